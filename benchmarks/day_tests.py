@@ -23,7 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri, stdtrit
 
-from rigidimeter.analysis.statistics import Epochs, difference, fit_mixed, nested, test_by_levels
+from rigidimeter.analysis.statistics import (
+    SubjectEpochs,
+    difference,
+    fit_mixed,
+    nested,
+    test_by_levels,
+)
 
 Array = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int], Array]
@@ -180,9 +186,9 @@ def rank_sum(x: Array, y: Array) -> bool:
     return bool(abs(away) > -ndtri(LEVEL / 2) * math.sqrt(x.size * y.size * (n + 1) / 12))
 
 
-def by_day(case: Case, x: Array, y: Array) -> Epochs:
+def by_day(case: Case, x: Array, y: Array) -> SubjectEpochs:
     """Return the epochs as the test by days takes them."""
-    found: Epochs = {}
+    found: SubjectEpochs = {}
     for k, (values, labels) in enumerate(zip((x, y), case.labels, strict=True)):
         for value, subject, day in zip(values.tolist(), *labels, strict=True):
             found.setdefault(subject, {}).setdefault(day, ([], []))[k].append(value)

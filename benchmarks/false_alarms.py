@@ -46,7 +46,7 @@ from rigidimeter.rig.guard import (
     torque_sign,
     watch,
 )
-from rigidimeter.virtual.batch import Batch, numbers, simulate_chunks, with_helpers
+from rigidimeter.virtual.batch import Batch, enum_numbers, simulate_chunks, with_helpers
 
 SIZES: dict[str, dict[str, Any]] = {
     "small": {
@@ -181,7 +181,7 @@ def compiled() -> Callable[..., tuple[int, int]]:
     def made(function: Callable[..., Any], **helpers: Any) -> Any:
         return njit(with_helpers(function, helpers), error_model="numpy", nogil=True)
 
-    causes = numbers(Cause)
+    causes = enum_numbers(Cause)
     solved_for = made(torque_sign.solved_for)
     sign = made(
         torque_sign.sign_is_wrong,

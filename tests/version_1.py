@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from rigidimeter.core.session import SCHEMA, read_samples
+from rigidimeter.core.session import SAMPLE_SCHEMA, read_samples
 
 OLD = ("checksum", "session_id")
 BATCH = 100
@@ -22,8 +22,12 @@ def as_version_1(folder: Path) -> Path:
     plain = [{name: v for name, v in line.items() if name not in OLD} for line in lines]
     events.write_text("".join(json.dumps(event) + "\n" for event in plain))
     columns = read_samples(folder / "samples.arrows")
-    table = pa.table({name: pa.array(values) for name, values in columns.items()}).cast(SCHEMA)
+    table = pa.table({name: pa.array(values) for name, values in columns.items()}).cast(
+        SAMPLE_SCHEMA
+    )
     options = pa.ipc.IpcWriteOptions(compression="lz4")
-    with pa.ipc.new_stream(str(folder / "samples.arrows"), SCHEMA, options=options) as stream:
+    with pa.ipc.new_stream(
+        str(folder / "samples.arrows"), SAMPLE_SCHEMA, options=options
+    ) as stream:
         stream.write_table(table, max_chunksize=BATCH)
     return folder

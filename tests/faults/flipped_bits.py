@@ -22,7 +22,7 @@ import numpy as np
 from tests.version_1 import as_version_1
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.session import Samples, read_session, recover, scan_samples
+from rigidimeter.core.session import StoredSamples, read_session, recover, scan_samples
 from rigidimeter.core.settings import parse_settings
 from rigidimeter.virtual import run_virtual_session
 
@@ -69,7 +69,7 @@ def flip_bits(folder: Path, name: str, n_bits: int, rng: np.random.Generator) ->
     return outcome
 
 
-def _samples(folder: Path) -> Samples:
+def _samples(folder: Path) -> StoredSamples:
     path = folder / "samples.arrows"
     return scan_samples(path.read_bytes(), path)
 

@@ -16,8 +16,8 @@ from rigidimeter.analysis.statistics import bootstrap, fit_mixed
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import (
     CELLS,
-    COLUMNS,
-    DIGITS,
+    MAX_COLUMNS,
+    MAX_DIGITS,
     NESTING,
     TABLE_ROWS,
     read_json,
@@ -44,7 +44,7 @@ def refused(path: Path, **options) -> str:
 
 
 DEEP = f"nested more than {NESTING} deep"
-LONG = f"more than {DIGITS} digits"
+LONG = f"more than {MAX_DIGITS} digits"
 
 
 @pytest.mark.parametrize(
@@ -71,8 +71,8 @@ def test_documents(tmp_path, read, text, told):
 
 def test_a_document_within_its_bounds(tmp_path):
     path = tmp_path / "a"
-    path.write_bytes(b'{"a": ' + b"9" * DIGITS + b"}")
-    assert read_json(path) == {"a": 10**DIGITS - 1}
+    path.write_bytes(b'{"a": ' + b"9" * MAX_DIGITS + b"}")
+    assert read_json(path) == {"a": 10**MAX_DIGITS - 1}
     path.write_bytes(b"[" * NESTING + b"]" * NESTING)
     assert read_json(path)
 
@@ -132,7 +132,7 @@ def test_a_million_columns(tmp_path):
     path = tmp_path / "wide.csv"
     names = b",".join(b"c%d" % k for k in range(10**6))
     path.write_bytes(names + b"\n" + b"1," * (10**6 - 1) + b"1\n")
-    told = f"names 1000000 columns; at most {COLUMNS} are read"
+    told = f"names 1000000 columns; at most {MAX_COLUMNS} are read"
     assert told in refused(path)
     assert told in refusal(read_text_table, path)
 
@@ -185,9 +185,9 @@ def test_an_array_that_is_shorter_than_its_header_says(tmp_path, shape, descr):
 def test_an_archive_of_many_entries(tmp_path):
     path = tmp_path / "r.npz"
     with zipfile.ZipFile(path, "w") as archive:
-        for k in range(COLUMNS + 1):
+        for k in range(MAX_COLUMNS + 1):
             archive.writestr(f"a{k}.npy", b"")
-    assert f"holds {COLUMNS + 1} entries; at most {COLUMNS} are read" in refused(path)
+    assert f"holds {MAX_COLUMNS + 1} entries; at most {MAX_COLUMNS} are read" in refused(path)
 
 
 def mat5(*elements: bytes) -> bytes:

@@ -17,14 +17,15 @@ from rigidimeter.paper import (
     AGREES,
     DIFFERS,
     MAKERS,
-    SECTIONS,
+    STATEMENTS,
     UNPUBLISHED,
     VERDICTS,
-    Check,
+    Bound,
+    Claim,
     Context,
-    Row,
     cycles_counted,
     drawn,
+    factored,
     highpass_errors_percent,
     ledger_text,
     make_rows,
@@ -34,8 +35,7 @@ from rigidimeter.paper import (
     position_sd_deg,
     printed,
     r_from,
-    render_page,
-    scaled,
+    render_paper,
     scored,
     voluntary_errors_percent,
     work_change_percent,
@@ -66,11 +66,11 @@ def context(study_folder: Path) -> Context:
 
 
 @pytest.fixture(scope="module")
-def rows(context: Context) -> dict[str, Row]:
+def rows(context: Context) -> dict[str, Claim]:
     return {row.id: row for row in make_rows(context)}
 
 
-def check_of(row: Row, what: str) -> Check:
+def check_of(row: Claim, what: str) -> Bound:
     return next(check for check in row.checks if check.what.startswith(what))
 
 
@@ -102,7 +102,7 @@ def test_another_paper_would_get_another_verdict(
 
 
 def test_every_row_has_its_place_on_the_page() -> None:
-    listed = [row_id for makers in SECTIONS.values() for row_id in makers]
+    listed = [row_id for makers in STATEMENTS.values() for row_id in makers]
     assert sorted(listed) == sorted(MAKERS)
     wanted = {f"eq-{n}" for n in range(1, 9)} | {"table-1", "table-2"}
     wanted |= {"fig-1", "fig-2", "fig-3a", "fig-3b", "fig-6a", "fig-6b", "fig-7"}
@@ -111,7 +111,7 @@ def test_every_row_has_its_place_on_the_page() -> None:
     assert wanted <= set(listed)
 
 
-def test_verdicts(rows: dict[str, Row]) -> None:
+def test_verdicts(rows: dict[str, Claim]) -> None:
     found = {verdict: {r.id for r in rows.values() if r.verdict == verdict} for verdict in VERDICTS}
     assert found[UNPUBLISHED] == {
         "fig-4b", "fig-4c", "fig-4d", "fig-5a", "fig-5b", "fig-5c", "fig-7", "fig-8a", "fig-8b",
@@ -127,7 +127,7 @@ def test_verdicts(rows: dict[str, Row]) -> None:
     }  # fmt: skip
 
 
-def test_what_stands_for_unpublished_data_says_so(rows: dict[str, Row]) -> None:
+def test_what_stands_for_unpublished_data_says_so(rows: dict[str, Claim]) -> None:
     for row in rows.values():
         if row.verdict == UNPUBLISHED:
             assert row.virtual, row.id
@@ -135,7 +135,7 @@ def test_what_stands_for_unpublished_data_says_so(rows: dict[str, Row]) -> None:
             assert "irtual" in row.ours
 
 
-def test_the_files(rows: dict[str, Row], tmp_path) -> None:
+def test_the_files(rows: dict[str, Claim], tmp_path) -> None:
     page = write_ledger(list(rows.values()), tmp_path, seed=7)
     ledger = json.loads((tmp_path / "ledger.json").read_text(encoding="utf-8"))
     assert [entry["id"] for entry in ledger] == list(rows)
@@ -154,16 +154,16 @@ def test_the_files(rows: dict[str, Row], tmp_path) -> None:
         assert f'id="{row_id}"' in text
 
 
-def test_the_same_seed_gives_the_same_bytes(rows: dict[str, Row], study_folder: Path) -> None:
+def test_the_same_seed_gives_the_same_bytes(rows: dict[str, Claim], study_folder: Path) -> None:
     again = make_rows(small_context(study_folder), ["fig-5a", "fig-5c"])
     assert ledger_text(again) == ledger_text([rows["fig-5a"], rows["fig-5c"]])
     before = [rows["fig-5a"], rows["fig-5c"]]
     assert drawn(again) == drawn(before)
-    assert render_page(again, drawn(again), 7) == render_page(before, drawn(before), 7)
+    assert render_paper(again, drawn(again), 7) == render_paper(before, drawn(before), 7)
 
 
 def test_the_virtual_study_is_kept_as_a_study_folder(
-    rows: dict[str, Row], study_folder: Path
+    rows: dict[str, Claim], study_folder: Path
 ) -> None:
     assert (study_folder / "study.toml").is_file()
     assert (study_folder / "sessions.csv").is_file()
@@ -171,7 +171,7 @@ def test_the_virtual_study_is_kept_as_a_study_folder(
 
 
 def test_another_seed_does_not_take_the_study_that_is_there(
-    rows: dict[str, Row], study_folder: Path
+    rows: dict[str, Claim], study_folder: Path
 ) -> None:
     other = Context(8, design=tiny(), folder=study_folder, processes=1)
     with pytest.raises(UserError, match=r"is the virtual study of .* seed 7.*not of .* seed 8"):
@@ -179,7 +179,7 @@ def test_another_seed_does_not_take_the_study_that_is_there(
 
 
 def test_the_whole_study_has_the_counts_of_table_1() -> None:
-    assert Context().counts == printed.COUNTS
+    assert Context().counts == printed.TABLE_1
 
 
 def test_every_measure_of_the_virtual_study_has_its_day_test(context: Context) -> None:
@@ -203,25 +203,25 @@ def test_units_by_the_position_sd(clock_hz: float) -> None:
     assert 15.0 <= position_sd_deg("per radian", clock_hz) <= 22.0
 
 
-def test_units_row_reads_per_degree(rows: dict[str, Row]) -> None:
+def test_units_row_reads_per_degree(rows: dict[str, Claim]) -> None:
     assert rows["app-a-units"].reading.startswith("Read per degree")
     assert "is unstable" in rows["app-a-units"].ours
     assert "is stable" in rows["sec-2.4.2-units"].ours
 
 
-def test_sums_of_appendix_a(rows: dict[str, Row]) -> None:
+def test_sums_of_appendix_a(rows: dict[str, Claim]) -> None:
     assert rows["app-a-inertia"].checks[0].ours == pytest.approx(0.00567, abs=5e-6)
     assert rows["app-a-damping"].checks[0].ours == pytest.approx(0.088)
 
 
-def test_corners_of_equation_8(rows: dict[str, Row]) -> None:
+def test_corners_of_equation_8(rows: dict[str, Claim]) -> None:
     assert rows["sec-2.4.3-bandwidth"].checks[0].ours == pytest.approx(3.44, abs=0.005)
     assert rows["eq-8-largest"].checks[0].ours == pytest.approx(6.84, abs=0.005)
     assert rows["eq-8-largest"].ours.count("Hz") == 10  # eight corners, the largest, the nominal
     assert "the very bandwidth of the nominal arm" in rows["eq-8-largest"].reason
 
 
-def test_equation_2_without_increment_is_nothing(rows: dict[str, Row], context: Context) -> None:
+def test_equation_2_without_increment_is_nothing(rows: dict[str, Claim], context: Context) -> None:
     assert check_of(rows["eq-2"], "Σ M / n").ours == pytest.approx(0.0, abs=1e-9)
     area = check_of(rows["eq-2"], "Σ M Δθ").ours
     assert area == pytest.approx(work_closed_form_j(printed.FIG_6, context.settings), rel=1e-3)
@@ -229,7 +229,7 @@ def test_equation_2_without_increment_is_nothing(rows: dict[str, Row], context: 
 
 def test_work_against_stiffness(context: Context) -> None:
     settings = context.settings
-    stiffer = scaled(printed.FIG_6, 1.0, 1.75)
+    stiffer = factored(printed.FIG_6, 1.0, 1.75)
     closed = math.pi * 0.13 * 2 * math.pi * math.radians(20.0) ** 2
     assert work_closed_form_j(stiffer, settings) == pytest.approx(closed)
     assert scored(stiffer, settings).work_j == pytest.approx(closed, rel=1e-3)
@@ -253,7 +253,7 @@ def test_an_uneven_arm_by_closed_form() -> None:
     assert check_of(row, "Asymmetry of an uneven arm").ours == pytest.approx(percent, rel=0.2)
 
 
-def test_the_order_of_effects_rests_on_which_p_is_taken(rows: dict[str, Row]) -> None:
+def test_the_order_of_effects_rests_on_which_p_is_taken(rows: dict[str, Claim]) -> None:
     margins = [check.ours for check in rows["sec-3.6-order"].checks]
     assert margins == pytest.approx([0.35 - 0.31, 0.311 - 0.329, 0.346 - 0.373], abs=1.5e-3)
 
@@ -271,7 +271,7 @@ def test_the_ratings_effect_is_not_significantly_smaller() -> None:
     assert f"stiffness {effects[0] - effects[1]:+.2f} [−" in printed_r
 
 
-def test_the_drawn_epoch_is_of_median_stiffness(rows: dict[str, Row], context: Context) -> None:
+def test_the_drawn_epoch_is_of_median_stiffness(rows: dict[str, Claim], context: Context) -> None:
     fits = [fit for fit in context.study.analysis.fixed_inertia if fit.condition == "OFF"]
     ranked = sorted(fit.stiffness_nm_rad for fit in fits if fit.outcome.included)
     median = ranked[(len(ranked) - 1) // 2]
@@ -281,7 +281,7 @@ def test_the_drawn_epoch_is_of_median_stiffness(rows: dict[str, Row], context: C
     assert f"K {number(median)})" in rows["fig-4b"].ours
 
 
-def test_figure_2_shows_the_loop_and_the_free_bodies(rows: dict[str, Row]) -> None:
+def test_figure_2_shows_the_loop_and_the_free_bodies(rows: dict[str, Claim]) -> None:
     assert [figure.name for figure in rows["fig-2"].figures] == ["fig-2", "fig-2b"]
     texts = [text.get_text() for text in rows["fig-2"].figures[1].draw().axes[0].texts]
     assert "J_p θ″ = M_meas + M_sub − B_p θ′ − K_p θ" in texts  # Eq. 5, left
@@ -338,12 +338,12 @@ def test_p_against_r_and_n() -> None:
         assert n_from(p, r) == pytest.approx(n)
 
 
-def test_f_test_without_intercept_is_not_the_contrast(rows: dict[str, Row]) -> None:
+def test_f_test_without_intercept_is_not_the_contrast(rows: dict[str, Claim]) -> None:
     check = rows["sec-3.1-f-test"].checks[0]
     assert check.ours < 1e-3 * check.paper
 
 
-def test_stiffness_is_printed_three_ways(rows: dict[str, Row]) -> None:
+def test_stiffness_is_printed_three_ways(rows: dict[str, Claim]) -> None:
     assert rows["k-printed"].checks[0].ours == pytest.approx(100 * (1.751 / 1.130 - 1))
 
 

@@ -11,8 +11,8 @@ from rigidimeter.paper import (
     AGREES,
     DIFFERS,
     UNPUBLISHED,
-    Check,
-    Row,
+    Bound,
+    Claim,
     bounded,
     near,
     rounded,
@@ -20,12 +20,8 @@ from rigidimeter.paper import (
 )
 
 
-def row_with(*checks: Check, **changes: object) -> Row:
-    return replace(
-        Row("o", (near("x", "m", 1.0, 1.0, 0.1),)),
-        checks=checks,
-        **changes,
-    )
+def row_with(*checks: Bound, **changes: object) -> Claim:
+    return replace(Claim("o", (near("x", "m", 1.0, 1.0, 0.1),)), checks=checks, **changes)
 
 
 def test_a_verdict_follows_from_the_numbers() -> None:
@@ -58,4 +54,4 @@ def test_rounding_allows_half_of_the_last_digit() -> None:
 
 def test_a_row_needs_something_that_decides() -> None:
     with pytest.raises(ValueError, match="neither a check"):
-        Row("o")
+        Claim("o")

@@ -10,9 +10,9 @@ from rigidimeter.analysis.statistics import ranksum
 from rigidimeter.core.records import Epoch, Fit
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.planning import (
-    PARAMETERS,
-    Precision,
-    Wanted,
+    PARAMETER_NAMES,
+    PredictedPrecision,
+    WantedDifference,
     detect,
     prbs_nm,
     predicted_precision,
@@ -24,7 +24,7 @@ SESSION = 25
 """Epochs that are fitted together."""
 
 
-def plan(voluntary_sd_nm: float, rig: dict) -> tuple[Settings, Precision]:
+def plan(voluntary_sd_nm: float, rig: dict) -> tuple[Settings, PredictedPrecision]:
     """Return settings whose only subject has this voluntary torque, and what is predicted."""
     subject = {"OFF": {"voluntary_sd_nm": voluntary_sd_nm}}
     settings = parse_settings(
@@ -40,7 +40,7 @@ def sessions(settings: Settings, epochs: int, seed: int) -> Iterator[list[Epoch]
 
 
 def table(fits: list[Fit], ending: str = "") -> np.ndarray:
-    return np.array([[getattr(fit, name + ending) for name in PARAMETERS] for fit in fits])
+    return np.array([[getattr(fit, name + ending) for name in PARAMETER_NAMES] for fit in fits])
 
 
 @pytest.mark.parametrize(("voluntary_sd_nm", "rig"), [(0.0, {}), (0.2, {}), (0.2, PAPER_RATES)])
@@ -104,7 +104,7 @@ def test_studies_see_the_difference_as_often_as_predicted() -> None:
         }
     )
     torque_nm = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
-    found = detect(settings, torque_nm, Wanted.parse("damping=20%"))
+    found = detect(settings, torque_nm, WantedDifference.parse("damping=20%"))
     assert found.planned == (n, n)
     significant, values = 0, []
     for batch in simulate_chunks(

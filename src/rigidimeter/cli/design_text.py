@@ -14,7 +14,7 @@ from rigidimeter.planning import (
     Detection,
     MultisineComparison,
     chip_count,
-    period_s,
+    prbs_period_s,
     prbs_toml,
     time_constant_s,
 )
@@ -56,8 +56,8 @@ def _prbs(design: Design) -> Iterator[Block]:
     yield Heading("Torque perturbation (PRBS)")
     yield (
         f"  {prbs.register_bits} bits ({chip_count(prbs)} chips) at {prbs.clock_hz:g} Hz, period "
-        f"{period_s(prbs):.4g} s; {prbs.duration_s:g} s at {design.settings.rig.tick_rate_hz:g} "
-        "ticks/s"
+        f"{prbs_period_s(prbs):.4g} s; {prbs.duration_s:g} s at "
+        f"{design.settings.rig.tick_rate_hz:g} ticks/s"
     )
     yield f"  ±{prbs.amplitude_nm:g} N·m; without its mean {low_nm:+.4g} and {high_nm:+.4g} N·m"
     yield (

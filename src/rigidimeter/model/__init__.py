@@ -12,7 +12,7 @@ from rigidimeter.model.controller import (
     tracking_step,
 )
 from rigidimeter.model.drive_model import (
-    EVEN,
+    ON_EDGE,
     ArmMotion,
     DriveModel,
     HeldCommand,

@@ -36,11 +36,9 @@ import scipy
 from numpy.typing import NDArray
 
 from rigidimeter.model.sensors import SAME_TIME_S
+from rigidimeter.model.velocity_drive import Array, Complex
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-
-EVEN = 0.01
+ON_EDGE = 0.01
 """A time this share of an interval away from an edge of the command is the edge."""
 
 APART = 1e-4
@@ -131,7 +129,9 @@ class DriveModel:
         -------
         array, shape (3, m)
         """
-        whole, rest_s = self._since_edge(after_s, interval_s)
+        place = (after_s - self.delay_s) / interval_s
+        tick = math.floor(place + ON_EDGE)
+        rest_s = (place - tick if place - tick > ON_EDGE else 0.0) * interval_s
         motion = np.zeros((3, z.size), dtype=np.complex128)
         for pole, residue, pair in self.modes():
             both = ((pole, residue), (pole.conjugate(), residue.conjugate()))
@@ -142,7 +142,7 @@ class DriveModel:
                 motion += np.array([r * p, r, r / p])[:, None] * state
         motion[0] += self.jump * (1.0 if rest_s > 0 else 1 / z)
         motion[2] += self.gain * (interval_s / (z - 1) + rest_s)
-        return np.asarray(motion * z ** float(whole))
+        return np.asarray(motion * z ** float(tick))
 
     def motion(
         self,
@@ -162,13 +162,6 @@ class DriveModel:
         """Return the motion at the ticks under held commands, from rest, without the delay."""
         tick = np.arange(command_rad_s.size)
         return self.motion(command_rad_s, interval_s, tick, np.zeros(tick.size))
-
-    def _since_edge(self, after_s: float, interval_s: float) -> tuple[int, float]:
-        """Return the tick and the time after it that are `after_s` less the delay."""
-        place = (after_s - self.delay_s) / interval_s
-        whole = math.floor(place + EVEN)
-        rest = place - whole
-        return whole, (rest if rest > EVEN else 0.0) * interval_s
 
     def modes(self) -> Iterator[tuple[complex, complex, bool]]:
         """Yield pole, residue, and whether they stand for a conjugate pair."""

@@ -36,16 +36,17 @@ from numpy.typing import ArrayLike
 
 from rigidimeter.core.settings import ControllerSettings, RigSettings, Settings, SubjectSettings
 from rigidimeter.model.controller import admittance, butterworth_lowpass
-from rigidimeter.model.drive_model import Array, Complex, DriveModel, lowpass
+from rigidimeter.model.drive_model import DriveModel, lowpass
 from rigidimeter.model.joint import JointDynamics, median_joint
 from rigidimeter.model.subject_torque import subject_density
+from rigidimeter.model.velocity_drive import Array, Complex
 
 Parameters = tuple[float, float, float]
 """J, B and K of the joint."""
 
 _PARTS_OF_A_TICK = 1_000_000
 
-_MOST_SAMPLES_A_PATTERN = 64
+_MAX_PATTERN_SAMPLES = 64
 """Rates are compared as a fraction of at most this denominator."""
 
 _LINES_A_HZ = 50
@@ -55,7 +56,7 @@ _DIGITS = 36.0
 """−ln of the relative rounding of a float, 2e-16."""
 
 
-class Reading(NamedTuple):
+class PatternReading(NamedTuple):
     """Which sample is read at one tick of the pattern.
 
     Attributes
@@ -299,14 +300,14 @@ def _delays(z: Complex, first: int, count: int) -> Complex:
 
 
 @lru_cache(maxsize=16)
-def reading_pattern(rig: RigSettings) -> tuple[tuple[Reading, ...], Fraction]:
+def reading_pattern(rig: RigSettings) -> tuple[tuple[PatternReading, ...], Fraction]:
     """Return what is read at each tick until the pattern repeats, and the ticks per sample.
 
     Sample k arrives at k / rate (later by the jitter's bound) and is read at the first tick that is
     not before; it was sampled one latency earlier.
     """
     tick_rate, sensor_rate = Fraction(repr(rig.tick_rate_hz)), Fraction(repr(rig.torque.rate_hz))
-    ticks_per_sample = (tick_rate / sensor_rate).limit_denominator(_MOST_SAMPLES_A_PATTERN)
+    ticks_per_sample = (tick_rate / sensor_rate).limit_denominator(_MAX_PATTERN_SAMPLES)
     late, latency = (
         (Fraction(repr(value)) * tick_rate).limit_denominator(_PARTS_OF_A_TICK)
         for value in (rig.torque.jitter_s, rig.torque.latency_s)
@@ -314,5 +315,5 @@ def reading_pattern(rig: RigSettings) -> tuple[tuple[Reading, ...], Fraction]:
     pattern = []
     for tick in range(ticks_per_sample.numerator):
         sample = math.floor((tick - late) / ticks_per_sample)
-        pattern.append(Reading(sample, tick - sample * ticks_per_sample - late + latency))
+        pattern.append(PatternReading(sample, tick - sample * ticks_per_sample - late + latency))
     return tuple(pattern), ticks_per_sample

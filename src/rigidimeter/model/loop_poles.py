@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -31,7 +30,10 @@ def spectral_radius(settings: Settings, joint: JointDynamics) -> float:
     """
     over_pattern: Array | None = None
     pattern_ticks = 0
-    for tick, times in _tick_matrices(settings, joint):
+    schedule = _schedule(settings.rig)
+    line = 1 + max(tick.place for tick, _ in schedule)
+    for (after_ticks, place), times in schedule:
+        tick = _control(settings, line, place) @ _motion(settings, joint, line, after_ticks)
         ticks = np.linalg.matrix_power(tick, times)
         over_pattern = ticks if over_pattern is None else ticks @ over_pattern
         pattern_ticks += times
@@ -71,15 +73,6 @@ def _schedule(rig: RigSettings) -> tuple[tuple[_Tick, int], ...]:
         after = float(taken * ticks_per_sample - offset - (n - 1)) if taken != newest[n] else None
         ticks.append(_Tick(after, taken - reading.sample))
     return tuple((tick, len(list(times))) for tick, times in itertools.groupby(ticks))
-
-
-def _tick_matrices(settings: Settings, joint: JointDynamics) -> Iterator[tuple[Array, int]]:
-    """Yield the loop over one tick as a matrix, and for how many ticks on end it is that one."""
-    schedule = _schedule(settings.rig)
-    line = 1 + max(tick.place for tick, _ in schedule)
-    for (after_ticks, place), times in schedule:
-        control = _control(settings, line, place)
-        yield control @ _motion(settings, joint, line, after_ticks), times
 
 
 _ANGLE, _COMMAND, _FIRST, _SECOND, _SAMPLES = 2, 3, 4, 5, 6

@@ -13,8 +13,8 @@ SAME_TIME_S = 1e-9
 """Two times closer than this are the same: stamps are sums of rounded numbers."""
 
 _BLOCK = 4096
-_MOST_STEPS = 2.0**51
-_WHOLE_ONLY = 1.5 * 2.0**52  # from half to twice this, the numbers are whole: a sum is rounded
+_MAX_STEPS = 2.0**51
+_ROUNDING_SUM = 1.5 * 2.0**52  # from half to twice this, the numbers are whole: a sum is rounded
 
 
 def quantised(value: float, resolution: float) -> float:
@@ -26,9 +26,9 @@ def quantised(value: float, resolution: float) -> float:
     if resolution == 0.0:
         return value
     steps = value * (1.0 / resolution)
-    if not abs(steps) < _MOST_STEPS:
+    if not abs(steps) < _MAX_STEPS:
         return value
-    return ((steps + _WHOLE_ONLY) - _WHOLE_ONLY) * resolution
+    return ((steps + _ROUNDING_SUM) - _ROUNDING_SUM) * resolution
 
 
 def moment(taken_s: float, now_s: float, interval_s: float) -> tuple[float, float]:

@@ -5,8 +5,8 @@ from rigidimeter.paper.comparison_table import (
     DIFFERS,
     UNPUBLISHED,
     VERDICTS,
-    Check,
-    Row,
+    Bound,
+    Claim,
     bounded,
     near,
     rounded,
@@ -15,18 +15,25 @@ from rigidimeter.paper.comparison_table import (
 from rigidimeter.paper.context import Context
 from rigidimeter.paper.controller import position_sd_deg
 from rigidimeter.paper.highpass import highpass_errors_percent
-from rigidimeter.paper.paper_page import drawn, ledger_text, render_page, tally, write_ledger
-from rigidimeter.paper.printed import COUNTS
+from rigidimeter.paper.printed import TABLE_1
 from rigidimeter.paper.printed_effects import n_from, p_from, r_from
 from rigidimeter.paper.protocol_rows import cycles_counted
-from rigidimeter.paper.rows import MAKERS, SECTIONS, chosen, make_rows
+from rigidimeter.paper.rows import (
+    MAKERS,
+    STATEMENTS,
+    chosen,
+    drawn,
+    ledger_text,
+    make_rows,
+    render_paper,
+    tally,
+    write_ledger,
+)
 from rigidimeter.paper.score_rows import (
+    factored,
     imposed_epoch,
-    scaled,
     scored,
     work_change_percent,
     work_closed_form_j,
 )
 from rigidimeter.paper.simulated_epochs import noise_runs, voluntary_errors_percent
-
-__all__ = ["Context", "make_rows"]

@@ -8,7 +8,7 @@ from functools import partial
 from rigidimeter.analysis.report.contents import Figure
 from rigidimeter.analysis.report.numbers import number
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import Row, near, rounded, within_percent
+from rigidimeter.paper.comparison_table import Claim, near, rounded, within_percent
 from rigidimeter.paper.context import Context
 from rigidimeter.paper.paper_figures import arm_bode
 from rigidimeter.planning import (
@@ -24,12 +24,12 @@ BANDWIDTH_PERCENT = 5.0
 """How far a bandwidth may be from a printed one."""
 
 
-def forearm_inertia(context: Context) -> Row:
+def forearm_inertia(context: Context) -> Claim:
     """Compare the forearm as a rod about its end, m l²/3."""
     forearm = Forearm()
     length_m = math.sqrt(3.0 * printed.APP_A_FOREARM_INERTIA / forearm.mass_kg)
     ours = forearm.inertia_kg_m2
-    return Row(
+    return Claim(
         ours=f"m = {number(forearm.mass_kg)} kg; the printed inertia asks for "
         f"l = {number(length_m)} m, and l = {forearm.length_m:.3f} m gives {number(ours, 5)} kg·m²",
         checks=(
@@ -44,11 +44,11 @@ def forearm_inertia(context: Context) -> Row:
     )
 
 
-def total_inertia(context: Context) -> Row:
+def total_inertia(context: Context) -> Claim:
     """Compare the sum of forearm, robot and controller."""
     total = printed.APP_A_FOREARM_INERTIA + ROBOT_INERTIA_KG_M2 + CONTROLLER_INERTIA_KG_M2
     estimated = printed.FIG_4.inertia_kg_m2 + CONTROLLER_INERTIA_KG_M2
-    return Row(
+    return Claim(
         ours=f"{number(total)} kg·m²",
         reading="0.0052 is kept as the nominal value, because Eq. 8 is half of it. (The median "
         f"inertia of Sec. 3.5 plus the controller's would be {number(estimated)}.)",
@@ -56,19 +56,19 @@ def total_inertia(context: Context) -> Row:
     )
 
 
-def total_damping(context: Context) -> Row:
+def total_damping(context: Context) -> Claim:
     """Compare the sum of elbow and controller."""
     total = printed.APP_A_ELBOW_DAMPING + printed.APP_A_CONTROLLER_DAMPING
-    return Row(
+    return Claim(
         ours=f"{number(total)} N·m·s/rad",
         checks=(rounded("Total damping", "N·m·s/rad", printed.APP_A_DAMPING_TOTAL, total, 0.0001),),
     )
 
 
-def equation_8(context: Context) -> Row:
+def equation_8(context: Context) -> Claim:
     """Compare Eq. 8 with the arm of App. A less 50 % of everything."""
     ours, paper = corners().equation_8.joint, printed.EQUATION_8
-    return Row(
+    return Claim(
         ours=f"1/({ours.inertia_kg_m2:.4f} s² + {ours.damping_nm_s_rad:.3f} s + "
         f"{ours.stiffness_nm_rad:.2f}): half of {APPENDIX_A.inertia_kg_m2:g}, "
         f"{APPENDIX_A.damping_nm_s_rad:g} and {APPENDIX_A.stiffness_nm_rad:g}",
@@ -80,10 +80,10 @@ def equation_8(context: Context) -> Row:
     )
 
 
-def bandwidth(context: Context) -> Row:
+def bandwidth(context: Context) -> Claim:
     """Compare the −3 dB frequency of Eq. 8."""
     ours = printed.EQUATION_8.bandwidth_hz()
-    return Row(
+    return Claim(
         ours=f"−3 dB of Eq. 8 at {number(ours, 3)} Hz",
         checks=(
             within_percent("−3 dB of Eq. 8", "Hz", printed.BANDWIDTH_HZ, ours, BANDWIDTH_PERCENT),
@@ -91,16 +91,16 @@ def bandwidth(context: Context) -> Row:
     )
 
 
-def largest_bandwidth(context: Context) -> Row:
+def largest_bandwidth(context: Context) -> Claim:
     """Compare the bandwidth of Eq. 8 with that of all corners."""
     table = corners()
     eight, widest, nominal = table.equation_8, table.widest, table.nominal
     listed = "; ".join(f"({_signs(c)}) {number(c.bandwidth_hz, 3)} Hz" for c in table.corners)
-    return Row(
+    return Claim(
         ours=f"largest: {number(widest.bandwidth_hz, 3)} Hz at ({_signs(widest)}); "
         f"corners of (J, B, K): {listed}; nominal arm {number(nominal.bandwidth_hz, 3)} Hz",
-        reading=f"Both are reported; the perturbation reaches {printed.BAND_HZ[1]:g} Hz and covers "
-        "both.",
+        reading=f"Both are reported; the perturbation reaches {printed.EXCITED_HZ[1]:g} Hz and "
+        "covers both.",
         checks=(
             within_percent(
                 "Largest −3 dB frequency within ±50 %",
@@ -117,7 +117,7 @@ def largest_bandwidth(context: Context) -> Row:
     )
 
 
-def figure_3a(context: Context) -> Row:
+def figure_3a(context: Context) -> Claim:
     """Compare the Bode plot of Eq. 8, with the nominal arm and the widest corner beside it."""
     arm = printed.EQUATION_8
     curves = {
@@ -128,7 +128,7 @@ def figure_3a(context: Context) -> Row:
     at_corner = 20.0 * math.log10(
         abs(arm.compliance_rad_nm(printed.BANDWIDTH_HZ)) * arm.stiffness_nm_rad
     )
-    return Row(
+    return Claim(
         ours=f"|θ/M| of Eq. 8 at 3.5 Hz is {number(at_corner, 3)} dB against rest",
         checks=(near("|θ/M| at 3.5 Hz against rest", "dB", -3.0, at_corner, 0.5),),
         figures=(

@@ -19,16 +19,16 @@ from typing import Any, Literal, TypeAlias
 from rigidimeter.analysis.report.contents import Figure
 from rigidimeter.analysis.report.numbers import number
 
-Verdict: TypeAlias = Literal["agrees", "differs", "cannot be computed from what was published"]
+RowVerdict: TypeAlias = Literal["agrees", "differs", "cannot be computed from what was published"]
 
-AGREES: Verdict = "agrees"
-DIFFERS: Verdict = "differs"
-UNPUBLISHED: Verdict = "cannot be computed from what was published"
-VERDICTS: tuple[Verdict, ...] = (AGREES, DIFFERS, UNPUBLISHED)
+AGREES: RowVerdict = "agrees"
+DIFFERS: RowVerdict = "differs"
+UNPUBLISHED: RowVerdict = "cannot be computed from what was published"
+VERDICTS: tuple[RowVerdict, ...] = (AGREES, DIFFERS, UNPUBLISHED)
 
 
 @dataclass(frozen=True)
-class Check:
+class Bound:
     """One computed number and the interval in which it counts as what the paper says.
 
     Attributes
@@ -77,17 +77,17 @@ class Check:
         }
 
 
-def within_percent(what: str, unit: str, paper: float, ours: float, percent: float) -> Check:
+def within_percent(what: str, unit: str, paper: float, ours: float, percent: float) -> Bound:
     """Allow so many percent of the printed number either way."""
     return near(what, unit, paper, ours, abs(paper) * percent / 100.0)
 
 
-def near(what: str, unit: str, paper: float, ours: float, margin: float) -> Check:
+def near(what: str, unit: str, paper: float, ours: float, margin: float) -> Bound:
     """Allow a margin in the unit of the number either way."""
-    return Check(what, unit, paper, ours, paper - margin, paper + margin)
+    return Bound(what, unit, paper, ours, paper - margin, paper + margin)
 
 
-def rounded(what: str, unit: str, paper: float, ours: float, last_digit: float) -> Check:
+def rounded(what: str, unit: str, paper: float, ours: float, last_digit: float) -> Bound:
     """Allow half of the last digit that the paper prints."""
     # A number that ends in a five may be rounded either way.
     return near(what, unit, paper, ours, 0.5 * last_digit * (1.0 + 1e-9))
@@ -95,13 +95,13 @@ def rounded(what: str, unit: str, paper: float, ours: float, last_digit: float) 
 
 def bounded(
     what: str, unit: str, ours: float, *, low: float = -math.inf, high: float = math.inf
-) -> Check:
+) -> Bound:
     """Hold a number against a statement without one, such as "falls"."""
-    return Check(what, unit, None, ours, low, high)
+    return Bound(what, unit, None, ours, low, high)
 
 
 @dataclass(frozen=True)
-class Row:
+class Claim:
     """One equation, figure, table or statement of the paper beside what we compute.
 
     The words that do not depend on our numbers are in ``statements.toml``; `rows.make_rows` adds
@@ -111,7 +111,7 @@ class Row:
     ----------
     ours : str
         What we compute, in words and numbers.
-    checks : tuple of Check
+    checks : tuple of Bound
         They decide. May be empty only where `unpublished` says what is missing.
     figures : tuple of Figure
     unpublished : str
@@ -134,7 +134,7 @@ class Row:
     """
 
     ours: str
-    checks: tuple[Check, ...] = ()
+    checks: tuple[Bound, ...] = ()
     figures: tuple[Figure, ...] = ()
     unpublished: str = ""
     virtual: bool = False
@@ -150,7 +150,7 @@ class Row:
             raise ValueError(f"a row has neither a check nor missing data: {self.ours}")
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> RowVerdict:
         """What the rule says."""
         if self.unpublished:
             return UNPUBLISHED

@@ -26,7 +26,7 @@ from rigidimeter.model import (
     loop_margins,
 )
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import Row, bounded, within_percent
+from rigidimeter.paper.comparison_table import Claim, bounded, within_percent
 from rigidimeter.paper.context import Context
 from rigidimeter.planning import ideal_response, prbs_nm
 
@@ -57,7 +57,7 @@ _SINE_HZ, _CYCLES, _RATE_HZ = 2.0, 20, 1000.0
 """The torque that moves the arm of Eq. 3."""
 
 
-def equation_3(context: Context) -> Row:
+def equation_3(context: Context) -> Claim:
     """Compare the arm under a sinusoidal torque with the compliance of Eq. 3."""
     joint = printed.SEC_34
     count = round(_CYCLES * _RATE_HZ / _SINE_HZ)
@@ -66,7 +66,7 @@ def equation_3(context: Context) -> Row:
     last = slice(count // 2, None)  # the beginning has died out by then
     found = 2.0 * float(abs(np.mean(angles[last] * np.exp(-1j * phase[last]))))
     wanted = float(abs(joint.compliance_rad_nm(_SINE_HZ)))
-    return Row(
+    return Claim(
         ours=f"|θ/M| at {_SINE_HZ:g} Hz {number(found)} rad/N·m stepped through time, "
         f"{number(wanted)} rad/N·m from the transfer function",
         checks=(within_percent("|θ/M| at 2 Hz", "rad/N·m", wanted, found, 0.5),),
@@ -81,7 +81,7 @@ def position_sd_deg(reading: str, clock_hz: float) -> float:
     return deg_from_rad(float(np.std(angle)))
 
 
-def units(reading: str, context: Context) -> Row:
+def units(reading: str, context: Context) -> Claim:
     """Compare J_c and B_c, read per degree or per radian, with the motion of the paper."""
     sds = {each: [position_sd_deg(each, clock) for clock in CLOCKS_HZ] for each in READINGS}
     nearest = min(
@@ -91,7 +91,7 @@ def units(reading: str, context: Context) -> Row:
     controller = READINGS[reading]
     settings = Settings(controller=controller)
     margins = loop_margins(settings, printed.SEC_34)
-    return Row(
+    return Claim(
         ours=f"J_c = {number(controller.inertia_kg_m2)} kg·m²/rad, "
         f"B_c = {number(controller.damping_nm_s_rad)} N·m·s/rad: position SD "
         f"{' and '.join(number(sd, 3) for sd in sds[reading])} deg (the ideal loop with a 7-bit "
@@ -117,7 +117,7 @@ def units(reading: str, context: Context) -> Row:
     )
 
 
-def equation_4(context: Context) -> Row:
+def equation_4(context: Context) -> Claim:
     """Compare the motion under voluntary torque with that of arm and controller together."""
     controller, joint = context.settings.controller, printed.SEC_34
     frequency_hz = np.array([0.3, 1.0, 4.0])
@@ -135,7 +135,7 @@ def equation_4(context: Context) -> Row:
         for hz, each in zip(frequency_hz, ratio, strict=True)
     }
     per_hz = ", ".join(f"{number(off, 2)} % at {hz:g} Hz" for hz, off in off_percent.items())
-    return Row(
+    return Claim(
         ours=f"|θ/M_sub| of the loop with sensor, 20 Hz filter and drive is off by {per_hz}",
         checks=tuple(
             bounded(f"|θ/M_sub| at {hz:g} Hz against Eq. 4", "%", off, high=LOOP_PERCENT)
@@ -144,7 +144,7 @@ def equation_4(context: Context) -> Row:
     )
 
 
-def equation_5(context: Context) -> Row:
+def equation_5(context: Context) -> Claim:
     """Compare the measured torque with the perturbation less the controller.
 
     With the torque filter F and the drive D, from the command to the velocity,
@@ -155,7 +155,7 @@ def equation_5(context: Context) -> Row:
     """
     settings = context.settings
     paper, fast = _equation_5_percent(settings), _equation_5_percent(_fast(settings))
-    return Row(
+    return Claim(
         ours="within 0.15 to 10 Hz the two sides differ by "
         f"{number(paper, 3)} % of M_meas with the 20 Hz filter and a "
         f"{settings.rig.drive_bandwidth_hz:g} Hz drive, and by {number(fast, 3)} % with filter and "
@@ -188,7 +188,7 @@ def _equation_5_percent(settings: Settings) -> float:
         - controller.damping_nm_s_rad * velocity
     )
     frequency_hz = np.fft.rfftfreq(left.size, 1.0 / rate_hz)
-    inside = (frequency_hz >= printed.BAND_HZ[0]) & (frequency_hz <= printed.BAND_HZ[1])
+    inside = (frequency_hz >= printed.EXCITED_HZ[0]) & (frequency_hz <= printed.EXCITED_HZ[1])
     rest, whole = (
         float(np.sum(np.abs(np.fft.rfft(values)[inside]) ** 2)) for values in (left, measured)
     )

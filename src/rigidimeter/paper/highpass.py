@@ -16,7 +16,7 @@ from scipy import signal
 from rigidimeter.analysis.estimation import Signals, fit_inertia_damping_stiffness
 from rigidimeter.core.settings import Settings
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import Check, Row, bounded
+from rigidimeter.paper.comparison_table import Bound, Claim, bounded
 from rigidimeter.paper.context import Context
 from rigidimeter.paper.controller import READINGS
 from rigidimeter.paper.simulated_epochs import Triple, errors_percent, signed
@@ -89,21 +89,21 @@ def _ideal_signals(reading: str, settings: Settings) -> Signals:
     )
 
 
-def equation_6(context: Context) -> Row:
+def equation_6(context: Context) -> Claim:
     """Compare least squares on signals that were all treated alike with the joint."""
     worst = max(
         abs(error)
         for way in FILTERS
         for error in highpass_errors_percent("per degree", way, alike=True)
     )
-    return Row(
+    return Claim(
         ours="noise-free loop, all four signals high-passed alike: J, B and K within "
         f"{worst:.2f} %",
         checks=(bounded("Largest error of J, B, K", "%", worst, high=UNBIASED_PERCENT),),
     )
 
 
-def equation_7(context: Context) -> Row:
+def equation_7(context: Context) -> Claim:
     """Compare B and K with the joint when J is held: at the truth, and at another printed median.
 
     In the noise-free loop nothing but Eq. 7 itself can put B and K off.
@@ -116,7 +116,7 @@ def equation_7(context: Context) -> Row:
 
     true, other = held(printed.SEC_34.inertia_kg_m2), held(printed.FIG_4.inertia_kg_m2)
     worst = max(abs(error) for error in true[1:])
-    return Row(
+    return Claim(
         ours=f"noise-free loop, J held at its true {printed.SEC_34.inertia_kg_m2:g} kg·m²: B and K "
         f"within {worst:.2f} %; held at {printed.FIG_4.inertia_kg_m2:g}, the median that Sec. 3.5 "
         f"prints: B {signed(other[1], 2)} %, K {signed(other[2], 2)} %",
@@ -124,18 +124,18 @@ def equation_7(context: Context) -> Row:
     )
 
 
-def highpass(reading: str, context: Context) -> Row:
+def highpass(reading: str, context: Context) -> Claim:
     """Compare the high-pass on the position alone, with the controller read either way."""
     errors = {way: highpass_errors_percent(reading, way, alike=False)[2] for way in FILTERS}
     text = ", ".join(f"{signed(error, 0)} % {way}" for way, error in errors.items())
     alike = max(abs(highpass_errors_percent(reading, way, alike=True)[2]) for way in FILTERS)
-    return Row(
+    return Claim(
         ours=f"error of K without any noise, controller read {reading}: {text}; all four signals "
         f"alike {alike:.2f} %",
         reading="Second-order Butterworth; order and direction are not printed. We filter all "
         "signals alike and keep the printed way as the method published.",
         checks=tuple(
-            Check(f"Error of K, {way}", "%", 0.0, error, -UNBIASED_PERCENT, UNBIASED_PERCENT)
+            Bound(f"Error of K, {way}", "%", 0.0, error, -UNBIASED_PERCENT, UNBIASED_PERCENT)
             for way, error in errors.items()
         ),
     )

@@ -72,7 +72,7 @@ def arm_bode(arms: Mapping[str, JointDynamics]) -> Drawing:
     return figure
 
 
-def sensitivity(
+def sensitivity_plot(
     score: str, percents: Sequence[float], changes: Curves, enlarged: Curves | None = None
 ) -> Drawing:
     """Draw the change of a score against the value of a parameter, both in percent (Fig. 6).

@@ -16,7 +16,7 @@ CONTROLLER_INERTIA, CONTROLLER_DAMPING = 0.0008, 0.028
 POSITION_SD_DEG = 4.0
 """Sec. 2.4.3: "approximately 4 deg for each perturbation epoch"."""
 
-BAND_HZ = (0.15, 10.0)
+EXCITED_HZ = (0.15, 10.0)
 """Sec. 2.4.3 and Fig. 3(b)."""
 
 BANDWIDTH_HZ = 3.5
@@ -53,7 +53,7 @@ FIG_6 = JointDynamics(0.0044, 0.1300, 1.130)
 EPOCHS_A_CONDITION, SESSION_MIN = 15, 10.0
 """Sec. 2.3: epochs of a condition, and how long they last."""
 
-COUNTS = {
+TABLE_1 = {
     "ratings": {"OFF": 27, "DBS": 12},
     "sinusoid": {"OFF": 92, "DBS": 46},
     "prbs": {"OFF": 78, "DBS": 23},
@@ -74,7 +74,7 @@ class Measured(NamedTuple):
     @property
     def n(self) -> int:
         """How many values were compared."""
-        return sum(COUNTS[self.counted].values())
+        return sum(TABLE_1[self.counted].values())
 
 
 MEASURED = {

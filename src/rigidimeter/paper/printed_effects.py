@@ -17,9 +17,9 @@ from scipy.stats import norm
 from rigidimeter.analysis.report.numbers import number, p_value
 from rigidimeter.analysis.statistics import compare_published, effect_from_p, joint_test
 from rigidimeter.analysis.study import RatingsFound
-from rigidimeter.paper.comparison_table import Check, Row, bounded, rounded, within_percent
+from rigidimeter.paper.comparison_table import Bound, Claim, bounded, rounded, within_percent
 from rigidimeter.paper.context import Context
-from rigidimeter.paper.printed import COUNTS, MEASURED, Measured
+from rigidimeter.paper.printed import MEASURED, TABLE_1, Measured
 
 P_PERCENT = 5.0
 """How far two prints of one p may be apart."""
@@ -40,13 +40,6 @@ def n_from(p: float, r: float) -> float:
     return (float(norm.isf(p / 2.0)) / r) ** 2
 
 
-def _better_p(measured: Measured) -> float:
-    """Return the printed p from which the printed r follows more nearly."""
-    return min(
-        (measured.p_table, measured.p_text), key=lambda p: abs(r_from(p, measured.n) - measured.r)
-    )
-
-
 _PRINTS: Mapping[str, Callable[[Measured], float]] = {
     "Table 2": lambda measured: measured.p_table,
     "the text": lambda measured: measured.p_text,
@@ -60,7 +53,7 @@ _AS_P: Mapping[str, Callable[[Measured], float]] = {
 """The same, and the p that the printed r and N come to."""
 
 
-def line_of_table_2(name: str, context: Context) -> Row:
+def line_of_table_2(name: str, context: Context) -> Claim:
     """Compare p, r and N of one line of Table 2 with each other."""
     measured = MEASURED[name]
     n, p, r = measured.n, measured.p_table, measured.r
@@ -71,7 +64,7 @@ def line_of_table_2(name: str, context: Context) -> Row:
         f" The p of {measured.place} ({p_value(measured.p_text)}) gives {other:.3f}, which "
         f"{'fits' if fits else 'does not fit'}."
     )
-    return Row(
+    return Claim(
         source="Table 2, Table 1",
         paper=f"{measured.title}: p = {p_value(p)}, r = {r:.2f}, N = {n}",
         ours=f"p and N give r = {found:.3f}; r and N give p = {p_value(p_from(r, n))}; p and r "
@@ -90,12 +83,14 @@ def _reading(name: str) -> str:
         return "The text prints the same p."
     if name == "mupdrs":
         return "Its p is that of an F-test, from which the paper gives no z."
-    best = _better_p(measured)
+    best = min(
+        (measured.p_table, measured.p_text), key=lambda p: abs(r_from(p, measured.n) - measured.r)
+    )
     where = "the table's" if best == measured.p_table else f"that of {measured.place}"
     return f"Of the two printed p, {where} is nearer to r."
 
 
-def p_of_text(name: str, context: Context) -> Row:
+def p_of_text(name: str, context: Context) -> Claim:
     """Compare the p of the text with that of Table 2."""
     measured = MEASURED[name]
     table, text = measured.p_table, measured.p_text
@@ -105,7 +100,7 @@ def p_of_text(name: str, context: Context) -> Row:
         differs += " One is exactly twice the other: one-sided and two-sided?"
     if math.isclose(abs(math.log10(ratio)), 1.0):
         differs += " The digits are the same, the exponent is not."
-    return Row(
+    return Claim(
         source=f"{measured.place} against Table 2",
         paper=f"p = {p_value(text)} in {measured.place}, {p_value(table)} in Table 2",
         ours=f"a factor of {number(ratio, 3)}; r from the text's p {r_from(text, measured.n):.3f}, "
@@ -117,7 +112,7 @@ def p_of_text(name: str, context: Context) -> Row:
     )
 
 
-def order_of_effects(context: Context) -> Row:
+def order_of_effects(context: Context) -> Claim:
     """Compare the sizes of all effects: r as printed, and from the p of one place at a time."""
     found = {"r as printed": {name: one.r for name, one in MEASURED.items()}}
     for place, p_of in _PRINTS.items():
@@ -128,7 +123,7 @@ def order_of_effects(context: Context) -> Row:
         f"{which}: " + ", ".join(f"{name} {r:.3f}" for name, r in sizes.items())
         for which, sizes in found.items()
     )
-    return Row(
+    return Claim(
         ours=text,
         checks=tuple(
             bounded(
@@ -143,12 +138,12 @@ def order_of_effects(context: Context) -> Row:
     )
 
 
-def larger_effects(names: Sequence[str], other: str, context: Context) -> Row:
+def larger_effects(names: Sequence[str], other: str, context: Context) -> Claim:
     """Compare the effects of some measures with that of another: all p of one place, or all r."""
     texts, checks = [], []
     for place, p_of in _AS_P.items():
         effects = {
-            name: effect_from_p(p_of(m), COUNTS[m.counted]["OFF"], COUNTS[m.counted]["DBS"])
+            name: effect_from_p(p_of(m), TABLE_1[m.counted]["OFF"], TABLE_1[m.counted]["DBS"])
             for name, m in MEASURED.items()
         }
         found = []
@@ -159,14 +154,14 @@ def larger_effects(names: Sequence[str], other: str, context: Context) -> Row:
             )
             checks.append(bounded(f"Lower end, {name} less {other}, {place}", "1", d.low, low=0.0))
         texts.append(f"{place}: {', '.join(found)}".replace("-", "−"))
-    return Row(
+    return Claim(
         ours=f"rank-biserial correlation less that of {other}, with 95 % interval. "
         + "; ".join(texts),
         checks=tuple(checks),
     )
 
 
-def ratings_of(context: Context) -> RatingsFound:
+def virtual_ratings(context: Context) -> RatingsFound:
     """Return the ratings of the virtual study with the model of Sec. 2.2.
 
     A mean for each condition, no intercept, and a random offset for each examiner.
@@ -176,18 +171,18 @@ def ratings_of(context: Context) -> RatingsFound:
     return ratings
 
 
-def f_test(context: Context) -> Row:
+def f_test(context: Context) -> Claim:
     """Compare the F-test of all fixed effects with that of the contrast."""
-    ratings = ratings_of(context)
+    ratings = virtual_ratings(context)
     fit, contrast = ratings.fit, ratings.contrast
     both_zero = joint_test(fit, np.eye(len(fit.conditions)))
     means = " and ".join(number(mean, 3) for mean in fit.means.tolist())
-    return Row(
+    return Claim(
         ours=f"virtual ratings, means {means}: "
         f"F of all fixed effects {number(both_zero.f, 3)}, p = {p_value(both_zero.p_residual)}; "
         f"contrast OFF − DBS F {number(contrast.f, 3)}, p = {p_value(contrast.p_residual)}",
         checks=(
-            Check(
+            Bound(
                 "p of all fixed effects, no intercept, against the contrast's",
                 "1",
                 contrast.p_residual,

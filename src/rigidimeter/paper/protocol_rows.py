@@ -19,7 +19,7 @@ from rigidimeter.analysis.report.sections.perturbation_figure import perturbatio
 from rigidimeter.core.records import Channel
 from rigidimeter.core.settings import BlockSettings
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import Row, bounded, near, within_percent
+from rigidimeter.paper.comparison_table import Claim, bounded, near, within_percent
 from rigidimeter.paper.context import Context
 from rigidimeter.paper.score_rows import imposed_epoch
 from rigidimeter.planning import check_band, plan, power_spectrum, prbs_nm
@@ -35,16 +35,16 @@ def _perturbation(context: Context) -> Channel:
     return Channel("perturbation_nm", np.arange(values.size) / rate_hz, values)
 
 
-def figure_3b(context: Context) -> Row:
+def figure_3b(context: Context) -> Claim:
     """Compare the power spectral density of the perturbation."""
     prbs, rate_hz = context.settings.prbs, context.settings.rig.tick_rate_hz
-    low_hz, high_hz = printed.BAND_HZ
+    low_hz, high_hz = printed.EXCITED_HZ
     band = check_band(prbs, rate_hz)
     half = band.half_power_hz / prbs.clock_hz  # whatever the clock
     reaching_hz = high_hz / half
     channel = _perturbation(context)
     share = power_spectrum(channel.values, rate_hz).share(low_hz, high_hz)
-    return Row(
+    return Claim(
         ours=f"7 bits at {prbs.clock_hz:g} Hz: lines from {number(band.line_spacing_hz)} "
         f"Hz on, {number(band.power_high_db, 3)} dB at {high_hz:g} Hz, half power at "
         f"{number(band.half_power_hz, 3)} Hz, {number(100 * share, 3)} % of the power in the band",
@@ -65,20 +65,20 @@ def figure_3b(context: Context) -> Row:
                 "Fig. 3(b) computed for a 7-bit sequence at 20 Hz; shaded: the band the paper "
                 "names.",
                 "Power spectral density of the perturbation with the band 0.15 to 10 Hz marked.",
-                partial(spectrum, channel, printed.BAND_HZ),
+                partial(spectrum, channel, printed.EXCITED_HZ),
             ),
         ),
     )
 
 
-def figure_4a(context: Context) -> Row:
+def figure_4a(context: Context) -> Claim:
     """Compare the perturbation over time."""
     prbs = context.settings.prbs
     channel = _perturbation(context)
     levels = np.unique(channel.values)
     mean = round(float(channel.values.mean()), 9) + 0.0  # free of the rounding of the sum
     duration_s = channel.values.size / context.settings.rig.tick_rate_hz
-    return Row(
+    return Claim(
         ours=f"mean {number(mean)} N·m, "
         f"{len(levels)} levels {' and '.join(number(float(v), 3) for v in levels)} N·m, "
         f"{duration_s:g} s, from one register start",
@@ -110,45 +110,43 @@ def cycles_counted(context: Context, motion_s: float) -> int:
     return scoring_cycles(imposed_epoch(printed.FIG_6, changed), scores).n_cycles
 
 
-def cycles_of_motion(context: Context) -> Row:
+def cycles_of_motion(context: Context) -> Claim:
     """Compare how many cycles 10 s of motion less two seconds hold."""
     count = cycles_counted(context, 10.0)
-    return Row(
-        ours=f"{count} cycles",
-        checks=(near("Cycles of 10 s of motion", "1", _CYCLES, count, 0.0),),
+    return Claim(
+        ours=f"{count} cycles", checks=(near("Cycles of 10 s of motion", "1", _CYCLES, count, 0.0),)
     )
 
 
-def cycles_of_epoch(context: Context) -> Row:
+def cycles_of_epoch(context: Context) -> Claim:
     """Compare how many cycles 20 s of motion would hold."""
     count = cycles_counted(context, 20.0)
-    return Row(
-        ours=f"{count} cycles",
-        checks=(near("Cycles of 20 s of motion", "1", _CYCLES, count, 0.0),),
+    return Claim(
+        ours=f"{count} cycles", checks=(near("Cycles of 20 s of motion", "1", _CYCLES, count, 0.0),)
     )
 
 
-def session_length(context: Context) -> Row:
+def session_length(context: Context) -> Claim:
     """Compare how long fifteen epochs take with their rests."""
     settings = context.settings
     block = BlockSettings(task="sinusoid", condition="OFF", epochs=printed.EPOCHS_A_CONDITION)
     protocol = settings.protocol.model_copy(update={"blocks": [block]})
     total_min = plan(protocol, settings.prbs, settings.sinusoid, settings.seed).total_s / 60.0
-    return Row(
+    return Claim(
         ours=f"{number(total_min, 3)} min, rests drawn at random",
         checks=(within_percent("15 epochs", "min", printed.SESSION_MIN, total_min, 25.0),),
     )
 
 
-def table_1(context: Context) -> Row:
+def table_1(context: Context) -> Claim:
     """Compare the counts with days, examiners and epochs a day."""
-    ratings, sines = printed.COUNTS["ratings"], printed.COUNTS["sinusoid"]
+    ratings, sines = printed.TABLE_1["ratings"], printed.TABLE_1["sinusoid"]
     rated = {name: days * _EXAMINERS for name, days in _DAYS.items()}
     planned = {name: days * printed.EPOCHS_A_CONDITION for name, days in _DAYS.items()}
     listed = "; ".join(
         f"{task} {numbers['OFF']}/{numbers['DBS']}" for task, numbers in context.counts.items()
     )
-    return Row(
+    return Claim(
         ours=f"9 and 4 days times 3 examiners: {rated['OFF']} and "
         f"{rated['DBS']} ratings; 15 epochs a day: {planned['OFF']} and "
         f"{planned['DBS']} sinusoids; our virtual study has {listed}",
@@ -162,20 +160,20 @@ def table_1(context: Context) -> Row:
     )
 
 
-def sequences(context: Context) -> Row:
+def sequences(context: Context) -> Claim:
     """Compare the two statements on how many perturbation sequences there were."""
-    count = sum(printed.COUNTS["prbs"].values())
-    return Row(
+    count = sum(printed.TABLE_1["prbs"].values())
+    return Claim(
         ours=f"Sec. 2.5 and Table 1 together: {count} epochs with distinct sequences",
         checks=(near("Sequences", "1", 1, count, 0.0),),
     )
 
 
-def one_stiffness(context: Context) -> Row:
+def one_stiffness(context: Context) -> Claim:
     """Compare the three values of the median stiffness."""
     values = [joint.stiffness_nm_rad for joint in (printed.SEC_34, printed.FIG_4, printed.FIG_6)]
     spread_percent = 100.0 * (max(values) / min(values) - 1.0)
-    return Row(
+    return Claim(
         ours=f"largest over smallest +{number(spread_percent, 3)} %; 1.130 is 1.310 with two "
         "digits exchanged",
         checks=(bounded("Spread of K", "%", spread_percent, high=0.5),),

@@ -26,7 +26,7 @@ from rigidimeter.model import (
     butterworth_lowpass,
 )
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import Row, bounded, within_percent
+from rigidimeter.paper.comparison_table import Claim, bounded, within_percent
 from rigidimeter.paper.context import Context
 from rigidimeter.planning import Forearm
 
@@ -38,13 +38,13 @@ _SINE_HZ, _CYCLES = 1.0, 10
 _ARM, _SUBJECT, _LINE = "#CFE3F1", "#F3E3D3", "#222222"
 
 
-def figure_1(context: Context) -> Row:
+def figure_1(context: Context) -> Claim:
     """Compare the part of the weight in K with K, the axis tilted as far as by eye."""
     forearm = Forearm()
     weight_nm = forearm.mass_kg * g * forearm.length_m / 2.0
     stiffness = printed.SEC_34.stiffness_nm_rad
     tilted = 100.0 * weight_nm * math.sin(math.radians(_TILT_DEG)) / stiffness
-    return Row(
+    return Claim(
         ours=f"the forearm's weight adds at most {number(tilted, 2)} % to K about an axis "
         f"{_TILT_DEG:g}° from the vertical, and {number(100.0 * weight_nm / stiffness, 2)} % about "
         "a horizontal one",
@@ -60,7 +60,7 @@ def figure_1(context: Context) -> Row:
     )
 
 
-def figure_2(context: Context) -> Row:
+def figure_2(context: Context) -> Claim:
     """Compare the stepped controller under a sinusoidal torque with its transfer function."""
     controller, rate_hz = context.settings.controller, context.settings.rig.tick_rate_hz
     J, B = controller.inertia_kg_m2, controller.damping_nm_s_rad
@@ -76,7 +76,7 @@ def figure_2(context: Context) -> Row:
     found = 2.0 * float(abs(np.mean(np.array(sent)[last] * np.exp(-1j * phase[last]))))
     s, corner = 2j * math.pi * _SINE_HZ, 2.0 * math.pi * controller.torque_cutoff_hz
     wanted = abs(1.0 / (J * s + B) / ((s / corner) ** 2 + math.sqrt(2.0) * s / corner + 1.0))
-    return Row(
+    return Claim(
         ours=f"|command/M_meas| at {_SINE_HZ:g} Hz {number(found)} rad/s per N·m stepped through "
         f"time, {number(wanted)} from the diagram",
         checks=(within_percent("|command/M_meas| at 1 Hz", "rad/(s·N·m)", wanted, found, 0.5),),

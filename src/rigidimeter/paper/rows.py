@@ -1,27 +1,50 @@
-"""All rows in the order of the page: their texts, and the functions that compute ours."""
+"""All rows in the order of the page: their texts, the functions that compute ours, and the files.
+
+The files are a page that needs nothing beside it, ``ledger.json`` and the figures.
+"""
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
+import jinja2
+from markupsafe import Markup
+
+from rigidimeter.analysis.report.numbers import number
+from rigidimeter.analysis.report.page import data_uri, shown_text
+from rigidimeter.analysis.report.style import svg_text
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import json_text, write_text
+from rigidimeter.core.version import __version__
 from rigidimeter.paper import appendix, controller, highpass, rig_drawings, score_rows
 from rigidimeter.paper import printed_effects as effects
 from rigidimeter.paper import protocol_rows as protocol
 from rigidimeter.paper import sensitivity_rows as sensitivity
 from rigidimeter.paper import simulated_epochs as simulated
 from rigidimeter.paper import virtual_rows as virtual
-from rigidimeter.paper.comparison_table import Row
+from rigidimeter.paper.comparison_table import (
+    AGREES,
+    DIFFERS,
+    UNPUBLISHED,
+    VERDICTS,
+    Claim,
+    RowVerdict,
+)
 from rigidimeter.paper.context import Context
 
-Maker = Callable[[Context], Row]
+_SHORT = {AGREES: "agrees", DIFFERS: "differs", UNPUBLISHED: "unpublished"}
+"""As names of CSS classes."""
 
-SECTIONS: Mapping[str, Mapping[str, Mapping[str, Any]]] = tomllib.loads(
+Maker = Callable[[Context], Claim]
+
+STATEMENTS: Mapping[str, Mapping[str, Mapping[str, Any]]] = tomllib.loads(
     (resources.files("rigidimeter.paper") / "statements.toml").read_text(encoding="utf-8")
 )
 """The page: by section and row, those texts of a row that do not depend on our numbers."""
@@ -109,18 +132,19 @@ def chosen(only: Iterable[str]) -> tuple[str, ...]:
     wanted = set(only)
     unknown = sorted(wanted - MAKERS.keys())
     if unknown:
-        every = ", ".join(row_id for texts in SECTIONS.values() for row_id in texts)
+        every = ", ".join(row_id for texts in STATEMENTS.values() for row_id in texts)
         raise UserError(f"--only {unknown[0]}: there is no such row; the rows are {every}")
     return tuple(
-        row_id for texts in SECTIONS.values() for row_id in texts if not wanted or row_id in wanted
+        row_id
+        for texts in STATEMENTS.values()
+        for row_id in texts
+        if not wanted or row_id in wanted
     )
 
 
 def make_rows(
-    context: Context,
-    only: Iterable[str] = (),
-    progress: Callable[[str], None] = lambda _: None,
-) -> list[Row]:
+    context: Context, only: Iterable[str] = (), progress: Callable[[str], None] = lambda _: None
+) -> list[Claim]:
     """Make rows in the order of the page.
 
     Parameters
@@ -136,9 +160,91 @@ def make_rows(
     UserError
         If a name is no row.
     """
-    texts = {row_id: each for section in SECTIONS.values() for row_id, each in section.items()}
+    texts = {row_id: each for section in STATEMENTS.values() for row_id, each in section.items()}
     rows = []
     for row_id in chosen(only):
         rows.append(replace(MAKERS[row_id](context), id=row_id, **texts[row_id]))
         progress(row_id)
     return rows
+
+
+def tally(rows: Sequence[Claim]) -> dict[RowVerdict, int]:
+    """Return how many rows have each verdict."""
+    counted = Counter(row.verdict for row in rows)
+    return {verdict: counted[verdict] for verdict in VERDICTS}
+
+
+def ledger_text(rows: Sequence[Claim]) -> str:
+    """Return ``ledger.json``: a list with one object for each row."""
+    return json_text([row.as_dict() for row in rows])
+
+
+def drawn(
+    rows: Sequence[Claim], progress: Callable[[str], None] = lambda _: None
+) -> dict[str, str]:
+    """Return every figure as SVG by its name; those of virtual data are marked."""
+    svg = {}
+    for row in rows:
+        for figure in row.figures:
+            svg[figure.name] = svg_text(figure.draw(), "virtual data" if row.virtual else "")
+        progress(row.id)
+    return svg
+
+
+def render_paper(rows: Sequence[Claim], svg: Mapping[str, str], seed: int) -> str:
+    """Return the page as text, with its style inside, and the figures that `svg` has by name."""
+    own, report = (
+        resources.files("rigidimeter.paper"),
+        resources.files("rigidimeter.analysis.report"),
+    )
+    environment = jinja2.Environment(
+        autoescape=True,
+        finalize=shown_text,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.globals["number"] = number
+    environment.globals["short"] = _SHORT
+    template = environment.from_string((own / "page.html").read_text(encoding="utf-8"))
+    css = [(room / "page.css").read_text(encoding="utf-8") for room in (report, own)]
+    by_id = {row.id: row for row in rows}
+    return template.render(
+        # The styles are this package's own files, so they may stand as they are.
+        css=Markup("\n".join(css)),
+        sections=[
+            (title, kept)
+            for title, makers in STATEMENTS.items()
+            if (kept := [by_id[row_id] for row_id in makers if row_id in by_id])
+        ],
+        images={name: data_uri(text) for name, text in svg.items()},
+        tally=tally(rows),
+        virtual=any(row.virtual for row in rows),
+        seed=seed,
+        version=__version__,
+    )
+
+
+def write_ledger(
+    rows: Sequence[Claim], out: Path, seed: int, progress: Callable[[str], None] = lambda _: None
+) -> Path:
+    """Write page, ledger and figures into a folder; return the page's path.
+
+    Parameters
+    ----------
+    rows : sequence of Claim
+    out : Path
+        Made if it does not exist. Files of the same names are replaced.
+    seed : int
+        As the page states it.
+    progress : callable
+        Called with the id of each row once its figures are drawn.
+    """
+    (out / "figures").mkdir(parents=True, exist_ok=True)
+    svg = drawn(rows, progress)
+    for name, text in svg.items():
+        write_text(out / "figures" / f"{name}.svg", text)
+    write_text(out / "ledger.json", ledger_text(rows))
+    page = out / "paper.html"
+    write_text(page, render_paper(rows, svg, seed))
+    return page

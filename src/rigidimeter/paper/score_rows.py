@@ -19,7 +19,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rigidimeter.analysis.estimation import Cycles, score_epoch, scoring_cycles
@@ -31,16 +30,14 @@ from rigidimeter.analysis.report.style import GREY
 from rigidimeter.core.records import Channel, Epoch, Motion, Score
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.units import rad_from_deg
-from rigidimeter.model import JointDynamics
+from rigidimeter.model import Array, JointDynamics
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import Row, bounded, within_percent
+from rigidimeter.paper.comparison_table import Claim, bounded, within_percent
 from rigidimeter.paper.context import Context
 from rigidimeter.planning import sinusoid
 
 SCORE_PERCENT = 0.5
 """How far a score may be from its closed form; the band-pass remembers the start of the motion."""
-
-Array = NDArray[np.float64]
 
 
 def imposed_epoch(joint: JointDynamics, settings: Settings, uneven: float = 0.0) -> Epoch:
@@ -73,7 +70,7 @@ def imposed_epoch(joint: JointDynamics, settings: Settings, uneven: float = 0.0)
     )
 
 
-def scaled(joint: JointDynamics, damping: float = 1.0, stiffness: float = 1.0) -> JointDynamics:
+def factored(joint: JointDynamics, damping: float = 1.0, stiffness: float = 1.0) -> JointDynamics:
     """Return the joint with damping and stiffness times a factor."""
     return replace(
         joint,
@@ -122,7 +119,7 @@ def work_change_percent(
             return float(np.sum(torque[:-1] * np.diff(angle)))
         return loop_area_j(torque, angle)
 
-    return 100.0 * (work(scaled(printed.FIG_6, damping, stiffness)) / work(printed.FIG_6) - 1.0)
+    return 100.0 * (work(factored(printed.FIG_6, damping, stiffness)) / work(printed.FIG_6) - 1.0)
 
 
 def _pure_cycles(
@@ -141,19 +138,19 @@ def _pure_cycles(
     return torque, amplitude * np.sin(omega * time_s)
 
 
-def equation_1(context: Context) -> Row:
+def equation_1(context: Context) -> Claim:
     """Compare the angular impulse with its closed form."""
     ours = scored(printed.FIG_6, context.settings).impulse_nm_s
     amplitude, omega, elastic, viscous = _parts(printed.FIG_6, context.settings)
     wanted = 4.0 * amplitude * math.hypot(elastic, viscous) / omega
-    return Row(
+    return Claim(
         ours=f"{number(ours, 5)} N·m·s a cycle for the joint of Fig. 6; the integral is "
         f"{number(wanted, 5)}",
         checks=(within_percent("Impulse per cycle", "N·m·s", wanted, ours, SCORE_PERCENT),),
     )
 
 
-def equation_2(context: Context) -> Row:
+def equation_2(context: Context) -> Claim:
     """Compare Eq. 2 with and without the displacement increment."""
     settings = context.settings
     area = scored(printed.FIG_6, settings).work_j
@@ -161,7 +158,7 @@ def equation_2(context: Context) -> Row:
     torque, _ = _pure_cycles(printed.FIG_6, settings, settings.rig.tick_rate_hz)
     # Without the rounding that is left of a sum of nothing.
     as_printed = round(float(np.sum(torque[:-1])) / settings.scores.cycles, 9) + 0.0
-    return Row(
+    return Claim(
         ours=f"as printed {abs(as_printed):.4f} N·m; with the increment, Σ M Δθ / n, "
         f"{number(area, 5)} J (πBωA² = {number(wanted, 5)} J)",
         checks=(
@@ -175,7 +172,7 @@ _UNEVEN = 0.3
 """Of the arm in `asymmetry`: stiffer by 30 % one way and softer by 30 % the other."""
 
 
-def asymmetry(context: Context) -> Row:
+def asymmetry(context: Context) -> Claim:
     """Compare the torque at the two ends of the motion, of a linear and of an uneven arm.
 
     With K (1 ± ε) on either side the torque at the ends is ±(K (1 ± ε) − Jω²) A, and a spring of
@@ -190,7 +187,7 @@ def asymmetry(context: Context) -> Row:
     )
     work = score_epoch(uneven_epoch, settings.scores, settings.estimation).work_j
     change = 100.0 * (work / work_closed_form_j(printed.FIG_6, settings) - 1.0)
-    return Row(
+    return Claim(
         ours=f"torque at the two ends, difference over mean: {number(linear, 2)} % for Eq. 3, "
         f"{number(uneven, 3)} % for an arm {100 * _UNEVEN:g} % stiffer one way and softer the "
         f"other, whose work is off by {number(change, 2)} %",

@@ -15,10 +15,10 @@ from rigidimeter.analysis.report.contents import Figure
 from rigidimeter.analysis.report.numbers import number
 from rigidimeter.core.settings import Settings
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import Check, Row, bounded
+from rigidimeter.paper.comparison_table import Bound, Claim, bounded
 from rigidimeter.paper.context import Context
-from rigidimeter.paper.paper_figures import Curves, sensitivity
-from rigidimeter.paper.score_rows import scaled, scored, work_change_percent, work_closed_form_j
+from rigidimeter.paper.paper_figures import Curves, sensitivity_plot
+from rigidimeter.paper.score_rows import factored, scored, work_change_percent, work_closed_form_j
 
 PERCENTS = (25.0, 50.0, 100.0, 150.0, 175.0)
 """Values of one parameter in percent of the median, as in Fig. 6; 100 is the median itself."""
@@ -43,7 +43,7 @@ def _changes(settings: Settings, measure: str) -> dict[str, list[float]]:
     """Return the change of a score at each of `PERCENTS`, by the product's own scoring."""
 
     def score(**factors: float) -> float:
-        return float(getattr(scored(scaled(printed.FIG_6, **factors), settings), measure))
+        return float(getattr(scored(factored(printed.FIG_6, **factors), settings), measure))
 
     before = score()
     return {
@@ -52,20 +52,20 @@ def _changes(settings: Settings, measure: str) -> dict[str, list[float]]:
     }
 
 
-def _rises(what: str, changes: Sequence[float]) -> Check:
+def _rises(what: str, changes: Sequence[float]) -> Bound:
     step = float(np.min(np.diff(changes)))
     return bounded(f"Smallest step with {what}", "%", step, low=VISIBLE_PERCENT)
 
 
-def _falls(what: str, change: float) -> Check:
+def _falls(what: str, change: float) -> Bound:
     return bounded(f"Change at K 175 %, {what}", "%", change, high=-VISIBLE_PERCENT)
 
 
-def figure_6a(context: Context) -> Row:
+def figure_6a(context: Context) -> Claim:
     """Compare how the impulse rises with damping and stiffness."""
     curves = _changes(context.settings, "impulse_nm_s")
     B, K = curves.values()
-    return Row(
+    return Claim(
         ours=f"at 25, 50, 150 and 175 %: B {_listed(B)}; K {_listed(K)}",
         checks=(
             _rises("B", B),
@@ -83,7 +83,7 @@ def figure_6a(context: Context) -> Row:
     )
 
 
-def figure_6b(context: Context) -> Row:
+def figure_6b(context: Context) -> Claim:
     """Compare how the work changes with damping and stiffness."""
     settings = context.settings
     curves = _changes(settings, "work_j")
@@ -97,7 +97,7 @@ def figure_6b(context: Context) -> Row:
         ]
         for name, rule in _RULES.items()
     }
-    return Row(
+    return Claim(
         ours=f"B: {_listed(B)}; K at 175 %: {abs(K[-1]):.2f} % by the "
         f"product, {abs(trapezoid):.2f} % by the trapezoid rule at 100 samples/s, 0 by the closed "
         "form πBωA²",
@@ -116,41 +116,41 @@ def figure_6b(context: Context) -> Row:
     )
 
 
-def left_sum(context: Context) -> Row:
+def left_sum(context: Context) -> Claim:
     """Compare the fall of the work with K when the loop is summed from one side."""
     change = {
         rate_hz: work_change_percent(context.settings, rate_hz, "left", stiffness=1.75)
         for rate_hz in (100.0, 50.0)
     }
     text = " and ".join(f"{number(c, 2)} % at {r:g} samples/s" for r, c in change.items())
-    return Row(
+    return Claim(
         ours=f"K +75 %, Σ M(k)(θ(k+1) − θ(k)): {text}",
         checks=tuple(_falls(f"{rate:g} samples/s", c) for rate, c in change.items()),
     )
 
 
-def delay(context: Context) -> Row:
+def delay(context: Context) -> Claim:
     """Compare the fall of the work with K when the torque is late against the angle."""
     settings = context.settings
     change = work_change_percent(settings, 100.0, "trapezoid", DELAY_S, stiffness=1.75)
     before, after = (
-        work_closed_form_j(scaled(printed.FIG_6, stiffness=factor), settings, DELAY_S)
+        work_closed_form_j(factored(printed.FIG_6, stiffness=factor), settings, DELAY_S)
         for factor in (1.0, 1.75)
     )
     closed = 100.0 * (after / before - 1.0)
-    return Row(
+    return Claim(
         ours=f"K +75 %, trapezoid rule, torque 10 ms late: {number(change, 3)} %; closed form "
         f"πA²(Bω cos ωτ − (K − Jω²) sin ωτ): {number(closed, 3)} %",
         checks=(_falls("10 ms", change),),
     )
 
 
-def cancelling(context: Context) -> Row:
+def cancelling(context: Context) -> Claim:
     """Compare the work when damping and stiffness rise together."""
     settings = context.settings
     both = work_change_percent(settings, 100.0, damping=1.5, stiffness=1.5)
     late = work_change_percent(settings, 100.0, "trapezoid", DELAY_S, damping=1.5, stiffness=1.5)
-    return Row(
+    return Claim(
         ours=f"both +50 %: {number(both, 3)} % (with the torque 10 ms late {number(late, 3)} %)",
         checks=(
             bounded("Change with both at 150 %", "%", abs(both), high=_INSIGNIFICANT_PERCENT),
@@ -165,7 +165,7 @@ def _figure(
         name,
         caption,
         f"Change in {score} against damping and stiffness from 25 to 175 % of nominal.",
-        partial(sensitivity, score, PERCENTS, curves, artefacts),
+        partial(sensitivity_plot, score, PERCENTS, curves, artefacts),
     )
 
 

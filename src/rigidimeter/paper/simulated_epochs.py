@@ -15,20 +15,20 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rigidimeter.analysis.estimation import fit_epochs
 from rigidimeter.analysis.report.numbers import number
 from rigidimeter.core.records import Fit
 from rigidimeter.core.settings import Settings, SubjectSettings, parse_settings
+from rigidimeter.model import Array
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import Check, Row, bounded, near, within_percent
+from rigidimeter.paper.comparison_table import Bound, Claim, bounded, near, within_percent
 from rigidimeter.paper.context import Context
 from rigidimeter.planning import prbs_nm, predicted_precision
 from rigidimeter.virtual import PAPER_RATES
 from rigidimeter.virtual.batch import simulate_epochs
 
-Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 TRUTH = np.array(printed.SEC_34.parameters)
@@ -64,9 +64,9 @@ def _fitted(fit: Fit) -> Triple:
     return fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad
 
 
-def _unbiased(errors: Triple, percent: float) -> tuple[Check, ...]:
+def _unbiased(errors: Triple, percent: float) -> tuple[Bound, ...]:
     return tuple(
-        Check(f"Error of {name}", "%", 0.0, error, -percent, percent)
+        Bound(f"Error of {name}", "%", 0.0, error, -percent, percent)
         for name, error in zip("JBK", errors, strict=True)
     )
 
@@ -116,12 +116,12 @@ def _noise_runs(context: Context) -> NoiseRuns:
     )
 
 
-def mean_errors(context: Context) -> Row:
+def mean_errors(context: Context) -> Claim:
     """Compare the mean errors of the paper's method with the printed ones."""
     found = noise_runs(context)
     percent = errors_percent(TRUTH + found.as_printed)
     allowed = _SIGMAS / math.sqrt(printed.SEC_34_RUNS)  # times a printed SD
-    return Row(
+    return Claim(
         ours=f"{context.runs} runs by the method as printed: {_numbers(found.as_printed)}, that is "
         f"{', '.join(signed(p, 0) for p in percent)} % of J, B, K",
         reading=f"Closed loop at the paper's rates, sensor noise {found.noise_sd_nm:g} N·m. The "
@@ -141,29 +141,29 @@ def mean_errors(context: Context) -> Row:
     )
 
 
-def mean_errors_by_instruments(context: Context) -> Row:
+def mean_errors_by_instruments(context: Context) -> Claim:
     """Compare the mean errors by instrumental variables with their standard errors."""
     found = noise_runs(context)
     percent = errors_percent(TRUTH + found.mean)
     sigmas = found.mean / (found.sd / np.sqrt(context.runs))
-    return Row(
+    return Claim(
         ours=f"{context.runs} runs: {_numbers(found.mean)}, that is "
         f"{', '.join(signed(p, 3) for p in percent)} % of J, B, K, or "
         f"{', '.join(signed(s, 1) for s in sigmas)} standard errors of the mean",
         checks=tuple(
-            Check(f"Mean error of {name}", "standard errors", 0.0, float(s), -_SIGMAS, _SIGMAS)
+            Bound(f"Mean error of {name}", "standard errors", 0.0, float(s), -_SIGMAS, _SIGMAS)
             for name, s in zip("JBK", sigmas, strict=True)
         ),
     )
 
 
-def spread_of_errors(context: Context) -> Row:
+def spread_of_errors(context: Context) -> Claim:
     """Compare the standard deviations with the Cramér–Rao bound."""
     found = noise_runs(context)
     ratio = np.array(printed.SEC_34_SD) / printed.SEC_34_SD[2]
     wanted = found.bound / found.bound[2]
     efficiency = ", ".join(f"{v:.2f}" for v in found.sd / found.bound)
-    return Row(
+    return Claim(
         ours=f"{_numbers(found.sd)} ({context.runs} runs), "
         f"{_numbers(found.sd / found.sd[2], ' : ')}; Cramér–Rao {_numbers(wanted, ' : ')}; "
         f"ours over the bound {efficiency}",
@@ -176,11 +176,11 @@ def spread_of_errors(context: Context) -> Row:
     )
 
 
-def implied_noise(context: Context) -> Row:
+def implied_noise(context: Context) -> Claim:
     """Compare the noise that the printed SD of K would need with the sensor's."""
     found = noise_runs(context)
     implied_nm = found.noise_sd_nm * printed.SEC_34_SD[2] / float(found.bound[2])
-    return Row(
+    return Claim(
         ours=f"the printed SD of K needs a noise of {number(implied_nm, 2)} N·m at "
         f"{found.rate_hz:g} samples/s",
         reading=f"A resolution of {found.resolution_nm:g} N·m, the finest of such a transducer; "
@@ -226,12 +226,12 @@ def _voluntary(context: Context) -> Mapping[str, Triple]:
     return found
 
 
-def voluntary_least_squares(context: Context) -> Row:
+def voluntary_least_squares(context: Context) -> Claim:
     """Compare least squares under voluntary torque with the joint."""
     found = voluntary_errors_percent(context)
     J, B, K = found["bandlimited"]
     expected = ", ".join(f"{signed(error, 0)} %" for error in found["expected"])
-    return Row(
+    return Claim(
         ours=f"{context.pooled_epochs} epochs with {VOLUNTARY_SD_NM:g} N·m (SD, 0.3–4 Hz) of "
         f"voluntary torque, least squares: J {signed(J, 0)} %, B {signed(B, 0)} %, "
         f"K {signed(K, 0)} % (expected of this loop: {expected})",
@@ -239,10 +239,10 @@ def voluntary_least_squares(context: Context) -> Row:
     )
 
 
-def voluntary_instruments(context: Context) -> Row:
+def voluntary_instruments(context: Context) -> Claim:
     """Compare instrumental variables under voluntary torque with the joint."""
     J, B, K = voluntary_errors_percent(context)["iv"]
-    return Row(
+    return Claim(
         ours="the same epochs by instrumental variables from the perturbation: "
         f"J {signed(J, 1)} %, B {signed(B, 1)} %, K {signed(K, 1)} %",
         checks=_unbiased((J, B, K), POOLED_PERCENT),

@@ -9,7 +9,6 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation import Signals, epoch_signals, scoring_cycles
 from rigidimeter.analysis.estimation.bandlimited import zero_phase_band
@@ -26,13 +25,11 @@ from rigidimeter.analysis.study.examples import (
     representative_scores,
 )
 from rigidimeter.analysis.study.rating_table import groupings
-from rigidimeter.model import ClosedLoopMotion, JointDynamics, closed_loop_motion
-from rigidimeter.paper.comparison_table import Row
+from rigidimeter.model import Array, ClosedLoopMotion, JointDynamics, closed_loop_motion
+from rigidimeter.paper.comparison_table import Claim
 from rigidimeter.paper.context import Context
 from rigidimeter.paper.paper_figures import torque_traces
-from rigidimeter.paper.printed_effects import ratings_of
-
-Array = NDArray[np.float64]
+from rigidimeter.paper.printed_effects import virtual_ratings
 
 _COLOURS = condition_colours(("OFF", "DBS"))
 _MISSING = "The recordings of the animal were not published; "
@@ -47,7 +44,7 @@ _PARTS = {
 """What of the torque each figure shows."""
 
 
-def torque_figure(name: str, context: Context) -> Row:
+def torque_figure(name: str, context: Context) -> Claim:
     """Compare measured, estimated and simulated torque of an OFF epoch, or one part of it.
 
     Estimated is J, B and K times the measured motion; simulated is the motion that the perturbation
@@ -79,7 +76,7 @@ def torque_figure(name: str, context: Context) -> Row:
     time_s = measured.time_s - float(perturbation.time_s[0])  # the session has begun earlier
     inside = (time_s >= _WINDOW_S[0]) & (time_s <= _WINDOW_S[1])
     shown = f"{_place(name)} from virtual data: {shows}"
-    return Row(
+    return Claim(
         ours="virtual OFF epoch with the median stiffness "
         f"(J {number(joint.inertia_kg_m2)}, held at the median of all epochs, "
         f"B {number(joint.damping_nm_s_rad)}, K {number(joint.stiffness_nm_rad)}): {text}",
@@ -122,7 +119,7 @@ def _missed_percent(values: Array, wanted: Array) -> str:
     return number(100.0 * float(np.std(wanted - values) / np.std(wanted)), 3)
 
 
-def measure_figure(name: str, measure: str, context: Context) -> Row:
+def measure_figure(name: str, measure: str, context: Context) -> Claim:
     """Compare one measure in OFF and DBS."""
     compared = _comparison(context, measure)
     p, r, by_day = _tests(compared)
@@ -131,7 +128,7 @@ def measure_figure(name: str, measure: str, context: Context) -> Row:
         for condition, summary in compared.summaries.items()
     )
     label = compared.measure.label
-    return Row(
+    return Claim(
         ours=f"virtual study: medians {medians} {compared.measure.unit}; p = {p}, "
         f"r = {r}; when days count, not epochs, p = {by_day}",
         reading="Two-sided rank-sum test with tie and continuity correction; every epoch a point. "
@@ -170,9 +167,9 @@ def _tests(compared: Comparison) -> tuple[str, str, str]:
     return p_value(compared.test.p), f"{compared.test.r:.2f}".replace("-", "−"), by_day
 
 
-def figure_5a(context: Context) -> Row:
+def figure_5a(context: Context) -> Claim:
     """Compare the ratings, corrected for the examiners."""
-    ratings = ratings_of(context)
+    ratings = virtual_ratings(context)
     fit, contrast = ratings.fit, ratings.contrast
     conditions = [row.condition for row in ratings.rows]
     offsets_of = groupings(ratings.rows, ["examiner", "day"])
@@ -187,7 +184,7 @@ def figure_5a(context: Context) -> Row:
     )
     offsets = ", ".join(f"{name} {b:+.2f}" for name, b in fit.offsets["examiner"].items())
     p_paper = p_value(contrast.p_residual)
-    return Row(
+    return Claim(
         ours=f"virtual ratings: medians {medians}; offsets of the examiners "
         f"{offsets.replace('-', '−')}; contrast OFF − DBS {number(contrast.estimate, 3)}, "
         f"p = {p_paper}; with an offset for every day p = {p_days}",
@@ -211,14 +208,14 @@ def figure_5a(context: Context) -> Row:
     )
 
 
-def figure_7(context: Context) -> Row:
+def figure_7(context: Context) -> Claim:
     """Compare torque against angle in the epoch of median work of each condition."""
     study = context.study
     chosen = representative_scores(study)
     epochs = [epoch for score in chosen if (epoch := analysed_epoch(study, score)) is not None]
     cycles = [scoring_cycles(epoch, study.settings.scores) for epoch in epochs]
     works = " and ".join(f"{number(s.work_j, 3)} J ({s.condition})" for s in chosen)
-    return Row(
+    return Claim(
         ours=f"virtual epochs of median work: {works}; symmetric, since the virtual arm is linear",
         unpublished=f"{_VIRTUAL_STUDY}has no asymmetry: Eq. 3 is linear.",
         figures=tuple(
@@ -238,13 +235,13 @@ def figure_7(context: Context) -> Row:
     )  # fmt: skip
 
 
-def median_inertia(context: Context) -> Row:
+def median_inertia(context: Context) -> Claim:
     """Show the two stages on the virtual study: J at the median of all epochs, then B and K."""
     analysis = context.study.analysis
     counted = [fit for fit in analysis.fixed_inertia if fit.outcome.included]
     damping = float(np.median([fit.damping_nm_s_rad for fit in counted]))
     stiffness = float(np.median([fit.stiffness_nm_rad for fit in counted]))
-    return Row(
+    return Claim(
         ours=f"median J of {len(analysis.fits)} virtual epochs {number(analysis.inertia_kg_m2)} "
         f"kg·m²; with it held, all epochs together give B {number(damping)} N·m·s/rad and "
         f"K {number(stiffness)} N·m/rad (medians)",
@@ -254,16 +251,16 @@ def median_inertia(context: Context) -> Row:
     )
 
 
-def table_2(context: Context) -> Row:
+def table_2(context: Context) -> Claim:
     """Compare the tests of Table 2 with those of the virtual study."""
-    parts = [f"mUPDRS p = {p_value(ratings_of(context).contrast.p_residual)} (contrast)"]
+    parts = [f"mUPDRS p = {p_value(virtual_ratings(context).contrast.p_residual)} (contrast)"]
     for measure in (
         "impulse_nm_s", "work_j", "inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad"
     ):  # fmt: skip
         compared = _comparison(context, measure)
         p, r, by_day = _tests(compared)
         parts.append(f"{compared.measure.title} p = {p}, r = {r} ({by_day})")
-    return Row(
+    return Claim(
         ours="virtual study, in parentheses p when days count: " + "; ".join(parts),
         unpublished=f"{_VIRTUAL_STUDY}shows that the chain from epochs to tests runs, not what DBS "
         "does.",

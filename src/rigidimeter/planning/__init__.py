@@ -1,17 +1,10 @@
 """The experiment before it runs: perturbations, session order, predicted precision, power."""
 
-from rigidimeter.planning.demand import (
-    beyond_limits,
-    demand,
-    ideal_response,
-    time_constant_s,
-    too_few_cycles,
-)
-from rigidimeter.planning.design_document import SCHEMA, design_document
+from rigidimeter.planning.document import DESIGN_SCHEMA, design_document
 from rigidimeter.planning.epochs_needed import (
     Detection,
-    Effect,
-    Wanted,
+    ExpectedEffect,
+    WantedDifference,
     detect,
     epoch_sd,
     planned_epochs,
@@ -26,21 +19,19 @@ from rigidimeter.planning.joint_bandwidth import (
     Forearm,
     corners,
 )
+from rigidimeter.planning.motion_demand import (
+    beyond_limits,
+    demand,
+    ideal_response,
+    time_constant_s,
+    too_few_cycles,
+)
 from rigidimeter.planning.multisine import (
     MultisineComparison,
     compare_multisine,
     crest_factor,
     multisine_nm,
     multisine_phases_rad,
-)
-from rigidimeter.planning.optimise import (
-    CRITERIA,
-    Candidate,
-    assess,
-    check_criterion,
-    optimise,
-    prbs_toml,
-    strongest_amplitude_nm,
 )
 from rigidimeter.planning.overview import Design, design
 from rigidimeter.planning.perturbation_band import (
@@ -53,24 +44,33 @@ from rigidimeter.planning.perturbation_band import (
     power_spectrum,
 )
 from rigidimeter.planning.perturbations import (
-    as_written,
     chip_count,
-    period_s,
+    draw_rests_s,
+    exact_decimal,
+    plan,
     prbs_levels,
     prbs_nm,
+    prbs_period_s,
+    rest_generator,
     sinusoid,
     tick_count,
     tick_times_s,
 )
-from rigidimeter.planning.precision import PARAMETERS, Precision, predicted_precision
+from rigidimeter.planning.precision import PARAMETER_NAMES, PredictedPrecision, predicted_precision
 from rigidimeter.planning.predicted_record import (
-    Record,
+    PredictedRecord,
     expected_record,
     layout,
     noise_covariance,
     noise_spectrum,
     weighted_products,
 )
-from rigidimeter.planning.session_order import draw_rests_s, plan, rest_generator
-
-__all__ = ["design", "prbs_nm"]
+from rigidimeter.planning.search import (
+    CRITERIA,
+    Candidate,
+    assess,
+    check_criterion,
+    optimise,
+    prbs_toml,
+    strongest_amplitude_nm,
+)

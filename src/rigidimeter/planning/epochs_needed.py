@@ -33,9 +33,9 @@ import scipy
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings
 from rigidimeter.model import Array
-from rigidimeter.planning.precision import PARAMETERS, predicted_precision
+from rigidimeter.planning.precision import PARAMETER_NAMES, predicted_precision
 
-_MOST_EPOCHS = 5000
+_MAX_EPOCHS = 5000
 """Where the search for a sample size ends."""
 
 _NAMES = {"inertia": 0, "damping": 1, "stiffness": 2}
@@ -51,7 +51,7 @@ _CERTAIN = 1e-12
 
 
 @dataclass(frozen=True)
-class Effect:
+class ExpectedEffect:
     """A difference to detect.
 
     Attributes
@@ -68,7 +68,7 @@ class Effect:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class WantedDifference:
     """A difference that is to be detected: of which parameter, and in what unit."""
 
     parameter: str
@@ -76,7 +76,7 @@ class Wanted:
     percent: bool
 
     @classmethod
-    def parse(cls, text: str) -> Wanted:
+    def parse(cls, text: str) -> WantedDifference:
         """Read ``damping=20%`` or ``stiffness=0.3``.
 
         Raises
@@ -109,10 +109,10 @@ class Detection:
 
     Attributes
     ----------
-    wanted : Wanted
+    wanted : WantedDifference
     condition : str
         From whose joint the difference is counted.
-    effect : Effect
+    effect : ExpectedEffect
         In the parameter's unit, with the SD of an epoch's value in both conditions.
     cv_percent : float
         The joint's own variation from epoch to epoch that is in it.
@@ -128,9 +128,9 @@ class Detection:
         With those; NaN without them.
     """
 
-    wanted: Wanted
+    wanted: WantedDifference
     condition: str
-    effect: Effect
+    effect: ExpectedEffect
     cv_percent: float
     needed: int
     power: float
@@ -151,7 +151,7 @@ def planned_epochs(settings: Settings) -> dict[str, int]:
 def detect(
     settings: Settings,
     perturbation_nm: Array,
-    wanted: Wanted,
+    wanted: WantedDifference,
     *,
     power: float = 0.8,
     alpha: float = 0.05,
@@ -175,7 +175,7 @@ def detect(
         )
     condition, subject = next(iter(settings.subject.items()))
     place = _NAMES[wanted.parameter]
-    key = PARAMETERS[place]
+    key = PARAMETER_NAMES[place]
     value = float(getattr(subject, key))
     difference = value * wanted.amount / 100.0 if wanted.percent else wanted.amount
     if value - difference <= 0.0:
@@ -190,7 +190,7 @@ def detect(
         errors = predicted_precision(perturbation_nm, settings, joint).iv
         error = errors.free[0] if place == 0 else errors.fixed_inertia[place - 1]
         spreads.append(epoch_sd(error, level, cv_percent))
-    effect = Effect(difference, *spreads)
+    effect = ExpectedEffect(difference, *spreads)
     needed = sample_size(effect, power, alpha=alpha)
     counts = list(planned_epochs(settings).values())
     planned = (counts[0], counts[1]) if len(counts) > 1 and min(counts[:2]) > 0 else None
@@ -224,12 +224,12 @@ def epoch_sd(standard_error: float, value: float, cv_percent: float) -> float:
     return math.hypot(standard_error, value * share * math.sqrt(1.0 + share**2))
 
 
-def ranksum_power(effect: Effect, n_x: int, n_y: int, *, alpha: float = 0.05) -> float:
+def ranksum_power(effect: ExpectedEffect, n_x: int, n_y: int, *, alpha: float = 0.05) -> float:
     """Return the power of the two-sided rank-sum test.
 
     Parameters
     ----------
-    effect : Effect
+    effect : ExpectedEffect
     n_x, n_y : int
         Epochs in each condition, at least 1.
     alpha : float
@@ -242,7 +242,7 @@ def ranksum_power(effect: Effect, n_x: int, n_y: int, *, alpha: float = 0.05) ->
 
     Examples
     --------
-    >>> round(ranksum_power(Effect(1.0, 1.0, 1.0), 20, 20), 3)
+    >>> round(ranksum_power(ExpectedEffect(1.0, 1.0, 1.0), 20, 20), 3)
     0.848
     """
     if n_x < 1 or n_y < 1 or effect.sd_x < 0 or effect.sd_y < 0 or not 0 < alpha < 1:
@@ -269,13 +269,13 @@ def ranksum_power(effect: Effect, n_x: int, n_y: int, *, alpha: float = 0.05) ->
     return min(1.0, float(count.sf(upper - 1) + count.cdf(pairs - upper)))
 
 
-def sample_size(effect: Effect, power: float = 0.8, *, alpha: float = 0.05) -> int:
+def sample_size(effect: ExpectedEffect, power: float = 0.8, *, alpha: float = 0.05) -> int:
     """Return the fewest epochs a condition, the same in both, that reach the power.
 
     Raises
     ------
     UserError
-        If `_MOST_EPOCHS` in each condition are not enough, or the difference is 0.
+        If `_MAX_EPOCHS` in each condition are not enough, or the difference is 0.
     """
     if effect.difference == 0.0:
         raise UserError("a difference of 0 cannot be detected; name one that is not 0")
@@ -284,9 +284,9 @@ def sample_size(effect: Effect, power: float = 0.8, *, alpha: float = 0.05) -> i
     low, high = 1, 2
     while ranksum_power(effect, high, high, alpha=alpha) < power:
         low, high = high, 2 * high
-        if low > _MOST_EPOCHS:
+        if low > _MAX_EPOCHS:
             raise UserError(
-                f"a difference of {effect.difference:.4g} needs more than {_MOST_EPOCHS} epochs in "
+                f"a difference of {effect.difference:.4g} needs more than {_MAX_EPOCHS} epochs in "
                 f"each condition at a spread of {effect.sd_x:.4g} from epoch to epoch"
             )
     while high - low > 1:
@@ -298,7 +298,7 @@ def sample_size(effect: Effect, power: float = 0.8, *, alpha: float = 0.05) -> i
     return high
 
 
-def _moments(effect: Effect, n_x: int, n_y: int) -> tuple[float, float]:
+def _moments(effect: ExpectedEffect, n_x: int, n_y: int) -> tuple[float, float]:
     """Return p₁ and the variance of U."""
     total = math.hypot(effect.sd_x, effect.sd_y)
     pairs = n_x * n_y

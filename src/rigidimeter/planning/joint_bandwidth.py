@@ -64,14 +64,14 @@ class Forearm(NamedTuple):
 
     def arm(self) -> JointDynamics:
         """Return the arm of App. A with this forearm; its inertia is the sum of its parts."""
-        for what, value, most, unit in (
+        for what, value, max_value, unit in (
             ("body mass", self.body_mass_kg, 500.0, "kg"),
             ("forearm", self.length_m, 1.0, "m"),
         ):
-            if not 0.0 < value <= most:
+            if not 0.0 < value <= max_value:
                 raise UserError(
                     f"a {what} of {value:g} {unit} is not possible; it must be above 0 and at "
-                    f"most {most:g} {unit}"
+                    f"most {max_value:g} {unit}"
                 )
         total = self.inertia_kg_m2 + ROBOT_INERTIA_KG_M2 + CONTROLLER_INERTIA_KG_M2
         return replace(APPENDIX_A, inertia_kg_m2=total)

@@ -28,7 +28,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import readonly
 from rigidimeter.core.settings import Settings
 from rigidimeter.planning.perturbations import tick_count, tick_times_s
-from rigidimeter.planning.precision import Precision, predicted_precision
+from rigidimeter.planning.precision import PredictedPrecision, predicted_precision
 
 _POINTS_PER_CYCLE = 16
 _CLIP_AT = 0.9
@@ -74,14 +74,14 @@ def multisine_phases_rad(
         spectrum[lines] = np.exp(1j * of)
         return np.asarray(scipy.fft.irfft(spectrum, points), dtype=np.float64)
 
-    best, least = phases, crest_factor(signal(phases))
+    best, lowest = phases, crest_factor(signal(phases))
     for step in range(steps):
         wave = signal(phases)
         peak = float(np.max(np.abs(wave))) * (_CLIP_AT + (1.0 - _CLIP_AT) * step / steps)
         phases = np.angle(scipy.fft.rfft(np.clip(wave, -peak, peak))[lines])
         crest = crest_factor(signal(phases))
-        if crest < least:
-            best, least = phases, crest
+        if crest < lowest:
+            best, lowest = phases, crest
     return best
 
 
@@ -148,7 +148,7 @@ class MultisineComparison:
 def compare_multisine(
     settings: Settings,
     perturbation_nm: NDArray[np.float64],
-    of_prbs: Mapping[str, Precision],
+    of_prbs: Mapping[str, PredictedPrecision],
 ) -> MultisineComparison:
     """Return the multisine and its standard errors beside those of the PRBS in each condition.
 

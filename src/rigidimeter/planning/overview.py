@@ -21,21 +21,20 @@ from rigidimeter.core.records import readonly
 from rigidimeter.core.session import Protocol
 from rigidimeter.core.settings import Settings, settings_from
 from rigidimeter.model import JointDynamics, Stability, loop_stability, median_joint
-from rigidimeter.planning.demand import (
+from rigidimeter.planning.epochs_needed import Detection, WantedDifference, detect, planned_epochs
+from rigidimeter.planning.joint_bandwidth import APPENDIX_A, Corners, Forearm, corners
+from rigidimeter.planning.motion_demand import (
     Demand,
     beyond_limits,
     demand,
     ideal_response,
     too_few_cycles,
 )
-from rigidimeter.planning.epochs_needed import Detection, Wanted, detect, planned_epochs
-from rigidimeter.planning.joint_bandwidth import APPENDIX_A, Corners, Forearm, corners
 from rigidimeter.planning.multisine import MultisineComparison, compare_multisine
-from rigidimeter.planning.optimise import Candidate, assess, check_criterion, optimise
 from rigidimeter.planning.perturbation_band import BandCheck, check_band
-from rigidimeter.planning.perturbations import prbs_nm, sinusoid
-from rigidimeter.planning.precision import PARAMETERS, Precision, predicted_precision
-from rigidimeter.planning.session_order import plan
+from rigidimeter.planning.perturbations import plan, prbs_nm, sinusoid
+from rigidimeter.planning.precision import PARAMETER_NAMES, PredictedPrecision, predicted_precision
+from rigidimeter.planning.search import Candidate, assess, check_criterion, optimise
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,7 +69,7 @@ class Design:
         condition of the settings.
     stability : Stability
         Of the loop, with the joint of each condition and the worst joint around it.
-    precision : mapping of str to Precision
+    precision : mapping of str to PredictedPrecision
         Standard errors of one epoch, by condition.
     remarks : tuple of str
         For each condition without an entry in `precision`, why it has none.
@@ -99,7 +98,7 @@ class Design:
     sinusoid_demand: Demand
     prbs_demand: Mapping[str, Demand]
     stability: Stability
-    precision: Mapping[str, Precision]
+    precision: Mapping[str, PredictedPrecision]
     remarks: tuple[str, ...]
     warnings: tuple[str, ...]
     detections: tuple[Detection, ...] = ()
@@ -118,7 +117,7 @@ class Design:
             for condition, found in self.precision.items()
             for method in ("bound", "iv", "least_squares")
         ]
-        columns = ["condition", "method", *(f"{name}_se" for name in PARAMETERS)]
+        columns = ["condition", "method", *(f"{name}_se" for name in PARAMETER_NAMES)]
         return pd.DataFrame(rows, columns=columns).set_index(["condition", "method"])
 
     def _repr_html_(self) -> str:
@@ -169,7 +168,7 @@ def design(
         If a value is out of range, or the PRBS never changes level within its duration.
     """
     chosen = settings_from(settings, **changes)
-    wanted = [Wanted.parse(text) for text in differences]
+    wanted = [WantedDifference.parse(text) for text in differences]
     if search is not None:
         check_criterion(search)
     rate_hz, guard = chosen.rig.tick_rate_hz, chosen.guard
@@ -225,7 +224,7 @@ def design(
 
 def _precision(
     settings: Settings, perturbation_nm: NDArray[np.float64], stability: Stability
-) -> tuple[dict[str, Precision], tuple[str, ...]]:
+) -> tuple[dict[str, PredictedPrecision], tuple[str, ...]]:
     """Return the precision of each condition, or a remark why there is none."""
     precision, remarks = {}, []
     for name, subject in settings.subject.items():

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigidimeter.core.records import readonly
 from rigidimeter.core.settings import PrbsSettings
-from rigidimeter.planning.perturbations import chip_count, period_s, prbs_nm
+from rigidimeter.planning.perturbations import chip_count, prbs_nm, prbs_period_s
 
 DROP_DB = 6.0
 """How far below its plateau the perturbation may be at an edge of the wanted band."""
@@ -37,7 +37,7 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class TorqueSpectrum:
     """One-sided power spectral density of a torque.
 
     Parameters
@@ -111,7 +111,7 @@ def envelope_edge_hz(clock_hz: float, drop_db: float = HALF_POWER_DB) -> float:
     return float(ratio) * clock_hz
 
 
-def power_spectrum(torque_nm: ArrayLike, rate_hz: float) -> Spectrum:
+def power_spectrum(torque_nm: ArrayLike, rate_hz: float) -> TorqueSpectrum:
     """Return the one-sided power spectral density of a torque, by the plain periodogram.
 
     The mean is taken off and no window is applied, so that by Parseval's theorem the density sums,
@@ -127,7 +127,7 @@ def power_spectrum(torque_nm: ArrayLike, rate_hz: float) -> Spectrum:
     frequency_hz, density_n2m2_hz = scipy.signal.periodogram(
         np.asarray(torque_nm, dtype=np.float64), fs=rate_hz, detrend="constant"
     )
-    return Spectrum(frequency_hz, density_n2m2_hz)
+    return TorqueSpectrum(frequency_hz, density_n2m2_hz)
 
 
 @dataclass(frozen=True)
@@ -214,6 +214,7 @@ def check_band(settings: PrbsSettings, rate_hz: float) -> BandCheck:
         *_period_and_changes(settings, enough, rate_hz, enough_rate_hz),
     ]
     covered = low_covered and high_covered
+    first_line = max(1, math.ceil(low_hz / lowest_hz - _ROUNDING))
     band = f"{low_hz:g}–{high_hz:g} Hz"
     opening = f"The wanted band {band} is {'covered' if covered else 'not covered'}."
     return BandCheck(
@@ -224,7 +225,7 @@ def check_band(settings: PrbsSettings, rate_hz: float) -> BandCheck:
         wanted_high_hz=high_hz,
         line_spacing_hz=line_spacing_hz(settings),
         lowest_hz=lowest_hz,
-        lines_in_band=_multiples(lowest_hz, low_hz, high_hz),
+        lines_in_band=max(0, math.floor(high_hz / lowest_hz + _ROUNDING) - first_line + 1),
         half_power_hz=envelope_edge_hz(settings.clock_hz),
         drop_db=DROP_DB,
         drop_edge_hz=drop_edge_hz,
@@ -238,21 +239,16 @@ def check_band(settings: PrbsSettings, rate_hz: float) -> BandCheck:
     )
 
 
-def _multiples(spacing_hz: float, low_hz: float, high_hz: float) -> int:
-    first = max(1, math.ceil(low_hz / spacing_hz - _ROUNDING))
-    return max(0, math.floor(high_hz / spacing_hz + _ROUNDING) - first + 1)
-
-
 def _tenth_up(value: float) -> float:
     return math.ceil(value * 10.0 - _ROUNDING) / 10.0
 
 
 def _enough(settings: PrbsSettings) -> PrbsSettings:
     """Return settings that cover the wanted band, changing as little as possible."""
-    least_clock_hz = settings.wanted_high_hz / envelope_edge_hz(1.0, DROP_DB)
+    min_clock_hz = settings.wanted_high_hz / envelope_edge_hz(1.0, DROP_DB)
     clock_hz = settings.clock_hz
     if envelope_edge_hz(clock_hz, DROP_DB) < settings.wanted_high_hz:
-        clock_hz = _tenth_up(least_clock_hz * (1.0 + _ROUNDING))
+        clock_hz = _tenth_up(min_clock_hz * (1.0 + _ROUNDING))
     bits = settings.register_bits
     while clock_hz / (2**bits - 1) > 2.0 * settings.wanted_low_hz:
         bits += 1
@@ -293,7 +289,7 @@ def _high_sentence(settings: PrbsSettings, rate_hz: float, power_high_db: float)
 def _period_and_changes(
     settings: PrbsSettings, enough: PrbsSettings, rate_hz: float, enough_rate_hz: float
 ) -> Iterator[str]:
-    periods = settings.duration_s / period_s(settings)
+    periods = settings.duration_s / prbs_period_s(settings)
     if periods < 1.0:
         yield (
             f"The epoch holds only {100.0 * periods:.0f} % of a period, so its spectrum is flat "

@@ -1,4 +1,8 @@
-"""What is commanded in an epoch, tick by tick: the PRBS of torque and the sinusoid of position.
+"""What is commanded in a session: its epochs in order, and each of them tick by tick.
+
+Each epoch is followed by a rest drawn at random. The paper rests 10 or 20 s between perturbations,
+chosen at random so that the subject cannot tell when the next one starts, while the arm returns to
+where it began (Sec. 2.3 and 2.4.3).
 
 The torque perturbation (Sec. 2.4.3) is a maximal-length pseudo-random binary sequence. A shift
 register of n bits with a primitive feedback polynomial runs through all its 2ⁿ − 1 nonzero states
@@ -30,17 +34,70 @@ not called, since loading it takes the loop's process a second.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.settings import PrbsSettings, SinusoidSettings
+from rigidimeter.core.records import Task
+from rigidimeter.core.session import PlannedEpoch, Protocol
+from rigidimeter.core.settings import PrbsSettings, ProtocolSettings, SinusoidSettings
 from rigidimeter.core.units import rad_from_deg
 
+_REST_STREAM = 0x7265_7374
+"""Sets the rests' random stream apart from others that start at the same recorded seed."""
 
-def as_written(value: float, name: str) -> Fraction:
+
+def rest_generator(seed: int) -> np.random.Generator:
+    """Return the generator of the rests of a session with this seed.
+
+    Raises
+    ------
+    ValueError
+        If the seed is negative.
+    """
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_REST_STREAM,)))
+
+
+def draw_rests_s(
+    rests_s: Sequence[float], count: int, generator: np.random.Generator
+) -> tuple[float, ...]:
+    """Return `count` rests drawn from `rests_s`, each with the same chance, in s."""
+    return tuple(float(rests_s[index]) for index in generator.integers(len(rests_s), size=count))
+
+
+def plan(
+    protocol: ProtocolSettings, prbs: PrbsSettings, sinusoid: SinusoidSettings, seed: int
+) -> Protocol:
+    """Return the epochs of a session, block after block.
+
+    Parameters
+    ----------
+    protocol : ProtocolSettings
+        Blocks in order, and the rests to draw from.
+    prbs, sinusoid : PrbsSettings, SinusoidSettings
+        For the duration of their epochs.
+    seed : int
+        Recorded with the session; the same seed and settings give the same session.
+
+    Raises
+    ------
+    ValueError
+        If the seed is negative.
+    """
+    duration_s: dict[Task, float] = {"prbs": prbs.duration_s, "sinusoid": sinusoid.duration_s}
+    in_order = [block for block in protocol.blocks for _ in range(block.epochs)]
+    rests_s = draw_rests_s(protocol.rests_s, len(in_order), rest_generator(seed))
+    epochs = tuple(
+        PlannedEpoch(number, str(number), block.task, block.condition, duration_s[block.task], rest)
+        for number, (block, rest) in enumerate(zip(in_order, rests_s, strict=True), start=1)
+    )
+    return Protocol(seed, epochs)
+
+
+def exact_decimal(value: float, name: str) -> Fraction:
     """Return the shortest decimal that reads back as this float, as an exact fraction.
 
     Raises
@@ -61,7 +118,7 @@ def tick_count(duration_s: float, rate_hz: float) -> int:
     ValueError
         If a value is not greater than zero, or the duration is shorter than half a tick.
     """
-    count = round(as_written(duration_s, "duration_s") * as_written(rate_hz, "rate_hz"))
+    count = round(exact_decimal(duration_s, "duration_s") * exact_decimal(rate_hz, "rate_hz"))
     if count < 1:
         raise ValueError(f"{duration_s:g} s holds no tick at {rate_hz:g} Hz")
     return count
@@ -77,7 +134,7 @@ def chip_count(settings: PrbsSettings) -> int:
     return (1 << settings.register_bits) - 1
 
 
-def period_s(settings: PrbsSettings) -> float:
+def prbs_period_s(settings: PrbsSettings) -> float:
     """Return the time after which the sequence repeats, (2ⁿ − 1) / f_clock, in seconds."""
     return chip_count(settings) / settings.clock_hz
 
@@ -143,7 +200,7 @@ def prbs_nm(settings: PrbsSettings, rate_hz: float) -> NDArray[np.float64]:
     UserError
         If the duration is over before the sequence first changes level.
     """
-    per_chip = as_written(rate_hz, "rate_hz") / as_written(settings.clock_hz, "clock_hz")
+    per_chip = exact_decimal(rate_hz, "rate_hz") / exact_decimal(settings.clock_hz, "clock_hz")
     if per_chip < 1:
         raise ValueError(
             f"a clock of {settings.clock_hz:g} Hz needs at least as many ticks a second, "

@@ -58,23 +58,23 @@ from rigidimeter.model import (
     subject_density,
 )
 from rigidimeter.planning.predicted_record import (
-    Record,
+    PredictedRecord,
     expected_record,
     layout,
     noise_spectrum,
     weighted_products,
 )
 
-_MOST_CONDITION = 1e12
+_MAX_CONDITION = 1e12
 """Above this condition number of scaled regressors the errors are not worth printing."""
 
-PARAMETERS = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
+PARAMETER_NAMES = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
 """In the order of every array here."""
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Standard errors of one epoch, in the units of `PARAMETERS`.
+    """Standard errors of one epoch, in the units of `PARAMETER_NAMES`.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class Errors:
 
 
 @dataclass(frozen=True)
-class Precision:
+class PredictedPrecision:
     """What one epoch of a perturbation can tell about one joint.
 
     Attributes
@@ -131,7 +131,7 @@ class Precision:
 
 def predicted_precision(
     perturbation_nm: Array, settings: Settings, subject: SubjectSettings
-) -> Precision:
+) -> PredictedPrecision:
     """Return the standard errors of one epoch for the median joint of a subject.
 
     Parameters
@@ -165,7 +165,7 @@ def predicted_precision(
     if own or sensor_density(rig.torque) > 0.0:  # otherwise nothing hides the joint
         A, Q = weighted_products(record, rig, subject, lines)
         bound, iv, covariance = _bound(record, rig, subject), _errors(A, Q), _sandwich(A, Q)
-    return Precision(
+    return PredictedPrecision(
         joint=joint,
         iv_band_hz=lines.band_hz,
         least_squares_band_hz=band_hz,
@@ -192,7 +192,7 @@ def _sandwich(A: Array, Q: Array) -> Array:
     """Return A⁻¹ Q A⁻ᵀ after scaling: the columns differ by powers of ten in their units."""
     scale = 1.0 / np.sqrt(np.diag(A))
     scaled = A * np.outer(scale, scale)
-    if np.linalg.cond(scaled) > _MOST_CONDITION:
+    if np.linalg.cond(scaled) > _MAX_CONDITION:
         raise UserError(
             "the predicted motion cannot distinguish J, B and K; the perturbation needs more lines "
             "in the band"
@@ -201,7 +201,7 @@ def _sandwich(A: Array, Q: Array) -> Array:
     return np.asarray(np.linalg.solve(scaled, half.T) * np.outer(scale, scale))
 
 
-def _bound(record: Record, rig: RigSettings, subject: SubjectSettings) -> Errors:
+def _bound(record: PredictedRecord, rig: RigSettings, subject: SubjectSettings) -> Errors:
     # The noise does not end with the record: the lines are twice as fine as the record's own.
     padded = 2 * scipy.fft.next_fast_len(record.motion.shape[1], real=True)
     density = noise_spectrum(rig, subject, scipy.fft.rfftfreq(padded, 1.0 / record.rate_hz))
@@ -229,25 +229,21 @@ def _least_squares(
     kept = motion.angle_rad.size - 2 * trim
     frequency = scipy.fft.rfftfreq(kept, 1.0 / rig.tick_rate_hz)
     inside = (frequency >= low_hz) & (frequency <= high_hz)
-    if np.count_nonzero(inside) < len(PARAMETERS):
+    if np.count_nonzero(inside) < len(PARAMETER_NAMES):
         raise UserError(
             f"the band {low_hz:g} to {high_hz:g} Hz holds {np.count_nonzero(inside)} lines of an "
-            f"epoch of {kept / rig.tick_rate_hz:g} s; the fit needs at least {len(PARAMETERS)}"
+            f"epoch of {kept / rig.tick_rate_hz:g} s; the fit needs at least {len(PARAMETER_NAMES)}"
         )
-    gain = _zero_phase_gain(frequency, low_hz, high_hz)
+    # Butterworth filters, second order below and fourth above, used twice.
+    with np.errstate(divide="ignore"):
+        above = 1.0 / (1.0 + (low_hz / frequency) ** 4)
+    gain = np.asarray(above / (1.0 + (frequency / high_hz) ** 8))
     Z = np.asarray(scipy.fft.rfft(np.stack(motion[1:])[:, trim : trim + kept]))
     A = _products(Z, gain**2, kept) / rig.tick_rate_hz
     Q = _products(Z, gain**4, kept) / rig.tick_rate_hz * sensor_density(rig.torque)
     voluntary = subject_density(subject, frequency, rig.tick_rate_hz) * gain**2
     bias = _bias(A, settings, joint, frequency, voluntary)
     return (low_hz, high_hz), _errors(A, Q), bias
-
-
-def _zero_phase_gain(frequency_hz: Array, low_hz: float, high_hz: float) -> Array:
-    """Return the gain of Butterworth filters, second order below and fourth above, used twice."""
-    with np.errstate(divide="ignore"):
-        above = 1.0 / (1.0 + (low_hz / frequency_hz) ** 4)
-    return np.asarray(above / (1.0 + (frequency_hz / high_hz) ** 8))
 
 
 def _bias(

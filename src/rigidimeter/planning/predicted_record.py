@@ -56,7 +56,7 @@ _ROUNDING = 1e-6
 """Of a sample: a stamp that is a rounding error late still counts."""
 
 
-class Record(NamedTuple):
+class PredictedRecord(NamedTuple):
     """One epoch as it will be read.
 
     Attributes
@@ -71,7 +71,7 @@ class Record(NamedTuple):
     motion: Array
 
 
-def expected_record(motion: ClosedLoopMotion, rig: RigSettings) -> Record:
+def expected_record(motion: ClosedLoopMotion, rig: RigSettings) -> PredictedRecord:
     """Return the motion where torque and motion will both have been recorded.
 
     Parameters
@@ -93,7 +93,7 @@ def expected_record(motion: ClosedLoopMotion, rig: RigSettings) -> Record:
     at_stamps = scipy.interpolate.CubicSpline(
         np.arange(ticks) / rig.tick_rate_hz, np.stack(motion[1:]), axis=1
     )
-    return Record(rate_hz, np.asarray(at_stamps(stamps_s), dtype=np.float64))
+    return PredictedRecord(rate_hz, np.asarray(at_stamps(stamps_s), dtype=np.float64))
 
 
 @lru_cache(maxsize=16)
@@ -149,7 +149,7 @@ def noise_spectrum(rig: RigSettings, subject: SubjectSettings, frequency_hz: Arr
 
 
 @dataclass(frozen=True)
-class Layout:
+class EpochLines:
     """Window and lines of one epoch.
 
     Attributes
@@ -173,12 +173,12 @@ class Layout:
         return float(low), float(high)
 
 
-def layout(record: Record, estimation: EstimationSettings) -> Layout:
+def layout(record: PredictedRecord, estimation: EstimationSettings) -> EpochLines:
     """Return window and lines as the estimation lays them out where the drive is known.
 
     Parameters
     ----------
-    record : Record
+    record : PredictedRecord
     estimation : EstimationSettings
         Its `trim_s` is the length of a taper. The band is from `band_low_hz` to
         `band_high_closed_loop_hz`, or 0.4 times the torque rate; the line below it counts too.
@@ -199,22 +199,22 @@ def layout(record: Record, estimation: EstimationSettings) -> Layout:
             f"the band {low_hz:g} to {high_hz:g} Hz holds {line.size} lines of an epoch of "
             f"{length_s:.3g} s; the fit needs at least {FEWEST_LINES}"
         )
-    return Layout(record.rate_hz, _window(n, record.rate_hz, estimation.trim_s), line)
+    return EpochLines(record.rate_hz, _window(n, record.rate_hz, estimation.trim_s), line)
 
 
 def weighted_products(
-    record: Record, rig: RigSettings, subject: SubjectSettings, lines: Layout
+    record: PredictedRecord, rig: RigSettings, subject: SubjectSettings, lines: EpochLines
 ) -> tuple[Array, Array]:
     """Return A and Q, each of shape (3, 3).
 
     Parameters
     ----------
-    record : Record
+    record : PredictedRecord
     rig : RigSettings
         For the torque sensor; it or the subject must make some noise.
     subject : SubjectSettings
         For voluntary torque and tremor.
-    lines : Layout
+    lines : EpochLines
     """
     window, line, n = lines.window, lines.line, lines.window.size
     # Over twice the length nothing wraps around, and line k is bin 2k.

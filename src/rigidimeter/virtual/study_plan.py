@@ -74,6 +74,7 @@ def plan_study(design: StudyDesign, seed: int) -> list[DayPlan]:
         if len(there) > 1:
             there, turned = there[::-1] if turned else there, not turned
         factors = day_factors(design, seed, day)
+        when = date.fromisoformat(design.first_date) + timedelta((day - 1) * design.days_apart)
         for place, condition in enumerate(there):
             joint = day_joint(design, condition, factors)
             prbs, sinusoids = (
@@ -85,7 +86,8 @@ def plan_study(design: StudyDesign, seed: int) -> list[DayPlan]:
                     folder=f"sessions/day-{day}-{condition.name}",
                     day=str(day),
                     condition=condition.name,
-                    created_utc=_date(design, day, place),
+                    # One after the other from nine in the morning.
+                    created_utc=f"{when.isoformat()}T{9 + place:02d}:00:00+00:00",
                     note=_note(condition, there, place),
                     joint=joint,
                     settings=_settings(design, condition, joint, prbs, sinusoids, seed, len(plans)),
@@ -195,12 +197,6 @@ def _settings(
 
 def _rng(seed: int, *key: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
-
-
-def _date(design: StudyDesign, day: int, place: int) -> str:
-    """Return when a session begins: one after the other from nine in the morning."""
-    when = date.fromisoformat(design.first_date) + timedelta((day - 1) * design.days_apart)
-    return f"{when.isoformat()}T{9 + place:02d}:00:00+00:00"
 
 
 def _note(condition: ConditionDesign, there: Sequence[ConditionDesign], place: int) -> str:

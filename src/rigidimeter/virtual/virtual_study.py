@@ -25,8 +25,6 @@ from rigidimeter.virtual.study_design import ConditionDesign, StudyDesign
 from rigidimeter.virtual.study_plan import DayPlan, day_joint, felt_rigidity, plan_study
 from rigidimeter.virtual.virtual_session import run_virtual_session, session_length_s
 
-Progress = Callable[[float], None]
-
 
 def study_length_s(plans: Sequence[DayPlan]) -> float:
     """Return how long all sessions last together, in s of the virtual clock."""
@@ -39,7 +37,7 @@ def write_virtual_study(
     seed: int,
     *,
     processes: int = 2,
-    progress: Progress = lambda _: None,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> list[DayPlan]:
     """Run every session of a virtual study and write its folder; return what was planned.
 
@@ -62,7 +60,10 @@ def write_virtual_study(
     """
     made = not folder.exists()
     if not made and not (folder.is_dir() and not any(folder.iterdir())):
-        raise UserError(f"{folder}: {_in_the_way(folder)} name another")
+        why = "is there already; a study is never written over,"
+        if (folder / "sessions").is_dir() and not (folder / "study.toml").exists():
+            why = "holds a study that was not finished: it has no study.toml; remove it or"
+        raise UserError(f"{folder}: {why} name another")
     plans = plan_study(design, seed)
     done_s = 0.0
     run = partial(_run, folder=folder)
@@ -80,16 +81,9 @@ def write_virtual_study(
             with suppress(OSError):
                 folder.rmdir()
         raise
-    write_text(folder / "sessions.csv", _sessions(plans, design.subject))
-    write_text(folder / "ratings.csv", _ratings(plans, design.subject))
+    _write_tables(folder, plans, design.subject)
     write_text(folder / "study.toml", _study_toml(design, seed))
     return plans
-
-
-def _in_the_way(folder: Path) -> str:
-    if (folder / "sessions").is_dir() and not (folder / "study.toml").exists():
-        return "holds a study that was not finished: it has no study.toml; remove it or"
-    return "is there already; a study is never written over,"
 
 
 def _run(plan: DayPlan, folder: Path) -> None:
@@ -102,18 +96,17 @@ def _run(plan: DayPlan, folder: Path) -> None:
         )
 
 
-def _sessions(plans: Sequence[DayPlan], subject: str) -> str:
-    rows = [(plan.folder, subject, plan.day, plan.condition, plan.note) for plan in plans]
-    return csv_text(("path", "subject", "day", "condition", "note"), rows)
-
-
-def _ratings(plans: Sequence[DayPlan], subject: str) -> str:
-    rows = [
+def _write_tables(folder: Path, plans: Sequence[DayPlan], subject: str) -> None:
+    sessions = [(plan.folder, subject, plan.day, plan.condition, plan.note) for plan in plans]
+    columns = ("path", "subject", "day", "condition", "note")
+    write_text(folder / "sessions.csv", csv_text(columns, sessions))
+    ratings = [
         (subject, plan.day, plan.condition, examiner, f"{score:g}")
         for plan in plans
         for examiner, score in plan.ratings.items()
     ]
-    return csv_text(("subject", "day", "condition", "examiner", "score"), rows)
+    columns = ("subject", "day", "condition", "examiner", "score")
+    write_text(folder / "ratings.csv", csv_text(columns, ratings))
 
 
 def _study_toml(design: StudyDesign, seed: int) -> str:

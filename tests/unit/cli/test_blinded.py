@@ -11,8 +11,8 @@ import pytest
 
 from rigidimeter.analysis.reading import read
 from rigidimeter.cli.planned_session import PlannedSession, write_nwb_beside
-from rigidimeter.core.files import json_text, text_bytes
-from rigidimeter.core.session import ZEROS, codes_of, drawn_codes, with_checksum
+from rigidimeter.core.files import ZEROS, json_text, text_bytes, with_checksum
+from rigidimeter.core.session import codes_of, drawn_codes
 from rigidimeter.core.settings import parse_settings
 from rigidimeter.planning import plan
 from rigidimeter.virtual import run_virtual_session

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from rigidimeter.cli.design import design
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings, load_settings
-from rigidimeter.planning import PARAMETERS, SCHEMA, multisine_nm, prbs_nm, sinusoid
+from rigidimeter.planning import DESIGN_SCHEMA, PARAMETER_NAMES, multisine_nm, prbs_nm, sinusoid
 
 app = typer.Typer()
 app.command()(design)
@@ -74,7 +74,7 @@ def test_writes_what_will_be_commanded(tmp_path: Path) -> None:
 
     document = json.loads(numbers.read_text())
     assert document == json.loads((folder / "design.json").read_text())
-    assert document["schema"] == SCHEMA == "rigidimeter.design/1"
+    assert document["schema"] == DESIGN_SCHEMA == "rigidimeter.design/1"
     assert document["prbs"]["covered"] is True
     assert len(document["bandwidth"]["corners"]) == 8
     assert document["protocol"]["total_s"] == 280.0
@@ -149,10 +149,10 @@ def test_numbers_of_what_is_predicted(tmp_path: Path) -> None:
     assert precision["iv_band_hz"] == pytest.approx([0.1016, 29.97], rel=1e-3)
     assert precision["least_squares_band_hz"] == [0.15, 10.0]
     for which in ("bound", "iv", "least_squares"):
-        assert list(precision[which]["free"]) == list(PARAMETERS)
-        assert list(precision[which]["fixed_inertia"]) == list(PARAMETERS[1:])
+        assert list(precision[which]["free"]) == list(PARAMETER_NAMES)
+        assert list(precision[which]["fixed_inertia"]) == list(PARAMETER_NAMES[1:])
     assert precision["planned_epochs"] == 4
-    for name in PARAMETERS:
+    for name in PARAMETER_NAMES:
         assert precision["iv_pooled"][name] == precision["iv"]["free"][name] / 2
     assert document["precision"]["DBS"]["iv_pooled"] is None
     assert document["optimised"] is document["multisine"] is None

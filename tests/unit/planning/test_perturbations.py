@@ -11,11 +11,11 @@ from scipy.integrate import cumulative_simpson
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import PrbsSettings, SinusoidSettings
 from rigidimeter.planning import (
-    as_written,
     chip_count,
-    period_s,
+    exact_decimal,
     prbs_levels,
     prbs_nm,
+    prbs_period_s,
     sinusoid,
     tick_count,
     tick_times_s,
@@ -132,7 +132,7 @@ def test_the_same_settings_give_the_same_sequence() -> None:
 
 def test_period_is_chips_over_clock() -> None:
     assert chip_count(PrbsSettings()) == 127
-    assert period_s(PrbsSettings()) == pytest.approx(6.35)
+    assert prbs_period_s(PrbsSettings()) == pytest.approx(6.35)
 
 
 @pytest.mark.parametrize("rate_hz", [10.0, 0.0, -1.0, float("nan"), float("inf")])
@@ -148,8 +148,8 @@ def test_an_epoch_that_never_changes_level_says_what_would_help() -> None:
 
 
 def test_a_float_reads_as_its_decimal() -> None:
-    assert as_written(22.6, "clock_hz") == Fraction(226, 10)
-    assert as_written(np.float64(0.1), "step_s") == Fraction(1, 10)
+    assert exact_decimal(22.6, "clock_hz") == Fraction(226, 10)
+    assert exact_decimal(np.float64(0.1), "step_s") == Fraction(1, 10)
 
 
 def test_counts_and_times() -> None:
@@ -161,7 +161,7 @@ def test_counts_and_times() -> None:
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
 def test_only_finite_values_above_zero(value: float) -> None:
     with pytest.raises(ValueError, match="rate_hz must be finite and greater than 0"):
-        as_written(value, "rate_hz")
+        exact_decimal(value, "rate_hz")
 
 
 def test_less_than_half_a_tick_is_refused() -> None:

@@ -14,7 +14,7 @@ from rigidimeter.core.settings import (
 )
 from rigidimeter.model import SubjectTorque, closed_loop_motion, median_joint, subject_density
 from rigidimeter.planning import (
-    Record,
+    PredictedRecord,
     expected_record,
     layout,
     noise_covariance,
@@ -154,7 +154,7 @@ def test_without_a_window_lines_of_white_noise_are_independent() -> None:
 
 
 def test_the_window_rises_and_falls_over_the_trimming() -> None:
-    lines = layout(Record(100.0, np.zeros((3, 1010))), EstimationSettings(trim_s=1.0))
+    lines = layout(PredictedRecord(100.0, np.zeros((3, 1010))), EstimationSettings(trim_s=1.0))
     assert lines.window.size == 1000  # 2³ 5³, the next fast length below
     np.testing.assert_allclose(lines.window, lines.window[::-1])
     assert lines.window[50] == pytest.approx(0.5, abs=0.01)
@@ -163,7 +163,7 @@ def test_the_window_rises_and_falls_over_the_trimming() -> None:
 
 
 def test_the_lines_begin_one_below_the_band_and_end_with_the_torque() -> None:
-    record = Record(100.0, np.zeros((3, 2000)))  # lines every 0.05 Hz
+    record = PredictedRecord(100.0, np.zeros((3, 2000)))  # lines every 0.05 Hz
     lines = layout(record, EstimationSettings(band_high_closed_loop_hz=50.0))
 
     def band(low_hz: float, high_hz: float) -> EstimationSettings:

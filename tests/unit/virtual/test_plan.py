@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.model import JointDynamics
-from rigidimeter.paper import COUNTS, Context
+from rigidimeter.paper import TABLE_1, Context
 from rigidimeter.virtual import (
     DESIGNS,
     NULL,
@@ -23,7 +23,7 @@ from rigidimeter.virtual import (
 
 @pytest.mark.parametrize("name", list(DESIGNS))
 def test_counts_are_those_of_table_1(name: str) -> None:
-    assert Context(5, design=DESIGNS[name]).counts == COUNTS
+    assert Context(5, design=DESIGNS[name]).counts == TABLE_1
 
 
 def test_off_on_nine_days_and_dbs_on_four_of_them_in_turns() -> None:

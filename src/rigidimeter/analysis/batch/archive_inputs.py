@@ -14,7 +14,7 @@ from rigidimeter.analysis.study.blinding import Naming, naming
 from rigidimeter.analysis.study.sessions import place_of
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import RECORDING_BYTES, open_regular
-from rigidimeter.core.study_files import Row, StudyFolder, is_study, read_study_folder
+from rigidimeter.core.study_files import StudyFolder, TableRow, is_study, read_study_folder
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def _of_study(folder: Path) -> Iterator[Input]:
     for notice in (*read.notices, *said):
         if notice.level == "error":
             yield Input(folder, refused=notice.text)
-    rows_at: dict[Path, list[Row]] = {}
+    rows_at: dict[Path, list[TableRow]] = {}
     for row in read.sessions:
         rows_at.setdefault(place_of(folder / row["path"]), []).append(row)
     for place, rows in rows_at.items():

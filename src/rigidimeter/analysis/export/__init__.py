@@ -6,13 +6,3 @@ from rigidimeter.analysis.export.exported_sessions import (
     sessions_of_study,
 )
 from rigidimeter.analysis.export.formats import FORMATS, Format, export_sessions, format_named
-
-__all__ = [
-    "FORMATS",
-    "ExportedSession",
-    "Format",
-    "export_sessions",
-    "format_named",
-    "sessions_of_recording",
-    "sessions_of_study",
-]

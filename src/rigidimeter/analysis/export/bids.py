@@ -35,29 +35,36 @@ _SIMULATED = "Simulated by a virtual rig from a model of the joint; there was no
 _MEASURED = "Measured with a robot that perturbs the joint or imposes a motion."
 _COUNTED = ("ACCEL", "ANGACCEL", "GYRO", "JNTANG", "LATENCY", "MAGN", "MISC", "ORNT", "POS", "VEL")
 
-Row = dict[str, Any]
+_Row = dict[str, Any]
 
 
 def write_bids(sessions: Sequence[ExportedSession], folder: Path) -> None:
     """Write a data set."""
     about = sessions[0].about
     _write_top(sessions, folder)
-    participants: dict[str, Row] = {}
-    scans: dict[Path, list[Row]] = {}
-    days: dict[str, dict[str, Row]] = {}
+    participants: dict[str, _Row] = {}
+    scans: dict[Path, list[_Row]] = {}
+    days: dict[str, dict[str, _Row]] = {}
     for session, names in zip(sessions, entities(sessions), strict=True):
         own, place = session.about, folder / f"sub-{names['sub']}" / f"ses-{names['ses']}"
-        head, tail = _parts(names)
+        # Before and after the tracking system in the name of a file.
+        day_of = joined({key: names[key] for key in ("sub", "ses")})
+        head, tail = f"{day_of}_task-{TASK}", f"acq-{names['acq']}" if "acq" in names else ""
         motion = place / "motion"
         motion.mkdir(parents=True, exist_ok=True)
         for stream in session.streams:
             stem = "_".join(filter(None, [head, f"tracksys-{stream.name}", tail]))
             _write_stream(stream, own, motion / stem)
             line = {"filename": f"motion/{stem}_motion.tsv", "acq_time": _started(own)}
-            scans.setdefault(place / f"{joined(_day(names))}_scans.tsv", []).append(line)
+            scans.setdefault(place / f"{day_of}_scans.tsv", []).append(line)
         events = "_".join(filter(None, [head, tail]))
         _write_events(own, motion / f"{events}_events")
-        _write_derivatives(own, folder, place.relative_to(folder) / "motion", events)
+        derived = folder / "derivatives" / "rigidimeter" / place.relative_to(folder) / "motion"
+        derived.mkdir(parents=True, exist_ok=True)
+        write_json(derived / f"{events}_session.json", own)
+        for name, rows in document_tables(own).items():
+            if name in ("estimates", "scores"):
+                _write_tsv(derived / f"{events}_{name}.tsv", rows)
         person = own.get("participant", {})
         participants[names["sub"]] = {
             "participant_id": f"sub-{names['sub']}",
@@ -67,7 +74,9 @@ def write_bids(sessions: Sequence[ExportedSession], folder: Path) -> None:
         }
         day = days.setdefault(names["sub"], {}).setdefault(names["ses"], {})
         day["session_id"] = f"ses-{names['ses']}"
-        day |= {_rating(own, each): each["score"] for each in own.get("ratings", ())}
+        for rating in own.get("ratings", ()):
+            who = f"{label(own['condition'], '')}_{label(rating['examiner'], '')}"
+            day[f"rating_{who}"] = rating["score"]
     for path, rows in scans.items():
         _write_tsv(path, rows)
     _write_tsv(folder / "participants.tsv", participants.values())
@@ -100,16 +109,6 @@ _EVENTS = {
     "stimulation_electrodes": {"Description": "Electrodes of deep brain stimulation."},
     "stimulation_wash_in_min": {"Description": "Time since it was changed.", "Units": "min"},
 }
-
-
-def _day(names: Mapping[str, str]) -> dict[str, str]:
-    return {key: names[key] for key in ("sub", "ses")}
-
-
-def _parts(names: Mapping[str, str]) -> tuple[str, str]:
-    """Return what stands before and after the tracking system in the name of a file."""
-    tail = f"acq-{names['acq']}" if "acq" in names else ""
-    return f"{joined(_day(names))}_task-{TASK}", tail
 
 
 def _started(about: Mapping[str, Any]) -> str | None:
@@ -163,7 +162,11 @@ def _write_top(sessions: Sequence[ExportedSession], folder: Path) -> None:
 
 def _write_stream(stream: Stream, about: Mapping[str, Any], stem: Path) -> None:
     columns = {"time_s": stream.time_s, **stream.columns}
-    arrays = [_cells(values) for values in columns.values()]
+    arrays = [pa.array(values, from_pandas=True) for values in columns.values()]
+    arrays = [
+        pa.compute.fill_null(array.cast(pa.string()), "n/a") if array.null_count else array
+        for array in arrays
+    ]
     table = pa.Table.from_arrays(arrays, names=list(columns))
     options = pa.csv.WriteOptions(include_header=False, delimiter="\t", quoting_style="none")
     pa.csv.write_csv(table, f"{stem}_motion.tsv", write_options=options)
@@ -188,12 +191,7 @@ def _write_stream(stream: Stream, about: Mapping[str, Any], stem: Path) -> None:
     )
 
 
-def _cells(values: Any) -> pa.Array:
-    array = pa.array(values, from_pandas=True)
-    return array if not array.null_count else pa.compute.fill_null(array.cast(pa.string()), "n/a")
-
-
-def _channel(column: str, about: Mapping[str, Any]) -> Row:
+def _channel(column: str, about: Mapping[str, Any]) -> _Row:
     kind = "LATENCY" if column == "time_s" else _TYPES.get(column, "MISC")
     unit = "s" if column == "time_s" else str(about["units"].get(column, "1"))
     return {
@@ -233,21 +231,7 @@ def _write_events(about: Mapping[str, Any], stem: Path) -> None:
         )
 
 
-def _write_derivatives(about: Mapping[str, Any], folder: Path, place: Path, stem: str) -> None:
-    derived = folder / "derivatives" / "rigidimeter" / place
-    derived.mkdir(parents=True, exist_ok=True)
-    write_json(derived / f"{stem}_session.json", about)
-    for name, rows in document_tables(about).items():
-        if name in ("estimates", "scores"):
-            _write_tsv(derived / f"{stem}_{name}.tsv", rows)
-
-
-def _rating(about: Mapping[str, Any], rating: Mapping[str, Any]) -> str:
-    """Return the column of a rating: condition and examiner."""
-    return f"rating_{label(about['condition'], '')}_{label(rating['examiner'], '')}"
-
-
-def _ratings(about: Mapping[str, Any], days: Iterable[Row]) -> Row:
+def _ratings(about: Mapping[str, Any], days: Iterable[_Row]) -> _Row:
     low, high = about.get("rating_scale", {}).get("scale", (0.0, 0.0))
     text = f"Rating of rigidity, from {low:g} to {high:g}: condition and examiner."
     columns = dict.fromkeys(name for day in days for name in day if name.startswith("rating_"))

@@ -18,13 +18,13 @@ from rigidimeter.analysis.reading.formats.table import Table
 from rigidimeter.core.files import as_written
 from rigidimeter.core.records import FIT_NUMBERS, PARAMETERS
 
-Row = dict[str, Any]
+_Row = dict[str, Any]
 
 _HELD = {f"{PARAMETERS[0].name}{ending}" for ending in ("_se", "_low", "_high", "_bound")}
 """Of a J that was held there is nothing to tell."""
 
 
-def document_tables(about: Mapping[str, Any]) -> dict[str, list[Row]]:
+def document_tables(about: Mapping[str, Any]) -> dict[str, list[_Row]]:
     """Return the tables of a document by name, without empty ones."""
     estimates = about.get("estimates") or {}
     fixed = (estimates.get("fixed_inertia") or {}).get("epochs", [])
@@ -88,7 +88,7 @@ def columns_of(rows: Iterable[Mapping[str, Any]]) -> dict[str, list[Any]]:
     return found
 
 
-def _plain(epoch: Mapping[str, Any]) -> Row:
+def _plain(epoch: Mapping[str, Any]) -> _Row:
     kept = {key: value for key, value in epoch.items() if not isinstance(value, dict | list)}
     for key in ("motion", "excitation_hz"):
         kept.pop(key, None)
@@ -109,7 +109,7 @@ def _plain(epoch: Mapping[str, Any]) -> Row:
     }
 
 
-def _estimate(fit: Mapping[str, Any], fixed: Mapping[str, Any]) -> Row:
+def _estimate(fit: Mapping[str, Any], fixed: Mapping[str, Any]) -> _Row:
     kept = {key: value for key, value in fit.items() if key not in ("findings", "band_hz")}
     low_hz, high_hz = fit.get("band_hz") or (None, None)
     findings = "; ".join(f"{each['level']}, {each['name']}" for each in fit.get("findings", ()))

@@ -36,7 +36,7 @@ from rigidimeter.core.settings import Settings, dump_settings
 from rigidimeter.core.study_files import SubjectTable
 from rigidimeter.core.version import __version__
 
-UNITS: Mapping[str, str] = {
+_UNITS: Mapping[str, str] = {
     **CHANNEL_UNITS,
     "target_angle_rad": "rad",
     "velocity_request_rad_s": "rad/s",
@@ -252,12 +252,12 @@ def _exported(
         "settings": dumped,
         "epochs": [_epoch(epoch) for epoch in epochs],
         "streams": {each.name: list(each.columns) for each in streams},
-        "units": {column: UNITS.get(column, "1") for each in streams for column in each.columns},
+        "units": {column: _UNITS.get(column, "1") for each in streams for column in each.columns},
         "column_meanings": {
             column: SAMPLE_UNITS[column]
             for each in streams
             for column in each.columns
-            if column in SAMPLE_UNITS and column not in UNITS
+            if column in SAMPLE_UNITS and column not in _UNITS
         },
         "estimates": None if analysis is None else _estimates(analysis, source, name),
     }

@@ -13,10 +13,9 @@ from pathlib import Path
 
 from rigidimeter.analysis.export.bids import write_bids
 from rigidimeter.analysis.export.exported_sessions import ExportedSession
-from rigidimeter.analysis.export.mat import write_mat
 from rigidimeter.analysis.export.names import stems
 from rigidimeter.analysis.export.nwb import write_nwb
-from rigidimeter.analysis.export.table_folders import write_csv, write_parquet
+from rigidimeter.analysis.export.table_files import write_csv, write_mat, write_parquet
 from rigidimeter.core.errors import UserError
 
 

@@ -22,19 +22,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rigidimeter.analysis.export.document_tables import (
+    columns_of,
+    document_tables,
+    exclusion_reasons,
+)
 from rigidimeter.analysis.export.exported_sessions import ExportedSession
 from rigidimeter.analysis.export.names import label, subject_label
-from rigidimeter.analysis.export.nwb_tables import (
-    add_events,
-    add_stimulation,
-    add_tables,
-    add_trials,
-)
 from rigidimeter.analysis.reading.formats.clocked_table import ROUNDING_S, Stream
 from rigidimeter.core.files import json_text
 
 if TYPE_CHECKING:
     from pynwb import NWBFile, TimeSeries
+if TYPE_CHECKING:
+    from pynwb import NWBFile
 
 SIMULATED = (
     "Simulated: computed by a virtual rig from a model of the joint; there was no living subject."
@@ -78,10 +79,10 @@ def write_nwb(session: ExportedSession, path: Path) -> None:
 
     file = _file(session.about)
     _add_streams(file, session)
-    add_trials(file, session.about)
-    add_stimulation(file, session.about)
-    add_events(file, session.about)
-    add_tables(file, session.about)
+    _add_trials(file, session.about)
+    _add_stimulation(file, session.about)
+    _add_events(file, session.about)
+    _add_tables(file, session.about)
     file.add_scratch(
         json_text(session.about["settings"]["controller"]),
         name="controller_settings",
@@ -106,7 +107,8 @@ def _file(about: Mapping[str, Any]) -> NWBFile:
     tasks = sorted({str(epoch["task"]) for epoch in about["epochs"] if epoch["task"]})
     condition = f" Condition {about['condition']}." if about["condition"] else ""
     coded = " The condition is a blinded code." if about.get("blinded") else ""
-    started = recorded.get("created_utc", "")
+    started_utc = recorded.get("created_utc", "")
+    started = datetime.fromisoformat(started_utc) if started_utc else UNKNOWN_START
     age_years = participant.get("age_years")
     name, _, version = str(about["software"]).partition(" ")
     digest = blake2b(json_text(about).encode(), digest_size=16).hexdigest()
@@ -116,7 +118,7 @@ def _file(about: Mapping[str, Any]) -> NWBFile:
             f"a robot's perturbation ({', '.join(tasks) or 'task unknown'}).{condition}{coded}"
         ),
         identifier=str(recorded.get("session_id") or digest),
-        session_start_time=_aware(started) if started else UNKNOWN_START,
+        session_start_time=started if started.tzinfo else started.replace(tzinfo=UTC),
         session_id=label(f"{about['day']}{about['condition']}{about['part']}", "1"),
         experiment_description=about.get("title") or f"Rigidity of the {joint}",
         experimenter=[_surname_first(author) for author in archive.get("authors", ())] or None,
@@ -126,7 +128,7 @@ def _file(about: Mapping[str, Any]) -> NWBFile:
         + (["simulated"] if virtual else []),
         notes=" ".join(
             [SIMULATED] * virtual
-            + ["The time of recording is unknown; 1900 stands in for it."] * (not started)
+            + ["The time of recording is unknown; 1900 stands in for it."] * (not started_utc)
         )
         or None,
         was_generated_by=[[name, version]],
@@ -138,11 +140,6 @@ def _file(about: Mapping[str, Any]) -> NWBFile:
             description=SIMULATED if virtual else about["subject"] or "unknown",
         ),
     )
-
-
-def _aware(text: str) -> datetime:
-    found = datetime.fromisoformat(text)
-    return found if found.tzinfo else found.replace(tzinfo=UTC)
 
 
 def _surname_first(author: str) -> str:
@@ -197,3 +194,116 @@ def _series(
             name=name, data=data, unit=unit, description=text, reference_frame=zero, **time
         )
     return TimeSeries(name=name, data=data, unit=unit, description=text, **time)
+
+
+def _add_trials(file: NWBFile, about: Mapping[str, Any]) -> None:
+    """Add a row for each epoch, and for each rest between two."""
+    for name, text in {
+        "task": "prbs (torque perturbation) or sinusoid (imposed motion).",
+        "condition": "Condition, or its code where blinded.",
+        "epoch": "Label of the epoch.",
+        "excluded": "Whether the epoch does not count.",
+        "exclusion_reason": "Why, empty if it counts.",
+        "rest": "Whether this is a rest between epochs.",
+    }.items():
+        file.add_trial_column(name, text)
+    rest = {"task": "", "condition": "", "epoch": "", "excluded": False, "exclusion_reason": ""}
+    reasons = exclusion_reasons(about)
+    before_s: float | None = None
+    for epoch in sorted(about["epochs"], key=lambda each: each["start_s"]):
+        start_s, stop_s = epoch["start_s"], epoch["stop_s"]
+        if before_s is not None and start_s > before_s:
+            file.add_trial(start_time=before_s, stop_time=start_s, rest=True, **rest)
+        reason = reasons.get(epoch["label"], "")
+        file.add_trial(
+            start_time=start_s,
+            stop_time=stop_s,
+            task=epoch["task"] or "",
+            condition=epoch["condition"],
+            epoch=epoch["label"],
+            excluded=bool(reason),
+            exclusion_reason=reason,
+            rest=False,
+        )
+        before_s = stop_s
+
+
+def _add_stimulation(file: NWBFile, about: Mapping[str, Any]) -> None:
+    """Add the stimulation of the session's condition, where it is known."""
+    from pynwb.epoch import TimeIntervals
+
+    known = about.get("stimulation", {}).get(about["condition"], {})
+    columns = {
+        "frequency_hz": (known.get("frequency_hz"), "Frequency of the stimulation, Hz."),
+        "amplitude_ua": (
+            None if known.get("amplitude_ma") is None else 1000.0 * known["amplitude_ma"],
+            "Amplitude of the stimulation, µA.",
+        ),
+        "amplitude_v": (known.get("amplitude_v"), "Amplitude of the stimulation, V."),
+        "pulse_width_us": (known.get("pulse_width_us"), "Width of a pulse, µs."),
+        "electrodes": (known.get("electrodes"), "Electrodes."),
+        "washin_s": (
+            None if known.get("wash_in_min") is None else 60.0 * known["wash_in_min"],
+            "Time between the change of the stimulation and the session, s.",
+        ),
+    }
+    given = {name: pair for name, pair in columns.items() if pair[0] not in (None, "")}
+    if not given or not about["epochs"]:
+        return
+    table = TimeIntervals(name="dbs_settings", description="Deep brain stimulation in the session.")
+    for name, (_, text) in given.items():
+        table.add_column(name, text)
+    table.add_row(
+        start_time=min(epoch["start_s"] for epoch in about["epochs"]),
+        stop_time=max(epoch["stop_s"] for epoch in about["epochs"]),
+        **{name: value for name, (value, _) in given.items()},
+    )
+    file.add_time_intervals(table)
+
+
+def _add_events(file: NWBFile, about: Mapping[str, Any]) -> None:
+    """Add what happened at a time that is known."""
+    from pynwb.event import EventsTable
+
+    events = [
+        event
+        for event in about["recorded"].get("events", ())
+        if isinstance(event.get("time_s"), int | float)
+    ]
+    if not events:
+        return
+    table = EventsTable(name="session_events", description="Events of the session, as recorded.")
+    for name in ("event", "epoch", "outcome", "reason"):
+        table.add_column(name, f"{name.capitalize()}; empty where it has none.")
+    for event in sorted(events, key=lambda each: each["time_s"]):
+        table.add_row(
+            timestamp=float(event["time_s"]),
+            event=str(event["event"]),
+            epoch=str(event.get("epoch", "")),
+            outcome=str(event.get("outcome", "")),
+            reason=str(event.get("reason", "")),
+        )
+    file.add_events_table(table)
+
+
+def _add_tables(file: NWBFile, about: Mapping[str, Any]) -> None:
+    """Add estimates, scores and ratings, where there are any."""
+    from hdmf.common import DynamicTable, VectorData
+
+    texts = {
+        "estimates": "Inertia, damping and stiffness of each epoch, with standard errors and 95 % "
+        "intervals; fixed_inertia: fitted again with the median inertia held. Units in the names.",
+        "scores": "Impulse and work of each imposed sinusoid, per cycle. Units in the names.",
+        "ratings": "Scores of examiners on this day.",
+    }
+    tables = {name: rows for name, rows in document_tables(about).items() if name in texts}
+    if not tables:
+        return
+    module = file.create_processing_module("rigidimeter", f"Results of {about['software']}.")
+    for name, rows in tables.items():
+        columns = [
+            VectorData(name=column, description=column.replace("_", " "), data=cells)
+            for column, cells in columns_of(rows).items()
+            if any(cell != "" and cell == cell for cell in cells)
+        ]
+        module.add(DynamicTable(name=name, description=texts[name], columns=columns))

@@ -1,6 +1,5 @@
 """Tables in, tables out: summaries, tests, mixed models and effect sizes."""
 
-from rigidimeter.analysis.statistics.bootstrap import bootstrap
 from rigidimeter.analysis.statistics.contrasts import (
     Contrast,
     JointTest,
@@ -10,19 +9,18 @@ from rigidimeter.analysis.statistics.contrasts import (
     joint_test,
     pairwise,
 )
-from rigidimeter.analysis.statistics.day_levels import Epochs, test_by_levels
+from rigidimeter.analysis.statistics.day_levels import (
+    PartiallyPaired,
+    SubjectEpochs,
+    partially_paired,
+    test_by_levels,
+)
 from rigidimeter.analysis.statistics.day_model import (
     DayDifference,
     day_difference,
     day_medians,
 )
-from rigidimeter.analysis.statistics.effect_from_p import (
-    compare_published,
-    effect_from_p,
-    largest_r,
-    rank_biserial_interval,
-)
-from rigidimeter.analysis.statistics.effect_sizes import (
+from rigidimeter.analysis.statistics.effects import (
     EffectDifference,
     Effects,
     TwoGroups,
@@ -32,10 +30,20 @@ from rigidimeter.analysis.statistics.effect_sizes import (
     rank_biserial,
     two_groups,
 )
-from rigidimeter.analysis.statistics.exact_ranks import exact_ranksum
 from rigidimeter.analysis.statistics.mixed import Mixed, fit_mixed, nested
-from rigidimeter.analysis.statistics.partially_paired import PartiallyPaired, partially_paired
 from rigidimeter.analysis.statistics.profiled_likelihood import evaluate, minimise, products
-from rigidimeter.analysis.statistics.rank_correlation import RankCorrelation, rank_correlation
-from rigidimeter.analysis.statistics.ranksum import RankSum, ranksum
+from rigidimeter.analysis.statistics.published_effects import (
+    compare_published,
+    effect_from_p,
+    largest_r,
+    rank_biserial_interval,
+)
+from rigidimeter.analysis.statistics.ranks import (
+    RankCorrelation,
+    RankSum,
+    exact_ranksum,
+    rank_correlation,
+    ranksum,
+)
+from rigidimeter.analysis.statistics.resampling import bootstrap
 from rigidimeter.analysis.statistics.summary import Summary, summarise

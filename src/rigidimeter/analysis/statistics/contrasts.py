@@ -15,13 +15,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import f as f_distribution
 from scipy.stats import t as t_distribution
 
 from rigidimeter.analysis.statistics.mixed import Mixed
-
-Array = NDArray[np.float64]
+from rigidimeter.analysis.statistics.summary import Array
 
 _NOTHING = 1e-10
 

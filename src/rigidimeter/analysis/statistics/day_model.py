@@ -12,15 +12,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import t as t_distribution
 
 from rigidimeter.analysis.statistics.contrasts import interval_of
-from rigidimeter.analysis.statistics.day_levels import Epochs, test_by_levels
-from rigidimeter.analysis.statistics.exact_ranks import exact_ranksum
+from rigidimeter.analysis.statistics.day_levels import SubjectEpochs, test_by_levels
+from rigidimeter.analysis.statistics.ranks import exact_ranksum
 from rigidimeter.analysis.statistics.summary import checked_sample
 
-Array = NDArray[np.float64]
 FEW_DF = 3.0
 """With fewer degrees of freedom the interval is wider than ± 3.2 standard errors."""
 
@@ -86,8 +85,9 @@ class DayDifference:
         if not self.df < FEW_DF:
             return ""
         errors = float(t_distribution.isf((1 - self.confidence) / 2, self.df))
+        df = f"{self.df:.1f}".removesuffix(".0")
         return (
-            f"with {_degrees(self.df)} only a difference above {errors:.3g} "
+            f"with {df} degree{'s' * (df != '1')} of freedom only a difference above {errors:.3g} "
             f"standard errors is shown; more {self.unit}s would show smaller ones"
         )
 
@@ -150,12 +150,15 @@ def day_difference(
         [""] * sample.size if given is None else list(map(str, given))
         for sample, given in zip(samples, (x_subjects, y_subjects), strict=True)
     ]
-    for name, sample, day, subject in zip(("x", "y"), samples, days, subjects, strict=True):
-        if not len(day) == len(subject) == sample.size:
+    for name, sample, own_days, own in zip(("x", "y"), samples, days, subjects, strict=True):
+        if not len(own_days) == len(own) == sample.size:
             raise ValueError(
-                f"{name} has {sample.size} values, {len(day)} days and {len(subject)} subjects"
+                f"{name} has {sample.size} values, {len(own_days)} days and {len(own)} subjects"
             )
-    epochs = _by_day(samples, subjects, days)
+    epochs: SubjectEpochs = {}
+    for k, columns in enumerate(zip(samples, subjects, days, strict=True)):
+        for value, subject, day in zip(*columns, strict=True):
+            epochs.setdefault(subject, {}).setdefault(day, ([], []))[k].append(float(value))
     tested = test_by_levels(epochs, names)
     estimate, se, df = tested.estimate, tested.se, tested.df
     low, high = interval_of(estimate, se, df, confidence)
@@ -190,22 +193,7 @@ def day_medians(values: ArrayLike, days: Sequence[str]) -> dict[str, float]:
     return {str(day): float(np.median(sample[labels == day])) for day in dict.fromkeys(days)}
 
 
-def _by_day(
-    samples: Sequence[Array], subjects: Sequence[Sequence[str]], days: Sequence[Sequence[str]]
-) -> Epochs:
-    found: Epochs = {}
-    for k, columns in enumerate(zip(samples, subjects, days, strict=True)):
-        for value, subject, day in zip(*columns, strict=True):
-            found.setdefault(subject, {}).setdefault(day, ([], []))[k].append(float(value))
-    return found
-
-
-def _degrees(df: float) -> str:
-    number = f"{df:.1f}".removesuffix(".0")
-    return f"{number} degree{'s' * (number != '1')} of freedom"
-
-
-def _day_share(epochs: Epochs) -> float:
+def _day_share(epochs: SubjectEpochs) -> float:
     """Return σ_d²/(σ_d² + σ²) by mean squares between and within the days of each condition."""
     between = within = size = 0.0
     df_between = df_within = 0
@@ -227,7 +215,7 @@ def _day_share(epochs: Epochs) -> float:
     return of_days / (of_days + residual)
 
 
-def _p_of_medians(epochs: Epochs) -> float:
+def _p_of_medians(epochs: SubjectEpochs) -> float:
     medians = [
         tuple([float(np.median(by[k])) for by in own.values() if by[k]] for k in (0, 1))
         for own in epochs.values()

@@ -14,13 +14,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rigidimeter.analysis.statistics.profiled_likelihood import Point, minimise, products
-from rigidimeter.analysis.statistics.summary import checked_sample
+from rigidimeter.analysis.statistics.summary import Array, checked_sample
 from rigidimeter.core.files import SCORES_BY_GROUPS_SQUARED
-
-Array = NDArray[np.float64]
 
 _NOTHING = 1e-10
 
@@ -130,7 +128,7 @@ def fit_mixed(
     >>> fit.means.round(3).tolist()
     [2.0, 1.375]
     """
-    y = checked_sample("the sequence of scores", scores, fewest=0)
+    y = checked_sample("the sequence of scores", scores, min_size=0)
     for name, labels in {"conditions": conditions, **groups}.items():
         if len(labels) != y.size:
             raise ValueError(f"{name} has {len(labels)} labels for {y.size} scores")
@@ -145,7 +143,7 @@ def fit_mixed(
     names, x = _indicators(conditions)
     if y.size <= len(names):
         raise ValueError(f"{y.size} scores cannot give {len(names)} means and their error")
-    kept, inseparable = _tellable(x, groups)
+    kept, inseparable = _separable(x, groups)
     members = {name: _indicators(groups[name]) for name in groups}
     z = [members[name][1] for name in kept]
     residual = y - _projected(np.concatenate([x, *z], axis=1), y)
@@ -200,7 +198,7 @@ def _projected(columns: Array, y: Array) -> Array:
     return np.asarray(columns @ np.linalg.lstsq(columns, y)[0])
 
 
-def _tellable(x: Array, groups: Mapping[str, Sequence[str]]) -> tuple[list[str], dict[str, str]]:
+def _separable(x: Array, groups: Mapping[str, Sequence[str]]) -> tuple[list[str], dict[str, str]]:
     """Return the groupings whose variance can be estimated, and why not for the others.
 
     Within the residuals, the matrices I and Z_k Z_kᵀ must be linearly independent, and means and

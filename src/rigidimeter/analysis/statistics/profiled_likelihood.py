@@ -17,14 +17,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 
-Array = NDArray[np.float64]
+from rigidimeter.analysis.statistics.summary import Array
 
 _STEPS = 200
 _PRECISION = 1e-13
-_MOST_AT_ONCE = 1_000_000
+_MAX_ELEMENTS = 1_000_000
 """Elements of each matrix while the grid is computed, so that memory does not grow with it."""
 
 
@@ -216,7 +215,7 @@ def minimise(data: Products) -> Point:
     steps = np.array([0.0, *np.geomspace(1e-3, 1e4, 15 if len(sizes) == 1 else 8)])
     shape = (steps.size,) * len(sizes)
     grid = np.array(list(itertools.product(*([steps] * len(sizes))))) / sizes
-    together = math.ceil(grid.shape[0] * data.zz.size / _MOST_AT_ONCE)
+    together = math.ceil(grid.shape[0] * data.zz.size / _MAX_ELEMENTS)
     heights = np.concatenate(
         [_solved(data, part).deviance for part in np.array_split(grid, together)]
     ).reshape(shape)

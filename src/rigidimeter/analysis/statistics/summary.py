@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class Summary:
@@ -33,7 +35,7 @@ def summarise(values: ArrayLike) -> Summary:
     ValueError
         If a value is not finite or the sample is not one-dimensional.
     """
-    sample = checked_sample("a sample", values, fewest=0)
+    sample = checked_sample("a sample", values, min_size=0)
     if sample.size == 0:
         return Summary(0, float("nan"), float("nan"), float("nan"))
     q1, median, q3 = np.quantile(sample, [0.25, 0.5, 0.75])
@@ -45,19 +47,19 @@ def summarise(values: ArrayLike) -> Summary:
     return Summary(int(sample.size), float(median), float(q1), float(q3), sd_percent)
 
 
-def checked_sample(name: str, values: ArrayLike, *, fewest: int = 1) -> NDArray[np.float64]:
+def checked_sample(name: str, values: ArrayLike, *, min_size: int = 1) -> Array:
     """Return values as an array; `name` is what a message calls them.
 
     Raises
     ------
     ValueError
-        If they are not one-dimensional, not finite, or fewer than `fewest`.
+        If they are not one-dimensional, not finite, or fewer than `min_size`.
     """
     sample = np.asarray(values, dtype=np.float64)
     if sample.ndim != 1:
         raise ValueError(f"{name} must be one-dimensional, got shape {sample.shape}")
-    if sample.size < fewest:
-        raise ValueError(f"{name} is empty; at least {fewest} value is needed")
+    if sample.size < min_size:
+        raise ValueError(f"{name} is empty; at least {min_size} value is needed")
     if not np.all(np.isfinite(sample)):
         raise ValueError(f"{name} must be finite; leave out what could not be measured")
     return sample

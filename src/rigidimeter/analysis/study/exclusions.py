@@ -9,12 +9,12 @@ from dataclasses import replace
 from rigidimeter.analysis.study.results import Exclusion, SessionEntry
 from rigidimeter.analysis.study.sessions import Gathered, place_of, source_of
 from rigidimeter.core.records import Analysis, Epoch, Fit, Notice, Outcome, Score
-from rigidimeter.core.study_files import Row, StudyFolder
+from rigidimeter.core.study_files import StudyFolder, TableRow
 
 
 def operators_exclusions(
     read: StudyFolder, gathered: Gathered
-) -> tuple[tuple[Epoch, ...], dict[tuple[str, str], Row], list[Notice]]:
+) -> tuple[tuple[Epoch, ...], dict[tuple[str, str], TableRow], list[Notice]]:
     """Return epochs with the operator's exclusions, the rows that met one, and what met none."""
     epochs = {(epoch.source, epoch.label): epoch for epoch in gathered.epochs}
     labels: dict[str, list[str]] = {}
@@ -22,7 +22,7 @@ def operators_exclusions(
         labels.setdefault(source, []).append(label)
     places = {place_of(read.folder / s.entry.path): s.entry.source for s in gathered.sessions}
     left_out = {place_of(read.folder / out.path) for out in gathered.left_out}
-    operator: dict[tuple[str, str], Row] = {}
+    operator: dict[tuple[str, str], TableRow] = {}
     notices = []
     for row in read.exclusions:
         place = place_of(read.folder / row["path"])
@@ -55,7 +55,7 @@ def exclusions_of(
     epochs: Sequence[Epoch],
     analysis: Analysis,
     sessions: Mapping[str, SessionEntry],
-    operator: Mapping[tuple[str, str], Row],
+    operator: Mapping[tuple[str, str], TableRow],
 ) -> Iterator[Exclusion]:
     """Yield every epoch that does not count, with who said so; `sessions` are by source."""
     everything: list[Fit | Score] = [*analysis.fits, *analysis.scores]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from rigidimeter.analysis.statistics import nested
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import NOTICES, TextTable, lines_text
+from rigidimeter.core.files import MAX_NOTICES, TextTable, lines_text
 
 RANDOM = ("examiner", "subject", "subject/day")
 FEWEST = 3
@@ -158,16 +158,16 @@ def _repeated(source: str, rows: Sequence[Rating], with_day: bool) -> list[str]:
             seen.setdefault(key, []).append(row)
     said = []
     repeated = {key: found for key, found in seen.items() if len(found) > 1}
-    for (_, examiner, condition, day), found in list(repeated.items())[:NOTICES]:
-        lines = " and ".join(str(row.line) for row in found[:NOTICES])
+    for (_, examiner, condition, day), found in list(repeated.items())[:MAX_NOTICES]:
+        lines = " and ".join(str(row.line) for row in found[:MAX_NOTICES])
         by = f" by examiner {examiner}" if examiner else ""
         said.append(
             f"{source}, lines {lines}: rated more than once{by} in {condition} on day {day} "
-            f"({', '.join(f'{row.score:g}' for row in found[:NOTICES])}); all are used as separate "
-            "ratings. If one is a copy, p is too small: take it out"
+            f"({', '.join(f'{row.score:g}' for row in found[:MAX_NOTICES])}); all are used as "
+            "separate ratings. If one is a copy, p is too small: take it out"
         )
-    if len(repeated) > NOTICES:
-        more = len(repeated) - NOTICES
+    if len(repeated) > MAX_NOTICES:
+        more = len(repeated) - MAX_NOTICES
         said.append(
             f"{source}: {more} more were rated more than once, and are used in the same way"
         )
@@ -188,8 +188,8 @@ def _single(rows: Sequence[Rating], random: Sequence[str]) -> list[str]:
 
 
 def _some(names: Sequence[str]) -> str:
-    more = f" and {len(names) - NOTICES} more" if len(names) > NOTICES else ""
-    return ", ".join(names[:NOTICES]) + more
+    more = f" and {len(names) - MAX_NOTICES} more" if len(names) > MAX_NOTICES else ""
+    return ", ".join(names[:MAX_NOTICES]) + more
 
 
 def _unmodelled(rows: Sequence[Rating], random: Sequence[str]) -> list[str]:

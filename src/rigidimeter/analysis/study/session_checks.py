@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rigidimeter.core.records import Notice
 from rigidimeter.core.settings import Settings, dump_settings
-from rigidimeter.core.study_files import Row
+from rigidimeter.core.study_files import TableRow
 
 if TYPE_CHECKING:
     from rigidimeter.analysis.study.sessions import Session
@@ -21,9 +21,9 @@ _COMMANDED: Mapping[str, tuple[str, ...]] = {
 """By task, the tables of the settings that say what the rig was commanded."""
 
 
-def twice(sessions: Sequence[Session]) -> list[tuple[Row, str]]:
+def twice(sessions: Sequence[Session]) -> list[tuple[TableRow, str]]:
     """Find a day of a subject that is there twice with the same condition, task and part."""
-    seen: dict[tuple[str, ...], Row] = {}
+    seen: dict[tuple[str, ...], TableRow] = {}
     found = []
     for session in sessions:
         row, entry = session.row, session.entry
@@ -44,13 +44,13 @@ def twice(sessions: Sequence[Session]) -> list[tuple[Row, str]]:
     return found
 
 
-def commanded_otherwise(sessions: Sequence[Session]) -> list[tuple[Row, str]]:
+def commanded_otherwise(sessions: Sequence[Session]) -> list[tuple[TableRow, str]]:
     """Return the sessions that were commanded otherwise than most of their task, and in what.
 
     Epochs of two versions of a protocol are two measurements, and must not be pooled.
     Where no version has more sessions than any other, the one that comes first in the table stays.
     """
-    found: list[tuple[Row, str]] = []
+    found: list[tuple[TableRow, str]] = []
     for task, tables in _COMMANDED.items():
         versions = [
             (session, _values(session.settings, tables))
@@ -109,6 +109,6 @@ def other_settings(sessions: Sequence[Session]) -> list[Notice]:
     return said
 
 
-def line_of(row: Row) -> str:
+def line_of(row: TableRow) -> str:
     """Return where in the table a row is."""
     return f"line {row.line}"

@@ -30,14 +30,14 @@ from rigidimeter.core.files import RECORDING_BYTES, noted_digests, open_regular
 from rigidimeter.core.records import Epoch, Notice
 from rigidimeter.core.session import EVENTS, MANIFEST, SAMPLES, is_session, read_events
 from rigidimeter.core.settings import Settings
-from rigidimeter.core.study_files import Row, StudyFolder, is_outside
+from rigidimeter.core.study_files import StudyFolder, TableRow, is_outside
 
 
 @dataclass(frozen=True)
 class Session:
     """One recording that was read: its row in the table, its epochs, its settings if it has any."""
 
-    row: Row
+    row: TableRow
     entry: SessionEntry
     epochs: tuple[Epoch, ...]
     settings: Settings | None
@@ -110,13 +110,13 @@ def gather(
     left_out: list[LeftOut] = []
     notices: list[Notice] = []
     digests: dict[str, str] = {}
-    at: dict[Path, list[Row]] = {}
-    samples: dict[str, Row] = {}
-    rows_at: dict[Path, list[Row]] = {}
+    at: dict[Path, list[TableRow]] = {}
+    samples: dict[str, TableRow] = {}
+    rows_at: dict[Path, list[TableRow]] = {}
     for row in read.sessions:
         rows_at.setdefault(place_of(read.folder / row["path"]), []).append(row)
 
-    def leave_out(row: Row, reason: str) -> None:
+    def leave_out(row: TableRow, reason: str) -> None:
         text = reason if reason.startswith(row.where) else f"{row.where}: {reason}"
         notices.append(Notice("error", f"{text}; the session is left out"))
         bare = text.replace(f"{read.folder}/", "")
@@ -157,11 +157,11 @@ def gather(
 
 def _read(
     read: StudyFolder,
-    row: Row,
+    row: TableRow,
     names: Naming,
-    beside: Sequence[Row],
-    at: dict[Path, list[Row]],
-    samples: dict[str, Row],
+    beside: Sequence[TableRow],
+    at: dict[Path, list[TableRow]],
+    samples: dict[str, TableRow],
     digests: dict[str, str],
     noted: Mapping[Path, str],
 ) -> tuple[Session, list[Notice]]:
@@ -240,7 +240,7 @@ def _note_others(folder: Path, noted: Mapping[Path, str], digests: dict[str, str
 
 
 def _options(
-    read: StudyFolder, row: Row, noted: Mapping[Path, str], digests: dict[str, str]
+    read: StudyFolder, row: TableRow, noted: Mapping[Path, str], digests: dict[str, str]
 ) -> ReadOptions:
     """Return how a recording is read: by its own mapping file, or that of the study."""
     named = row["mapping"] or read.about.mapping
@@ -255,7 +255,7 @@ def _options(
 
 def _joined(
     folder: Path,
-    row: Row,
+    row: TableRow,
     options: ReadOptions,
     noted: Mapping[Path, str],
     digests: dict[str, str],
@@ -273,7 +273,7 @@ def _joined(
     return found
 
 
-def _differs(path: Path, row: Row, before: Sequence[Row], names: Naming) -> None:
+def _differs(path: Path, row: TableRow, before: Sequence[TableRow], names: Naming) -> None:
     """Refuse a row of a recording that has one already, but for another of its conditions."""
     for other in before:
         there = f"{path} is in the table already ({line_of(other)})"
@@ -288,9 +288,9 @@ def _differs(path: Path, row: Row, before: Sequence[Row], names: Naming) -> None
 
 def _of_condition(
     path: Path,
-    row: Row,
+    row: TableRow,
     condition: str,
-    beside: Sequence[Row],
+    beside: Sequence[TableRow],
     epochs: Sequence[Epoch],
     names: Naming,
 ) -> tuple[list[Epoch], list[Notice]]:

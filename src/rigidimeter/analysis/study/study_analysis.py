@@ -39,7 +39,7 @@ from rigidimeter.analysis.study.warnings import analysis_warnings, lacking
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import Analysis, Epoch, Notice
 from rigidimeter.core.settings import Settings
-from rigidimeter.core.study_files import Row, StudyFolder, read_study_folder
+from rigidimeter.core.study_files import StudyFolder, TableRow, read_study_folder
 
 MEASURE_MS, RESAMPLE_MS = 50.0, 0.01
 """What the tests of a measure cost, beside the steps of `analysis.step_costs`."""
@@ -56,7 +56,7 @@ class StudyRead:
     gathered : Gathered
     epochs : tuple of Epoch
         With what the operator excluded.
-    operator : mapping of (str, str) to Row
+    operator : mapping of (str, str) to TableRow
         The operator's exclusions that met an epoch, by source and label.
     settings : Settings
         Those that the first session was recorded with, or what was given instead.
@@ -71,7 +71,7 @@ class StudyRead:
     names: Naming
     gathered: Gathered
     epochs: tuple[Epoch, ...]
-    operator: Mapping[tuple[str, str], Row]
+    operator: Mapping[tuple[str, str], TableRow]
     settings: Settings
     method: str
     notices: tuple[Notice, ...]

@@ -1,6 +1,14 @@
 """Files of text, JSON, CSV and TOML: the one place where they are written, and read as values."""
 
-from rigidimeter.core.files.escaping import NUMBER, as_read, as_written, printable, visible
+from rigidimeter.core.files.checksum import (
+    FIELD,
+    ZEROS,
+    checksum_holds,
+    covered_values,
+    digest_hex,
+    with_checksum,
+)
+from rigidimeter.core.files.escaping import NUMBER_TEXT, as_read, as_written, printable, visible
 from rigidimeter.core.files.label_table import (
     TextTable,
     cell_number,
@@ -10,7 +18,6 @@ from rigidimeter.core.files.label_table import (
     read_text_table,
     refuse_duplicates,
 )
-from rigidimeter.core.files.locking import lock
 from rigidimeter.core.files.reading import (
     noted_digests,
     open_regular,
@@ -23,16 +30,16 @@ from rigidimeter.core.files.reading import (
 from rigidimeter.core.files.size_limits import (
     BOOTSTRAP_COUNTS,
     CELLS,
-    COLUMNS,
-    DIGITS,
     DOCUMENT_BYTES,
-    EPOCHS,
     EXPANDED_BYTES,
     EXPANSION,
     MAGNITUDE,
+    MAX_COLUMNS,
+    MAX_DIGITS,
+    MAX_EPOCHS,
+    MAX_NOTICES,
     MIB,
     NESTING,
-    NOTICES,
     RANKED_PAIRS,
     RECORDING_BYTES,
     SAMPLING_RATE_HZ,
@@ -43,12 +50,14 @@ from rigidimeter.core.files.size_limits import (
     lines_text,
     size_text,
 )
-from rigidimeter.core.files.text_lines import content, read_utf8, records, trimmed, whole_names
+from rigidimeter.core.files.text_lines import content, joined_names, read_utf8, records, trimmed
 from rigidimeter.core.files.writing import (
+    append_line,
     csv_text,
     in_place,
     json_line,
     json_text,
+    lock,
     plain_values,
     replace_file,
     text_bytes,

@@ -15,7 +15,7 @@ import re
 _COMMANDS = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 _LINES = re.compile(_COMMANDS.pattern.replace("\x00-\x1f", "\x00-\x08\x0b-\x1f"))
 _FORMULA = re.compile("'*[=+\\-@\t\n\uff1d\uff0b\uff0d\uff20]")
-NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
+NUMBER_TEXT = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 """A number as tables hold it, with a decimal point or comma."""
 
 
@@ -33,11 +33,9 @@ def visible(text: str, *, lines: bool = False) -> str:
     >>> visible("a\x1b[31m")
     'a\\x1b[31m'
     """
-    return (_LINES if lines else _COMMANDS).sub(_escape, text)
-
-
-def _escape(found: re.Match[str]) -> str:
-    return found[0].encode("unicode_escape").decode("ascii")
+    return (_LINES if lines else _COMMANDS).sub(
+        lambda found: found[0].encode("unicode_escape").decode("ascii"), text
+    )
 
 
 def as_written(text: str) -> str:
@@ -49,7 +47,7 @@ def as_written(text: str) -> str:
     ["'=1+1", '-0.5', "'-a", "''=", 'OFF']
     """
     text = visible(text, lines=True)  # a line feed within a cell is quoted
-    return f"'{text}" if _FORMULA.match(text) and not NUMBER.fullmatch(text) else text
+    return f"'{text}" if _FORMULA.match(text) and not NUMBER_TEXT.fullmatch(text) else text
 
 
 def as_read(text: str) -> str:

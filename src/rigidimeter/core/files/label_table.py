@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files.escaping import NUMBER, as_read, printable
-from rigidimeter.core.files.size_limits import COLUMNS, TABLE_BYTES, TABLE_CELLS, TABLE_ROWS
+from rigidimeter.core.files.escaping import NUMBER_TEXT, as_read, printable
+from rigidimeter.core.files.size_limits import MAX_COLUMNS, TABLE_BYTES, TABLE_CELLS, TABLE_ROWS
 from rigidimeter.core.files.text_lines import content, is_missing, read_utf8
 
 _EXAMPLE = "condition,examiner,score"
@@ -79,7 +79,7 @@ def cell_number(text: str, name: str, where: str) -> float | None:
     """
     if is_missing(text):
         return None
-    if not NUMBER.fullmatch(text):
+    if not NUMBER_TEXT.fullmatch(text):
         raise UserError(
             f"{where}: {name} is {text!r}, which is not a number; write a number, or leave the "
             "cell empty where there is none"
@@ -151,7 +151,7 @@ def first_line_names(source: str, text: str, example: str) -> tuple[str, list[st
     delimiter = next((mark for mark in "\t;," if mark in text), ",")
     names = [name.strip().strip("\"'").strip() for name in cells_of(text, delimiter)]
     cells = names if len(names) > 1 else text.split()
-    if any(cells) and all(NUMBER.fullmatch(cell) for cell in cells if cell):
+    if any(cells) and all(NUMBER_TEXT.fullmatch(cell) for cell in cells if cell):
         raise UserError(
             f"{source}: its first line holds numbers ({', '.join(cells[:3])}"
             f"{', ...' if len(cells) > 3 else ''}), but it must name the columns, as in {example}; "
@@ -168,10 +168,10 @@ def checked_names(source: str, names: Sequence[str]) -> list[str]:
     UserError
         If there are too many.
     """
-    if len(names) > COLUMNS:
+    if len(names) > MAX_COLUMNS:
         raise UserError(
-            f"{source}: its first line names {len(names)} columns; at most {COLUMNS} are read, so "
-            "leave out those that are not needed"
+            f"{source}: its first line names {len(names)} columns; at most {MAX_COLUMNS} are read, "
+            "so leave out those that are not needed"
         )
     shown = [printable(name.strip().strip("\"'").strip()) for name in names]
     return [name or f"column {index}" for index, name in enumerate(shown, start=1)]

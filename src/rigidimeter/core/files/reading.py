@@ -18,8 +18,8 @@ from typing import Any
 
 from rigidimeter.core.errors import UserError, refused
 from rigidimeter.core.files.size_limits import (
-    DIGITS,
     DOCUMENT_BYTES,
+    MAX_DIGITS,
     NESTING,
     SETTINGS_BYTES,
     size_text,
@@ -37,13 +37,13 @@ _KINDS = (
 _noted: ContextVar[dict[Path, str] | None] = ContextVar("noted", default=None)
 
 
-def open_regular(path: Path, most_bytes: int) -> io.BufferedReader:
+def open_regular(path: Path, max_bytes: int) -> io.BufferedReader:
     """Open a regular file for reading, or what a link to one leads to.
 
     Parameters
     ----------
     path : Path
-    most_bytes : int
+    max_bytes : int
         The largest file that is opened, one of `core.files.size_limits`.
 
     Raises
@@ -53,7 +53,7 @@ def open_regular(path: Path, most_bytes: int) -> io.BufferedReader:
         than its bound, or it cannot be opened.
     """
     with ExitStack() as on_failure:
-        file = on_failure.enter_context(_opened(path, most_bytes))
+        file = on_failure.enter_context(_opened(path, max_bytes))
         if _noted.get() is not None:
             with refused(path, "cannot be read"):
                 _note(path, hashlib.file_digest(file, "sha256").hexdigest())
@@ -62,22 +62,20 @@ def open_regular(path: Path, most_bytes: int) -> io.BufferedReader:
     return file
 
 
-def _opened(path: Path, most_bytes: int) -> io.BufferedReader:
+def _opened(path: Path, max_bytes: int) -> io.BufferedReader:
     try:
-        _check(path, os.stat(path), most_bytes)
+        _check(path, os.stat(path), max_bytes)
         # Another file may have this name by now; without O_NONBLOCK a pipe waits for its writer.
         with ExitStack() as on_failure:
-            file = on_failure.enter_context(open(path, "rb", opener=_without_waiting))
-            _check(path, os.fstat(file.fileno()), most_bytes)
+            file = on_failure.enter_context(
+                open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
+            )
+            _check(path, os.fstat(file.fileno()), max_bytes)
             on_failure.pop_all()
         return file
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
         reason = getattr(error, "strerror", None) or error
         raise UserError(f"{path}: cannot be read ({reason})") from None
-
-
-def _without_waiting(path: str, flags: int) -> int:
-    return os.open(path, flags | os.O_NONBLOCK)
 
 
 @contextmanager
@@ -101,18 +99,18 @@ def _note(path: Path, digest: str) -> None:
         raise UserError(f"{path}: was changed while it was read; run the command again")
 
 
-def _check(path: Path, status: os.stat_result, most_bytes: int) -> None:
+def _check(path: Path, status: os.stat_result, max_bytes: int) -> None:
     if not stat.S_ISREG(status.st_mode):
         kind = next((what for test, what in _KINDS if test(status.st_mode)), "something else")
         raise UserError(f"{path}: cannot be read (it is {kind}); name a regular file")
-    if status.st_size > most_bytes:
+    if status.st_size > max_bytes:
         raise UserError(
-            f"{path}: has {size_text(status.st_size)}, and at most {size_text(most_bytes)} are "
+            f"{path}: has {size_text(status.st_size)}, and at most {size_text(max_bytes)} are "
             "read of such a file; split it, or name the right file"
         )
 
 
-def read_bytes(path: Path, most_bytes: int) -> bytes:
+def read_bytes(path: Path, max_bytes: int) -> bytes:
     """Return what a regular file holds.
 
     Raises
@@ -120,8 +118,8 @@ def read_bytes(path: Path, most_bytes: int) -> bytes:
     UserError
         As `open_regular`.
     """
-    with _opened(path, most_bytes) as file, refused(path, "cannot be read"):
-        # Not read(most_bytes), which would make room for as much.
+    with _opened(path, max_bytes) as file, refused(path, "cannot be read"):
+        # Not read(max_bytes), which would make room for as much.
         content = file.read(os.fstat(file.fileno()).st_size)
     if _noted.get() is not None:
         _note(path, hashlib.sha256(content).hexdigest())
@@ -210,7 +208,7 @@ def _check_values(values: Any, source: str) -> None:
     for name, value in _leaves(values):
         if value is _DEEPER:
             raise UserError(_too_deep(source))
-        if isinstance(value, int) and abs(value) >= 10**DIGITS:
+        if isinstance(value, int) and abs(value) >= 10**MAX_DIGITS:
             raise UserError(_too_long(source, name or "a whole number"))
 
 
@@ -242,4 +240,6 @@ def _too_deep(source: str) -> str:
 
 
 def _too_long(source: str, name: str) -> str:
-    return f"{source}: {name} has more than {DIGITS} digits; write a whole number of at most that"
+    return (
+        f"{source}: {name} has more than {MAX_DIGITS} digits; write a whole number of at most that"
+    )

@@ -25,10 +25,10 @@ SETTINGS_BYTES = 1 * MIB
 NESTING = 32
 """Tables or lists within one another; the deepest document written here has 7."""
 
-DIGITS = 40
+MAX_DIGITS = 40
 """Of a whole number: a seed of 128 bits has 39."""
 
-COLUMNS = 2_000
+MAX_COLUMNS = 2_000
 """Of a table or entries of an archive: a BIDS or EMG file has some hundred channels."""
 
 TABLE_ROWS = 100_000
@@ -37,7 +37,7 @@ TABLE_ROWS = 100_000
 TABLE_CELLS = 2_000_000
 """Of a small table, rows times columns: text takes about 100 bytes a cell."""
 
-EPOCHS = 10_000
+MAX_EPOCHS = 10_000
 """Of one recording, pieces between gaps included: 8 h of epochs of 3 s."""
 
 CELLS = 200_000
@@ -70,7 +70,7 @@ RANKED_PAIRS = 50_000_000
 SHOWN_LINES = 5
 """Of the lines that one sentence is about; the others are counted."""
 
-NOTICES = 20
+MAX_NOTICES = 20
 """Of one kind about the rows of one table; the others are counted."""
 
 

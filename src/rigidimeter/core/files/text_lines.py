@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files.escaping import NUMBER
+from rigidimeter.core.files.escaping import NUMBER_TEXT
 from rigidimeter.core.files.reading import open_regular
 from rigidimeter.core.files.size_limits import EXPANDED_BYTES, EXPANSION, size_text
 
@@ -32,7 +32,7 @@ _NAME_LINES = 16
 _MISSING = {"", "na", "n/a", "#n/a", "nan", "null", "none", "-", "–", "."}
 
 
-def read_utf8(path: Path, most_bytes: int) -> bytes:
+def read_utf8(path: Path, max_bytes: int) -> bytes:
     """Return the text of a file as UTF-8, with line feeds as line ends.
 
     Raises
@@ -41,12 +41,12 @@ def read_utf8(path: Path, most_bytes: int) -> bytes:
         If it cannot be read, is too large, or is not a text.
     """
     source = str(path)
-    with open_regular(path, most_bytes) as file:
+    with open_regular(path, max_bytes) as file:
         try:
             data = file.read(_HEAD_BYTES)
             if data.startswith(_GZIP):
                 file.seek(0)
-                data = _expanded(path, file, most_bytes)
+                data = _expanded(path, file, max_bytes)
             elif len(data) == _HEAD_BYTES:
                 _refuse_zeros(source, data)  # before the rest of a large file
                 data += file.read(os.fstat(file.fileno()).st_size)
@@ -55,9 +55,9 @@ def read_utf8(path: Path, most_bytes: int) -> bytes:
     return _utf8(source, data)
 
 
-def _expanded(path: Path, file: BinaryIO, most_bytes: int) -> bytes:
+def _expanded(path: Path, file: BinaryIO, max_bytes: int) -> bytes:
     """Return what a file that gzip compressed holds."""
-    most = min(most_bytes, max(EXPANDED_BYTES, EXPANSION * os.fstat(file.fileno()).st_size))
+    most = min(max_bytes, max(EXPANDED_BYTES, EXPANSION * os.fstat(file.fileno()).st_size))
     try:
         data = gzip.GzipFile(fileobj=file).read(most + 1)
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
@@ -104,7 +104,7 @@ def _decoded(data: bytes) -> str:
         return text
 
 
-def whole_names(data: bytes) -> bytes:
+def joined_names(data: bytes) -> bytes:
     """Return the text with names that go over several lines, in quotes, on the first.
 
     Empty lines stand in for those that it had, so that all lines keep their numbers.
@@ -161,15 +161,15 @@ def is_missing(text: str) -> bool:
     return text.lower() in _MISSING
 
 
-def _is_text(line: bytes, is_whole: bool, first: bytes, mark: bytes) -> bool:
+def _is_text(line: bytes, is_row: bool, first: bytes, mark: bytes) -> bool:
     """Whether a line is no row: it begins with no number, though the first row does."""
     start = line.decode("utf-8").strip()
-    if not is_whole:
-        return not NUMBER.match(start)
+    if not is_row:
+        return not NUMBER_TEXT.match(start)
     cells = [row.split(mark)[0].strip().decode("utf-8") for row in (first, line)]
     if is_missing(cells[1]) or cells[1].lower() in ("inf", "infinity"):
         return False
-    return bool(NUMBER.fullmatch(cells[0])) and cells[1][:1].isalpha()
+    return bool(NUMBER_TEXT.fullmatch(cells[0])) and cells[1][:1].isalpha()
 
 
 def trimmed(

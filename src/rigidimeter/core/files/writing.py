@@ -6,11 +6,12 @@ import csv
 import io
 import json
 import math
+import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -170,3 +171,43 @@ def in_place(path: Path) -> Iterator[Path]:
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def lock(file: BinaryIO) -> bool:
+    """Lock a file until it is closed; return False if another process holds the lock.
+
+    The lock ends with the process, also when it is killed. Where there are no locks, as on some
+    network file systems, it is True.
+    """
+    try:
+        import fcntl
+    except ImportError:  # not of POSIX
+        return True
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def append_line(file: BinaryIO, line: bytes) -> None:
+    """Write bytes at the end of an unbuffered file, all of them or none.
+
+    Raises
+    ------
+    OSError
+        If the disk does not take them; what it took is cut off again.
+    """
+    start = os.fstat(file.fileno()).st_size
+    rest = memoryview(line)
+    try:
+        while rest:
+            rest = rest[file.write(rest) :]
+        file.flush()
+    except OSError as error:
+        file.seek(start)
+        file.truncate()
+        error.filename = file.name  # of a descriptor the system does not say it
+        raise

@@ -4,7 +4,6 @@ Every name ends in its unit. Arrays are float64 and read-only once inside a reco
 """
 
 from rigidimeter.core.records.analysis_record import WEIGHT_IN_STIFFNESS, Analysis
-from rigidimeter.core.records.band_estimate import BAND_VECTORS, BandEstimate, Three
 from rigidimeter.core.records.epochs import (
     CHANNEL_UNITS,
     LATE_TICK,
@@ -19,30 +18,16 @@ from rigidimeter.core.records.epochs import (
     Ticks,
     readonly,
 )
-from rigidimeter.core.records.estimates import FIT_NUMBERS, STATISTICS, Delay, Finding, Fit, Score
-from rigidimeter.core.records.parameters import PARAMETER_VECTORS, PARAMETERS
-
-__all__ = [
-    "CHANNEL_UNITS",
-    "FIT_NUMBERS",
-    "LATE_TICK",
-    "LOST_SAMPLES",
-    "PARAMETERS",
-    "PARAMETER_VECTORS",
-    "STATISTICS",
-    "Analysis",
-    "BandEstimate",
-    "Channel",
-    "Delay",
-    "Epoch",
-    "Finding",
-    "Fit",
-    "LeftOut",
-    "Motion",
-    "Notice",
-    "Outcome",
-    "Score",
-    "Task",
-    "Ticks",
-    "readonly",
-]
+from rigidimeter.core.records.estimates import (
+    BAND_VECTORS,
+    FIT_NUMBERS,
+    PARAMETER_VECTORS,
+    PARAMETERS,
+    STATISTICS,
+    BandEstimate,
+    Delay,
+    Finding,
+    Fit,
+    Score,
+    Three,
+)

@@ -8,14 +8,20 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rigidimeter.core.records.band_estimate import BandEstimate
-from rigidimeter.core.records.estimates import FIT_NUMBERS, Delay, Finding, Fit, Score
-from rigidimeter.core.records.parameters import PARAMETERS
+from rigidimeter.core.records.estimates import (
+    FIT_NUMBERS,
+    PARAMETERS,
+    BandEstimate,
+    Delay,
+    Finding,
+    Fit,
+    Score,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
 
-MOST_EPOCHS = 20
+_MAX_SHOWN = 20
 """Epochs shown one by one; of more only the first are."""
 
 
@@ -25,7 +31,7 @@ WEIGHT_IN_STIFFNESS = (
 )
 
 
-class Findings(NamedTuple):
+class FindingGroup(NamedTuple):
     """What one check found, in one or more epochs: the first finding, and the fits of all."""
 
     first: Finding
@@ -55,14 +61,14 @@ class Analysis:
     sensitivity: tuple[BandEstimate, ...] = ()
 
     @property
-    def findings(self) -> tuple[Findings, ...]:
+    def findings(self) -> tuple[FindingGroup, ...]:
         """What the checks found: for each check and level the epochs, in the order of reading."""
         groups: dict[tuple[str, str], tuple[Finding, list[Fit]]] = {}
         for fit in (*self.fits, *self.pooled):
             for finding in fit.findings:
                 _, fits = groups.setdefault((finding.name, finding.level), (finding, []))
                 fits.append(fit)
-        return tuple(Findings(first, tuple(fits)) for first, fits in groups.values())
+        return tuple(FindingGroup(first, tuple(fits)) for first, fits in groups.values())
 
     @property
     def weight_in_stiffness(self) -> str:
@@ -103,49 +109,46 @@ class Analysis:
         return pd.DataFrame(self.rows())
 
     def _repr_html_(self) -> str:
-        return _html(self)
+        """Return J, B and K with their 95 % intervals, what the checks found, and the scores."""
+        reason = f": {self.method_reason}" if self.method_reason else ""
+        parts = [f"<p>{escape(f'Method {self.method}{reason}.')}</p>"]
+        if self.fits:
+            heading = ["epoch", "condition"]
+            heading += [f"{p.symbol} ({p.unit}) [95\xa0% interval]" for p in PARAMETERS]
+            shown = [*self.fits[:_MAX_SHOWN], *self.pooled]
+            heading += ["R²", "outcome", "doubted by"]
+            parts.append(_table(heading, [_fit_row(fit) for fit in shown]))
+        if len(self.fits) > _MAX_SHOWN:
+            parts.append(f"<p>The first {_MAX_SHOWN} of {len(self.fits)} epochs.</p>")
+        if self.findings:
+            rows = []
+            for first, fits in self.findings:
+                where = "all together"
+                if fits[0].epoch != "pooled":
+                    where = f"{fits[0].source}, {fits[0].epoch}"
+                if len(fits) > 1:
+                    where = f"{len(fits)}, first {where}"
+                rows.append([first.level, where, first.text, first.remedy])
+            parts.append("<p>What the checks found:</p>")
+            parts.append(_table(["level", "epochs", "finding in the first", "remedy"], rows))
+        if self.scores:
+            rows = [
+                [
+                    f"{s.source}, {s.epoch}",
+                    s.condition,
+                    _number(s.impulse_nm_s),
+                    _number(s.work_j),
+                    f"{s.outcome.kind} {s.outcome.reason}",
+                ]
+                for s in self.scores[:_MAX_SHOWN]
+            ]
+            heading = ["epoch", "condition", "impulse (N·m·s)", "work (J)", "outcome"]
+            parts.append(_table(heading, rows))
+        return "\n".join(parts)
 
 
 def _in_a_cell(finding: Finding) -> str:
     return f"{finding.level}, {finding.name}: {finding.text}"
-
-
-def _html(analysis: Analysis) -> str:
-    """Return J, B and K with their 95 % intervals, what the checks found, and the scores."""
-    parts = [f"<p>{escape(_summary(analysis))}</p>"]
-    if analysis.fits:
-        heading = ["epoch", "condition"]
-        heading += [f"{p.symbol} ({p.unit}) [95\xa0% interval]" for p in PARAMETERS]
-        shown = [*analysis.fits[:MOST_EPOCHS], *analysis.pooled]
-        heading += ["R²", "outcome", "doubted by"]
-        parts.append(_table(heading, [_fit_row(fit) for fit in shown]))
-    if len(analysis.fits) > MOST_EPOCHS:
-        parts.append(f"<p>The first {MOST_EPOCHS} of {len(analysis.fits)} epochs.</p>")
-    if analysis.findings:
-        rows = [
-            [found.first.level, _where(found.fits), found.first.text, found.first.remedy]
-            for found in analysis.findings
-        ]
-        parts.append("<p>What the checks found:</p>")
-        parts.append(_table(["level", "epochs", "finding in the first", "remedy"], rows))
-    if analysis.scores:
-        rows = [
-            [
-                f"{s.source}, {s.epoch}",
-                s.condition,
-                _number(s.impulse_nm_s),
-                _number(s.work_j),
-                f"{s.outcome.kind} {s.outcome.reason}",
-            ]
-            for s in analysis.scores[:MOST_EPOCHS]
-        ]
-        parts.append(_table(["epoch", "condition", "impulse (N·m·s)", "work (J)", "outcome"], rows))
-    return "\n".join(parts)
-
-
-def _summary(analysis: Analysis) -> str:
-    reason = f": {analysis.method_reason}" if analysis.method_reason else ""
-    return f"Method {analysis.method}{reason}."
 
 
 def _fit_row(fit: Fit) -> list[str]:
@@ -157,11 +160,6 @@ def _fit_row(fit: Fit) -> list[str]:
     outcome = f"{fit.outcome.kind} {fit.outcome.reason}"
     doubts = ", ".join(fit.doubts)
     return [name, fit.condition, *intervals, _number(fit.r_squared), outcome, doubts]
-
-
-def _where(fits: Sequence[Fit]) -> str:
-    first = "all together" if fits[0].epoch == "pooled" else f"{fits[0].source}, {fits[0].epoch}"
-    return first if len(fits) == 1 else f"{len(fits)}, first {first}"
 
 
 def _number(value: float) -> str:

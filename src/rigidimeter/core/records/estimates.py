@@ -4,13 +4,33 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.core.records.epochs import Outcome, readonly
-from rigidimeter.core.records.parameters import PARAMETER_VECTORS, PARAMETERS
+
+
+class Parameter(NamedTuple):
+    """A parameter of Eq. 3: its name with the unit in it, its symbol, its unit, and in words."""
+
+    name: str
+    symbol: str
+    unit: str
+    title: str
+
+
+PARAMETERS = (
+    Parameter("inertia_kg_m2", "J", "kg·m²", "inertia"),
+    Parameter("damping_nm_s_rad", "B", "N·m·s/rad", "damping"),
+    Parameter("stiffness_nm_rad", "K", "N·m/rad", "stiffness"),
+)
+"""J, B and K in the order of every vector of a `Fit`."""
+
+PARAMETER_VECTORS = {"value": "", "se": "_se", "low": "_low", "high": "_high", "bound": "_bound"}
+"""The vectors of a `Fit`, and what their entries are called after the parameter's name."""
+
 
 STATISTICS = ("r_squared", "vaf_percent", "condition_number", "residual_sd_nm")
 """How well a fit explains the torque, beside its parameters."""
@@ -62,12 +82,8 @@ class _Entry:
         return float(getattr(fit, self._vector)[self._index])
 
 
-def _unknown() -> NDArray[np.float64]:
-    return np.full(len(PARAMETERS), math.nan)
-
-
-def _unknown_square() -> NDArray[np.float64]:
-    return np.full((len(PARAMETERS), len(PARAMETERS)), math.nan)
+def _unknown(n_axes: int = 1) -> NDArray[np.float64]:
+    return np.full((len(PARAMETERS),) * n_axes, math.nan)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +132,7 @@ class Fit:
     low: NDArray[np.float64] = field(default_factory=_unknown)
     high: NDArray[np.float64] = field(default_factory=_unknown)
     bound: NDArray[np.float64] = field(default_factory=_unknown)
-    covariance: NDArray[np.float64] = field(default_factory=_unknown_square)
+    covariance: NDArray[np.float64] = field(default_factory=lambda: _unknown(2))
     r_squared: float = math.nan
     vaf_percent: float = math.nan
     condition_number: float = math.nan
@@ -220,3 +236,52 @@ def _named(result: Fit | Score) -> dict[str, Any]:
         "outcome": result.outcome.kind,
         "reason": result.outcome.reason,
     }
+
+
+Three = tuple[float, float, float]
+
+BAND_VECTORS = {"value": "", "change": "_change", "change_se": "_change_se", "p": "_p"}
+"""What is known of each parameter, and how the names of it end in files and tables."""
+
+
+@dataclass(frozen=True)
+class BandEstimate:
+    """J, B and K of all epochs of a condition together, from one band and part of the epochs.
+
+    Attributes
+    ----------
+    condition : str
+    low_hz, high_hz : float
+    part : str
+        ``all``, or ``first half`` or ``second half`` of each epoch.
+    value : (float, float, float)
+        In the order of `PARAMETERS`.
+    change, change_se : (float, float, float)
+        From the estimate in the band of the fit, and the standard error of that difference.
+    p : (float, float, float)
+        Probability of as large a change by chance; 1 for the band of the fit.
+    """
+
+    condition: str
+    low_hz: float
+    high_hz: float
+    part: str
+    value: Three
+    change: Three
+    change_se: Three
+    p: Three
+
+    @property
+    def of_fit(self) -> bool:
+        """Whether this is the estimate that the others are held against."""
+        return self.change_se == (0.0, 0.0, 0.0)
+
+    def row(self) -> dict[str, Any]:
+        """Return names and numbers, as files and tables have them."""
+        numbers = {
+            parameter.name + ending: getattr(self, vector)[i]
+            for i, parameter in enumerate(PARAMETERS)
+            for vector, ending in BAND_VECTORS.items()
+        }
+        where = {name: getattr(self, name) for name in ("condition", "low_hz", "high_hz", "part")}
+        return where | numbers

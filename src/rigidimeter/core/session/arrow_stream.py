@@ -16,7 +16,7 @@ import struct
 from dataclasses import dataclass, field
 from typing import Any
 
-from rigidimeter.core.session.checksum import FIELD, checksum_holds, covered_values
+from rigidimeter.core.files import FIELD, checksum_holds, covered_values
 
 MARKER = b"\xff\xff\xff\xff"
 END_OF_STREAM = MARKER + bytes(4)
@@ -25,12 +25,12 @@ KEY = "rigidimeter"
 
 _SCHEMA, _BATCH = 1, 3
 """Types of messages in Arrow's flatbuffers."""
-_MOST_METADATA = 1 << 20
-"""Bytes; those of 19 columns take less than 2,000."""
+_MAX_METADATA_BYTES = 1 << 20
+"""Those of 19 columns take less than 2,000."""
 
 
 @dataclass(frozen=True)
-class Message:
+class StreamMessage:
     """One whole message: its place in the bytes, and what it says of itself, if anything."""
 
     start: int
@@ -47,13 +47,13 @@ class Gap:
 
 
 @dataclass(frozen=True)
-class Stream:
+class ArrowStream:
     """What a stream holds.
 
     Attributes
     ----------
-    schema : Message or None
-    batches : tuple of Message
+    schema : StreamMessage or None
+    batches : tuple of StreamMessage
         Those that are whole, in order.
     gaps : tuple of Gap
     stop : int
@@ -64,32 +64,32 @@ class Stream:
         Whether its messages have checksums.
     """
 
-    schema: Message | None
-    batches: tuple[Message, ...]
+    schema: StreamMessage | None
+    batches: tuple[StreamMessage, ...]
     gaps: tuple[Gap, ...]
     stop: int
     closed: bool
     checked: bool
 
 
-def find_schema(content: bytes) -> Message | None:
+def find_schema(content: bytes) -> StreamMessage | None:
     """Return the message with which a stream begins, None if it is damaged."""
     return _message(content, 0, _SCHEMA, FIELD in content, b"")
 
 
-def scan_stream(content: bytes, schema: Message | None, context: bytes) -> Stream:
+def scan_stream(content: bytes, schema: StreamMessage | None, context: bytes) -> ArrowStream:
     """Find the messages of a stream.
 
     Parameters
     ----------
     content : bytes
-    schema : Message or None
+    schema : StreamMessage or None
         What `find_schema` found.
     context : bytes
         What the checksum of a batch covers besides the batch: its columns.
     """
     checked = FIELD in content
-    batches: list[Message] = []
+    batches: list[StreamMessage] = []
     gaps: list[Gap] = []
     at = schema.stop if schema else 0
     stop = at
@@ -106,10 +106,10 @@ def scan_stream(content: bytes, schema: Message | None, context: bytes) -> Strea
     if closed and stop + len(END_OF_STREAM) < len(content):
         gaps.append(Gap(stop, len(content) - len(END_OF_STREAM)))
         stop = gaps[-1].stop
-    return Stream(schema, tuple(batches), tuple(gaps), stop, closed, checked)
+    return ArrowStream(schema, tuple(batches), tuple(gaps), stop, closed, checked)
 
 
-def _next(content: bytes, start: int, checked: bool, context: bytes) -> Message | None:
+def _next(content: bytes, start: int, checked: bool, context: bytes) -> StreamMessage | None:
     """Return the first whole batch that begins at `start` or later."""
     at = content.find(MARKER, start)
     while at >= 0:
@@ -120,14 +120,16 @@ def _next(content: bytes, start: int, checked: bool, context: bytes) -> Message 
     return None
 
 
-def _message(content: bytes, at: int, kind: int, checked: bool, context: bytes) -> Message | None:
+def _message(
+    content: bytes, at: int, kind: int, checked: bool, context: bytes
+) -> StreamMessage | None:
     """Return the message that begins at a place, None if none of this kind is whole there."""
     try:
         if content[at : at + 4] != MARKER:
             return None
         (size,) = struct.unpack_from("<i", content, at + 4)
         metadata = at + 8
-        if not 0 < size <= min(_MOST_METADATA, len(content) - metadata):
+        if not 0 < size <= min(_MAX_METADATA_BYTES, len(content) - metadata):
             return None
         head = content[metadata : metadata + size]
         stop = metadata + size + _body_length(head, kind)
@@ -136,13 +138,13 @@ def _message(content: bytes, at: int, kind: int, checked: bool, context: bytes) 
     if stop > len(content):
         return None
     if not checked:
-        return Message(at, stop)
+        return StreamMessage(at, stop)
     # A checksum is looked for in the metadata alone: the body may hold anything.
     if FIELD not in head:
         return None
     if not checksum_holds(content[at:stop], context):
         return None
-    return Message(at, stop, covered_values(head))
+    return StreamMessage(at, stop, covered_values(head))
 
 
 def _body_length(metadata: bytes, kind: int) -> int:

@@ -1,4 +1,4 @@
-"""From a session folder to epochs, closed or not."""
+"""From a session folder to epochs, closed or not; lost samples are stretches left out."""
 
 from __future__ import annotations
 
@@ -11,14 +11,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.records import LATE_TICK, Channel, Epoch, Motion, Notice, Outcome, Ticks
-from rigidimeter.core.session.folder import EVENTS, MANIFEST, SAMPLES, read_manifest
-from rigidimeter.core.session.lost_samples import STAMPS, lost_stretches
-from rigidimeter.core.session.stored_files import SessionFiles, read_session_files
+from rigidimeter.core.records import (
+    LATE_TICK,
+    LOST_SAMPLES,
+    Channel,
+    Epoch,
+    LeftOut,
+    Motion,
+    Notice,
+    Outcome,
+    Ticks,
+)
+from rigidimeter.core.session.folder import (
+    EVENTS,
+    MANIFEST,
+    SAMPLES,
+    SessionFiles,
+    read_manifest,
+    read_session_files,
+)
 from rigidimeter.core.settings import Settings, parse_settings
 
 CHANNELS = ("torque_nm", "angle_rad", "velocity_rad_s", "velocity_command_rad_s", "perturbation_nm")
 """The columns of samples that an epoch has."""
+_STAMPS = ("time_s", "torque_time_s", "motion_time_s")
 
 
 def is_session(path: Path) -> bool:
@@ -46,7 +62,7 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
     UserError
         If a file of the folder is missing or unreadable.
     """
-    files = read_session_files(folder, (*CHANNELS, *STAMPS, "epoch", "limited", "lateness_s"))
+    files = read_session_files(folder, (*CHANNELS, *_STAMPS, "epoch", "limited", "lateness_s"))
     manifest, samples, events = files.manifest, files.samples.columns, files.log.events
     settings = _settings(folder, manifest)
     notices = _damage(folder, files)
@@ -80,8 +96,8 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
             )
             continue
         rows = slice(first[number], last[number] + 1)
-        most_s = 1.5 / settings.rig.tick_rate_hz
-        left_out = lost_stretches(files, rows, event, ended.get(number, {}), most_s)
+        tolerance_s = 1.5 / settings.rig.tick_rate_hz
+        left_out = _lost_stretches(files, rows, event, ended.get(number, {}), tolerance_s)
         notices += [
             Notice(
                 "error",
@@ -120,6 +136,46 @@ def _damage(folder: Path, files: SessionFiles) -> list[Notice]:
         said = [f"{SAMPLES}: {damaged} bytes are damaged, but no sample is lost"]
     said += [f"{EVENTS}: line {n} is damaged and left out" for n in files.log.damaged]
     return [Notice("error", f"{folder}/{text}") for text in said]
+
+
+def _lost_stretches(
+    files: SessionFiles,
+    rows: slice,
+    started: Mapping[str, Any],
+    ended: Mapping[str, Any],
+    tolerance_s: float,
+) -> tuple[LeftOut, ...]:
+    """Return from when to when an epoch has lost its samples, and why.
+
+    A stretch goes from the last stamp before the loss to the first sample after it. A sample may
+    lie `tolerance_s` from when the events say that the epoch began or ended; `ended` is empty where
+    they do not say it.
+    """
+    columns = files.samples.columns
+    first_s = float(columns["time_s"][rows.start])
+    last_s = float(columns["time_s"][rows.stop - 1])
+    began_s, ended_s = (
+        float(event["time_s"]) if isinstance(event.get("time_s"), int | float) else None
+        for event in (started, ended)
+    )
+    found = []
+    for lost in files.samples.lost:
+        reason = f"{lost} of {SAMPLES} is damaged"
+        if rows.start < lost.row < rows.stop:
+            start_s = min(float(columns[stamp][lost.row - 1]) for stamp in _STAMPS)
+            found.append(LeftOut(start_s, float(columns["time_s"][lost.row]), reason, LOST_SAMPLES))
+        elif lost.row == rows.start and (began_s is None or first_s - began_s > tolerance_s):
+            start_s = first_s if began_s is None else began_s
+            found.append(LeftOut(start_s, first_s, reason, LOST_SAMPLES))
+        elif lost.row == rows.stop and ended_s is not None and ended_s - last_s > tolerance_s:
+            found.append(LeftOut(last_s, ended_s, reason, LOST_SAMPLES))
+    if (
+        ended_s is not None
+        and max([last_s, *(each.stop_s for each in found)]) < ended_s - tolerance_s
+    ):
+        reason = f"{SAMPLES} breaks off at {columns['time_s'][-1]:.3f} s"
+        found.append(LeftOut(last_s, ended_s, reason, LOST_SAMPLES))
+    return tuple(found)
 
 
 def epoch_extents(number: NDArray[Any]) -> tuple[dict[int, int], dict[int, int]]:
@@ -187,6 +243,8 @@ def epoch_of_samples(
     if task not in ("prbs", "sinusoid"):
         raise UserError(f"{source}: task is {task!r}; it must be 'prbs' or 'sinusoid'")
     sine = settings.sinusoid
+    late = samples["lateness_s"][rows] * settings.rig.tick_rate_hz  # in ticks
+    counts = np.sum(late > LATE_TICK), np.sum(np.floor(late)), np.sum(samples["limited"][rows] > 0)
     if task == "prbs":
         channels.append(Channel("perturbation_nm", time_s, samples["perturbation_nm"][rows]))
     return Epoch(
@@ -205,16 +263,8 @@ def epoch_of_samples(
         ),
         closed=closed,
         virtual=virtual,
-        ticks=_ticks(
-            samples["lateness_s"][rows] * settings.rig.tick_rate_hz, samples["limited"][rows]
-        ),
+        ticks=Ticks(late.size, *map(int, counts)),
     )
-
-
-def _ticks(late: NDArray[Any], limited: NDArray[Any]) -> Ticks:
-    """Return the counts of ticks that came late by so many ticks, and were limited, shape (n,)."""
-    counts = np.sum(late > LATE_TICK), np.sum(np.floor(late)), np.sum(limited > 0)
-    return Ticks(late.size, *map(int, counts))
 
 
 def _sampled(

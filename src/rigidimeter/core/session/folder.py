@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import platform
 import uuid
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, BinaryIO, Literal
@@ -25,22 +26,27 @@ from numpy.typing import NDArray
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import (
     DOCUMENT_BYTES,
+    RECORDING_BYTES,
+    ZEROS,
+    checksum_holds,
+    digest_hex,
     json_text,
     lock,
     parse_json,
     read_bytes,
     replace_file,
     text_bytes,
+    with_checksum,
 )
-from rigidimeter.core.session.checksum import ZEROS, checksum_holds, digest_hex, with_checksum
-from rigidimeter.core.session.event_log import append_event, checked_line
+from rigidimeter.core.session.event_log import EventLog, append_event, checked_line, scan_events
 from rigidimeter.core.session.sample_log import SAMPLE_UNITS, Sample, SampleLog, append_line
+from rigidimeter.core.session.sample_reading import StoredSamples, scan_samples
 from rigidimeter.core.settings import Settings, dump_settings
 from rigidimeter.core.version import __version__
 
 MANIFEST, SAMPLES, EVENTS = "manifest.json", "samples.arrows", "events.jsonl"
-SCHEMA = "rigidimeter.session/2"
-SCHEMAS = ("rigidimeter.session/1", SCHEMA)
+SESSION_SCHEMA = "rigidimeter.session/2"
+SCHEMAS = ("rigidimeter.session/1", SESSION_SCHEMA)
 """Those that are read; version 1 has neither checksums nor the id of a session."""
 
 MANIFEST_TYPES: Mapping[str, type] = {
@@ -105,7 +111,9 @@ class SessionWriter:
             "settings": dump_settings(settings),
             "protocol": [dict(epoch) for epoch in protocol],
         }
-        self.session_id = _new_id(planned if repeatable else None)
+        self.session_id = (
+            digest_hex(json_text(planned).encode()) if repeatable else uuid.uuid4().hex
+        )[:16]
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if any(folder.iterdir()):
@@ -114,7 +122,7 @@ class SessionWriter:
                     "a new folder"
                 )
             manifest = {
-                "schema": SCHEMA,
+                "schema": SESSION_SCHEMA,
                 "session_id": self.session_id,
                 "created_utc": created_utc or datetime.now(UTC).isoformat(timespec="seconds"),
                 "virtual": virtual,
@@ -212,7 +220,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
             raise UserError(f"{path}: {key} is missing or damaged; the manifest was changed")
     if not isinstance(manifest.get("continues", {}), dict):
         raise UserError(f"{path}: continues is damaged; it must be an object, or absent")
-    if schema == SCHEMA and not checksum_holds(content):
+    if schema == SESSION_SCHEMA and not checksum_holds(content):
         raise UserError(
             f"{path}: is damaged or was changed since it was written (its checksum does not hold); "
             "put back a copy of it"
@@ -251,7 +259,41 @@ def _session(session_id: str) -> str:
     return f"session {session_id}" if session_id else "a session without an id (version 1)"
 
 
-def _new_id(planned: Mapping[str, Any] | None) -> str:
-    if planned is None:
-        return uuid.uuid4().hex[:16]
-    return digest_hex(json_text(planned).encode())[:16]
+@dataclass(frozen=True)
+class SessionFiles:
+    """What the files of a session hold."""
+
+    manifest: Mapping[str, Any]
+    samples: StoredSamples
+    log: EventLog
+
+    @property
+    def ended(self) -> Mapping[str, Any] | None:
+        """The event with which the session ended, None if it was interrupted."""
+        found = (e for e in self.log.events if e.get("event") == "session_ended")
+        return next(found, None)
+
+
+def read_session_files(folder: Path, wanted: Collection[str] = Sample._fields) -> SessionFiles:
+    """Read manifest, samples and events of a session.
+
+    Parameters
+    ----------
+    folder : Path
+    wanted : collection of str
+        The columns of the samples to decode.
+
+    Raises
+    ------
+    UserError
+        If a file is missing or unreadable, or belongs to another session.
+    """
+    manifest = read_manifest(folder)
+    for name in (SAMPLES, EVENTS):
+        if not (folder / name).exists():
+            raise UserError(f"{folder}: the session has no {name}")
+    samples_path, events_path = folder / SAMPLES, folder / EVENTS
+    samples = scan_samples(read_bytes(samples_path, RECORDING_BYTES), samples_path, wanted)
+    log = scan_events(read_bytes(events_path, DOCUMENT_BYTES), events_path)
+    check_session(folder, manifest, {SAMPLES: samples.session_ids, EVENTS: log.session_ids})
+    return SessionFiles(manifest, samples, log)

@@ -20,10 +20,11 @@ from rigidimeter.core.session.folder import (
     EVENTS,
     MANIFEST,
     SAMPLES,
+    SessionFiles,
     locked,
     read_manifest,
+    read_session_files,
 )
-from rigidimeter.core.session.stored_files import SessionFiles, read_session_files
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
@@ -18,8 +17,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from rigidimeter.core.files import ZEROS, append_line, with_checksum
 from rigidimeter.core.session.arrow_stream import END_OF_STREAM, KEY
-from rigidimeter.core.session.checksum import ZEROS, with_checksum
 
 BATCH_S = 0.1
 """How much can be lost when the process is killed."""
@@ -87,10 +86,10 @@ _INTEGERS = {
     "motion_status": pa.int64(),
     "cause": pa.int8(),
 }
-SCHEMA = pa.schema(
+SAMPLE_SCHEMA = pa.schema(
     [pa.field(name, _INTEGERS.get(name, pa.float64()), nullable=False) for name in Sample._fields]
 )
-DTYPES = [np.dtype(str(kind)) for kind in SCHEMA.types]
+DTYPES = [np.dtype(str(kind)) for kind in SAMPLE_SCHEMA.types]
 
 
 def sample_dtypes() -> dict[str, np.dtype[Any]]:
@@ -132,7 +131,7 @@ class SampleLog:
         options = pa.ipc.IpcWriteOptions(compression="lz4", use_threads=False)
         # Arrow does not look at how much of its bytes a file took, so it writes to memory.
         self._message = io.BytesIO()
-        self._writer = pa.ipc.new_stream(self._message, SCHEMA, options=options)
+        self._writer = pa.ipc.new_stream(self._message, SAMPLE_SCHEMA, options=options)
         self._rows: list[Sample] = []
         self._batch = max(1, int(BATCH_S * tick_rate_hz))
         self._session_id = session_id
@@ -141,8 +140,9 @@ class SampleLog:
         self._writer.write_batch(_batch(np.empty(0, dtype) for dtype in DTYPES))
         self._message.seek(0)
         self._message.truncate()
+        schema = SAMPLE_SCHEMA.with_metadata(_facts(session_id)).serialize().to_pybytes()
         try:
-            append_line(self._file, before or _schema_message(session_id))
+            append_line(self._file, before or with_checksum(schema))
         except OSError:
             self._file.close()
             raise
@@ -204,18 +204,13 @@ def _facts(session_id: str, **facts: int) -> dict[str, str]:
     return {KEY: json.dumps({"checksum": ZEROS, "session_id": session_id, **facts})}
 
 
-def _schema_message(session_id: str) -> bytes:
-    schema = SCHEMA.with_metadata(_facts(session_id))
-    return with_checksum(schema.serialize().to_pybytes())
-
-
 def _batch(columns: Iterable[NDArray[Any]]) -> pa.RecordBatch:
     """Return the columns of a batch; `pa.array` would load pandas, half a second of a processor."""
     arrays = [
         pa.Array.from_buffers(kind, len(column), [None, pa.py_buffer(column)])
-        for kind, column in zip(SCHEMA.types, columns, strict=True)
+        for kind, column in zip(SAMPLE_SCHEMA.types, columns, strict=True)
     ]
-    return pa.RecordBatch.from_arrays(arrays, schema=SCHEMA)
+    return pa.RecordBatch.from_arrays(arrays, schema=SAMPLE_SCHEMA)
 
 
 def columns_text(schema: pa.Schema) -> bytes:
@@ -223,25 +218,4 @@ def columns_text(schema: pa.Schema) -> bytes:
     return ",".join(f"{field.name}:{field.type}" for field in schema).encode()
 
 
-_COLUMNS = columns_text(SCHEMA)
-
-
-def append_line(file: BinaryIO, line: bytes) -> None:
-    """Write bytes at the end of an unbuffered file, all of them or none.
-
-    Raises
-    ------
-    OSError
-        If the disk does not take them; what it took is cut off again.
-    """
-    start = os.fstat(file.fileno()).st_size
-    rest = memoryview(line)
-    try:
-        while rest:
-            rest = rest[file.write(rest) :]
-        file.flush()
-    except OSError as error:
-        file.seek(start)
-        file.truncate()
-        error.filename = file.name  # of a descriptor the system does not say it
-        raise
+_COLUMNS = columns_text(SAMPLE_SCHEMA)

@@ -15,13 +15,13 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import RECORDING_BYTES, read_bytes
 from rigidimeter.core.session.arrow_stream import (
     END_OF_STREAM,
+    ArrowStream,
     Gap,
-    Message,
-    Stream,
+    StreamMessage,
     find_schema,
     scan_stream,
 )
-from rigidimeter.core.session.sample_log import SCHEMA, Sample, columns_text, sample_dtypes
+from rigidimeter.core.session.sample_log import SAMPLE_SCHEMA, Sample, columns_text, sample_dtypes
 
 _FIRST = len(Sample._fields) - len(Sample._field_defaults)
 """Columns that every recording has; later versions added the others."""
@@ -66,7 +66,7 @@ class Lost:
 
 
 @dataclass(frozen=True)
-class Samples:
+class StoredSamples:
     """What a file of samples holds.
 
     Attributes
@@ -76,7 +76,7 @@ class Samples:
     lost : tuple of Lost
     session_ids : tuple of str
         That the messages name; an empty text where they name none, as in version 1.
-    stream : Stream
+    stream : ArrowStream
     next_batch : int
         The number of the batch that would follow.
     """
@@ -84,7 +84,7 @@ class Samples:
     columns: dict[str, NDArray[Any]]
     lost: tuple[Lost, ...]
     session_ids: tuple[str, ...]
-    stream: Stream
+    stream: ArrowStream
     next_batch: int
 
 
@@ -99,7 +99,9 @@ def read_samples(path: Path) -> dict[str, NDArray[Any]]:
     return scan_samples(read_bytes(path, RECORDING_BYTES), path).columns
 
 
-def scan_samples(content: bytes, source: Path, wanted: Collection[str] = Sample._fields) -> Samples:
+def scan_samples(
+    content: bytes, source: Path, wanted: Collection[str] = Sample._fields
+) -> StoredSamples:
     """Return what a file of samples holds, and what is damaged in it.
 
     Parameters
@@ -123,13 +125,16 @@ def scan_samples(content: bytes, source: Path, wanted: Collection[str] = Sample.
     columns = _to_columns(tables, names, wanted, source)
     rows = np.concatenate(([0], np.cumsum(lengths, dtype=int)))
     facts = [message.facts for message in (stream.schema, *stream.batches) if message]
-    ids = dict.fromkeys(str(said.get("session_id", "")) for said in facts)
-    numbers = [_number(stream, k) for k in range(len(stream.batches))]
+    ids = dict.fromkeys(str(each.get("session_id", "")) for each in facts)
+    numbers = [  # without checksums counted, damage as one
+        int(batch.facts.get("batch", k + sum(gap.start < batch.start for gap in stream.gaps)))
+        for k, batch in enumerate(stream.batches)
+    ]
     lost = _lost(stream, numbers, rows, columns["tick"])
-    return Samples(columns, tuple(lost), tuple(ids), stream, max([-1, *numbers]) + 1)
+    return StoredSamples(columns, tuple(lost), tuple(ids), stream, max([-1, *numbers]) + 1)
 
 
-def _read_schema(content: bytes) -> tuple[bytes, pa.Schema, Message | None]:
+def _read_schema(content: bytes) -> tuple[bytes, pa.Schema, StreamMessage | None]:
     """Return the message of the schema, and the schema; those of this version if it is damaged."""
     message = find_schema(content)
     if message is not None:
@@ -140,13 +145,13 @@ def _read_schema(content: bytes) -> tuple[bytes, pa.Schema, Message | None]:
             return header, schema, message
         except _REFUSALS:
             pass
-    return SCHEMA.serialize().to_pybytes(), SCHEMA, None
+    return SAMPLE_SCHEMA.serialize().to_pybytes(), SAMPLE_SCHEMA, None
 
 
 def _recorded(schema: pa.Schema, wanted: Collection[str], source: Path) -> list[str]:
     """Return which wanted columns a file has, in its order."""
     names = [name for name in schema.names if name in Sample._fields]
-    types = {name: SCHEMA.field(name).type for name in names}
+    types = {name: SAMPLE_SCHEMA.field(name).type for name in names}
     if (
         not set(Sample._fields[:_FIRST]) <= set(names)
         or len(types) < len(names)
@@ -157,10 +162,10 @@ def _recorded(schema: pa.Schema, wanted: Collection[str], source: Path) -> list[
 
 
 def _decode(
-    content: bytes, header: bytes, stream: Stream, fields: list[int]
-) -> tuple[Stream, list[int], list[pa.Table]]:
+    content: bytes, header: bytes, stream: ArrowStream, fields: list[int]
+) -> tuple[ArrowStream, list[int], list[pa.Table]]:
     """Return these fields of the batches, and how long each is; those Arrow refuses become gaps."""
-    messages: list[Message] = []
+    messages: list[StreamMessage] = []
     lengths: list[int] = []
     tables: list[pa.Table] = []
     gaps = list(stream.gaps)
@@ -182,7 +187,7 @@ def _decode(
 
 
 def _decode_together(
-    content: bytes, header: bytes, messages: Sequence[Message], fields: list[int]
+    content: bytes, header: bytes, messages: Sequence[StreamMessage], fields: list[int]
 ) -> pa.Table | None:
     """Return these fields of some batches, a chunk of each; None if Arrow refuses one."""
     runs = [content[message.start : message.stop] for message in messages]
@@ -196,15 +201,8 @@ def _decode_together(
     return table if table.column(0).num_chunks == len(messages) else None
 
 
-def _number(stream: Stream, k: int) -> int:
-    """Return the number of a whole batch; without checksums it is counted, damage as one."""
-    message = stream.batches[k]
-    counted = k + sum(gap.start < message.start for gap in stream.gaps)
-    return int(message.facts.get("batch", counted))
-
-
 def _lost(
-    stream: Stream, numbers: Sequence[int], rows: NDArray[Any], tick: NDArray[Any]
+    stream: ArrowStream, numbers: Sequence[int], rows: NDArray[Any], tick: NDArray[Any]
 ) -> list[Lost]:
     """Return what is lost before each batch, and after the last."""
     starts = [message.start for message in stream.batches]

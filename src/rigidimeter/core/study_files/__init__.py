@@ -1,16 +1,15 @@
 """The files of a study: `study.toml`, and its tables of sessions, ratings and exclusions."""
 
-from rigidimeter.core.study_files.extended_folder import extend_study
-from rigidimeter.core.study_files.folder import Row, StudyFolder, is_study, read_study_folder
-from rigidimeter.core.study_files.new_folder import write_new_study
+from rigidimeter.core.study_files.extended_folder import extend_study, write_new_study
+from rigidimeter.core.study_files.folder import StudyFolder, TableRow, is_study, read_study_folder
 from rigidimeter.core.study_files.recorded_sessions import recorded_session, session_rows
-from rigidimeter.core.study_files.study_text import is_own
 from rigidimeter.core.study_files.study_toml import (
     STUDY_FILE,
     STUDY_SCHEMA,
     ConditionTable,
     SubjectTable,
     is_outside,
+    is_own,
     read_study_toml,
 )
 from rigidimeter.core.study_files.tables import add_rows, table_path, table_rows

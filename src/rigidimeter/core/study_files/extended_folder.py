@@ -1,4 +1,4 @@
-"""A folder of sessions becomes a study folder, and grows with each session that is recorded.
+"""A study folder is made, empty or of a folder of sessions, and grows with each that is recorded.
 
 Nothing that a person wrote is changed: rows are added behind theirs, and a `study.toml` that was
 edited stays as it is.
@@ -11,20 +11,30 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from rigidimeter.core.errors import UserError
+from rigidimeter.core.errors import UserError, refused
 from rigidimeter.core.files import DOCUMENT_BYTES, read_bytes, write_text
 from rigidimeter.core.session import EVENTS, is_session, read_events, read_manifest
 from rigidimeter.core.settings import validated
 from rigidimeter.core.study_files.folder import is_study
 from rigidimeter.core.study_files.recorded_sessions import (
     RecordedSession,
-    rating_rows,
+    recorded_rating_rows,
     recorded_session,
     session_rows,
     stimulated,
 )
-from rigidimeter.core.study_files.study_text import is_own, own_text, pair_of, study_text, toml_key
-from rigidimeter.core.study_files.study_toml import STUDY_FILE, ConditionTable, read_study_toml
+from rigidimeter.core.study_files.study_toml import (
+    DBS,
+    OFF,
+    STUDY_FILE,
+    ConditionTable,
+    is_own,
+    own_text,
+    pair_of,
+    read_study_toml,
+    study_text,
+    toml_key,
+)
 from rigidimeter.core.study_files.tables import (
     add_rows,
     commented_cells,
@@ -32,6 +42,32 @@ from rigidimeter.core.study_files.tables import (
     table_path,
     table_rows,
 )
+
+_TABLES = ("sessions", "ratings", "exclusions")
+
+
+def write_new_study(folder: Path, title: str = "") -> None:
+    """Make a study folder; without a title it has the folder's name.
+
+    Raises
+    ------
+    UserError
+        If one of its files is there already, or the folder cannot be written.
+    """
+    names = (STUDY_FILE, *(f"{name}.csv" for name in _TABLES))
+    there = [name for name in names if (folder / name).exists()]
+    if there:
+        raise UserError(
+            f"{folder / there[0]}: is there already; a study is never written over, so name "
+            "another folder"
+        )
+    with refused(folder, "cannot be made"):
+        folder.mkdir(parents=True, exist_ok=True)
+    for name in _TABLES:
+        write_text(folder / f"{name}.csv", empty_table(name))
+    shown = title.strip() or folder.resolve().name
+    conditions = {OFF: ConditionTable(), DBS: ConditionTable()}
+    write_text(folder / STUDY_FILE, study_text(shown, OFF, DBS, conditions))
 
 
 def extend_study(
@@ -123,7 +159,7 @@ def _added(
     if not session.conditions:
         return [f"{path}: no epoch was begun in it, so it is not in the study"] if asked else []
     before = table_rows(table, "sessions")
-    kinds = (_virtual(study / row["path"]) for row in before)
+    kinds = (_is_virtual(study / row["path"]) for row in before)
     if next((kind for kind in kinds if kind is not None), session.virtual) != session.virtual:
         kind, other = ("virtual", "real") if session.virtual else ("real", "virtual")
         return [
@@ -145,13 +181,13 @@ def _added(
     said = _described(study, session, recorded, names)
     ratings = table_path(study, "ratings")
     # The row of the session comes last: what was interrupted before is done again.
-    add_rows(ratings, "ratings", rating_rows(session, table_rows(ratings, "ratings")))
+    add_rows(ratings, "ratings", recorded_rating_rows(session, table_rows(ratings, "ratings")))
     add_rows(table, "sessions", session_rows(session, before))
     # Not in which condition: the operator may be blinded.
     return [f"{path}: is in {table.name}, subject {session.subject}, day {session.day}.", *said]
 
 
-def _virtual(folder: Path) -> bool | None:
+def _is_virtual(folder: Path) -> bool | None:
     """Whether a row's recording was made on the virtual rig; None where that is not known."""
     try:
         return bool(read_manifest(folder)["virtual"]) if is_session(folder) else None

@@ -14,13 +14,12 @@ the rows mean.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import (
-    TextTable,
     cell_number,
     lines_text,
     noted_digests,
@@ -44,7 +43,7 @@ _MAY_BE_EMPTY = ("note", "part", "by", "mapping", "join", "clock_offset")
 
 
 @dataclass(frozen=True)
-class Row:
+class TableRow:
     """One row of a table: its file and line, and its cells by column."""
 
     source: str
@@ -79,8 +78,8 @@ class StudyFolder:
     ----------
     folder : Path
     about : StudyToml
-    sessions, ratings, exclusions : tuple of Row
-    key : tuple of Row or None
+    sessions, ratings, exclusions : tuple of TableRow
+    key : tuple of TableRow or None
         None where there is no blinding key.
     files : mapping of str to Path
         The tables and `study.toml` that exist, by the name under which a digest is kept.
@@ -92,10 +91,10 @@ class StudyFolder:
 
     folder: Path
     about: StudyToml
-    sessions: tuple[Row, ...]
-    ratings: tuple[Row, ...]
-    exclusions: tuple[Row, ...]
-    key: tuple[Row, ...] | None
+    sessions: tuple[TableRow, ...]
+    ratings: tuple[TableRow, ...]
+    exclusions: tuple[TableRow, ...]
+    key: tuple[TableRow, ...] | None
     files: Mapping[str, Path]
     digests: Mapping[str, str]
     notices: tuple[Notice, ...]
@@ -116,61 +115,51 @@ def read_study_folder(folder: Path, key: Path | None = None) -> StudyFolder:
         no session.
     """
     with noted_digests() as noted:
-        return _read_folder(folder, key, noted)
-
-
-def _read_folder(folder: Path, key: Path | None, noted: Mapping[Path, str]) -> StudyFolder:
-    about = read_study_toml(folder / STUDY_FILE)
-    notices: list[Notice] = []
-    if "one_offset_a_day" in about.analysis.model_fields_set:
-        text = (
-            f"{folder / STUDY_FILE}: one_offset_a_day has no effect any more, for the test by days "
-            "is chosen by which days have which conditions; remove the line"
+        about = read_study_toml(folder / STUDY_FILE)
+        notices: list[Notice] = []
+        if "one_offset_a_day" in about.analysis.model_fields_set:
+            text = (
+                f"{folder / STUDY_FILE}: one_offset_a_day has no effect any more, for the test by "
+                "days is chosen by which days have which conditions; remove the line"
+            )
+            notices.append(Notice("warning", text))
+        files = {STUDY_FILE: folder / STUDY_FILE}
+        tables: dict[str, tuple[TableRow, ...] | None] = {}
+        for name in TABLE_COLUMNS:
+            path, namer = folder / getattr(about, name), STUDY_FILE
+            named = name in about.model_fields_set or name == "sessions"
+            if name == "key" and key is not None:
+                path, named, namer = key, True, "--key"
+            if not path.exists():
+                if named:
+                    raise UserError(
+                        f"{path}: there is no such file, but {namer} names it as the table "
+                        f"with the columns {', '.join(TABLE_COLUMNS[name][0])}"
+                    )
+                tables[name] = None
+                continue
+            # A key is listed by its role: it may be kept anywhere, and its place is not recorded.
+            files["key" if name == "key" else getattr(about, name)] = path
+            tables[name] = _read_table(path, name, notices)
+        if not tables["sessions"]:
+            raise UserError(
+                f"{folder / about.sessions}: holds no session; write a row with "
+                "path,subject,day,condition for each"
+            )
+        return StudyFolder(
+            folder,
+            about,
+            tables["sessions"] or (),
+            tables["ratings"] or (),
+            tables["exclusions"] or (),
+            tables["key"],
+            files,
+            {name: noted[path] for name, path in files.items()},
+            tuple(notices),
         )
-        notices.append(Notice("warning", text))
-    files = {STUDY_FILE: folder / STUDY_FILE}
-    tables: dict[str, tuple[Row, ...] | None] = {}
-    for name in TABLE_COLUMNS:
-        path = folder / getattr(about, name)
-        named = name in about.model_fields_set or name == "sessions"
-        if name == "key" and key is not None:
-            path, named = key, True
-        if not path.exists():
-            if named:
-                raise UserError(
-                    f"{path}: there is no such file, but {_namer(name, key)} names it as the table "
-                    f"with the columns {', '.join(TABLE_COLUMNS[name][0])}"
-                )
-            tables[name] = None
-            continue
-        # A key is listed by its role: it may be kept anywhere, and its place is not recorded.
-        files["key" if name == "key" else getattr(about, name)] = path
-        tables[name] = _read_table(path, name, notices)
-    if not tables["sessions"]:
-        raise UserError(
-            f"{folder / about.sessions}: holds no session; write a row with "
-            "path,subject,day,condition for each"
-        )
-    return StudyFolder(
-        folder,
-        about,
-        tables["sessions"] or (),
-        tables["ratings"] or (),
-        tables["exclusions"] or (),
-        tables["key"],
-        files,
-        {name: noted[path] for name, path in files.items()},
-        tuple(notices),
-    )
 
 
-def _namer(name: str, key: Path | None) -> str:
-    if name == "key" and key is not None:
-        return "--key"
-    return STUDY_FILE
-
-
-def _read_table(path: Path, name: str, notices: list[Notice]) -> tuple[Row, ...]:
+def _read_table(path: Path, name: str, notices: list[Notice]) -> tuple[TableRow, ...]:
     table = read_text_table(path, may_be_empty=True)
     needed, allowed = TABLE_COLUMNS[name]
     present = tuple(table.columns)
@@ -183,21 +172,15 @@ def _read_table(path: Path, name: str, notices: list[Notice]) -> tuple[Row, ...]
             f"{path}: there is no column {missing[0]}{hint}; its columns are {', '.join(present)}, "
             f"and it must have {', '.join(needed)}"
         )
-    notices += _unknown_columns(path, present, (*needed, *allowed))
-    return tuple(_rows(table, needed, notices))
-
-
-def _unknown_columns(path: Path, present: Sequence[str], known: Sequence[str]) -> Iterable[Notice]:
     for column in present:
-        if column in known or column.startswith("column "):
+        if column in (*needed, *allowed) or column.startswith("column "):
             continue
-        free = [name for name in known if name not in present]
+        free = [name for name in (*needed, *allowed) if name not in present]
         near = difflib.get_close_matches(column, free, n=1, cutoff=0.6)
         nearest = f"the nearest that is known is {near[0]}" if near else "it means nothing here"
-        yield Notice("warning", f"{path}: column {column} is not read; {nearest}")
-
-
-def _rows(table: TextTable, needed: Sequence[str], notices: list[Notice]) -> Iterable[Row]:
+        text = f"{path}: column {column} is not read; {nearest}"
+        notices.append(Notice("warning", text))
+    rows: list[TableRow] = []
     lacking: dict[str, list[int]] = {}
     for index, line in enumerate(table.lines):
         cells = {name: cells[index] for name, cells in table.columns.items()}
@@ -205,8 +188,9 @@ def _rows(table: TextTable, needed: Sequence[str], notices: list[Notice]) -> Ite
         if empty:
             lacking.setdefault(" and ".join(empty), []).append(line)
             continue
-        yield Row(table.source, line, cells)
+        rows.append(TableRow(table.source, line, cells))
     for names, lines in lacking.items():
-        rows = "the row is" if len(lines) == 1 else "the rows are"
-        text = f"{table.source}, {lines_text(lines)}: no {names} is given; {rows} left out"
+        left = "the row is" if len(lines) == 1 else "the rows are"
+        text = f"{table.source}, {lines_text(lines)}: no {names} is given; {left} left out"
         notices.append(Notice("error", text))
+    return tuple(rows)

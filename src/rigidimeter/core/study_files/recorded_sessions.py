@@ -116,7 +116,7 @@ def session_rows(
     return rows
 
 
-def rating_rows(
+def recorded_rating_rows(
     session: RecordedSession, before: Sequence[Mapping[str, str]]
 ) -> list[dict[str, str]]:
     """Return the rows of `ratings.csv` for a session; `note` says which epoch was rated.

@@ -2,28 +2,73 @@
 
 Strict as the settings are: an unknown key is refused with the nearest known one, a number out of
 its range with the range and the unit.
+
+What the program wrote without being asked carries a checksum. Once a person has changed the file,
+it is theirs, and nothing is written into it any more.
 """
 
 from __future__ import annotations
 
+import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from rigidimeter.core.files import FIELD, ZEROS, checksum_holds, text_bytes, with_checksum
 from rigidimeter.core.settings import Section, read_section
 
 STUDY_FILE = "study.toml"
 STUDY_SCHEMA = "rigidimeter.study/1"
+
+OFF, DBS = "OFF", "DBS"
+_TITLES = {OFF: "stimulation off", DBS: "stimulation on"}
+
+_HEAD = """\
+schema = "{schema}"
+title = {title}
+
+# Differences are reference - other.
+reference = {reference}
+other = {other}
+
+# The tables, below this folder. Only that of the sessions must exist.
+sessions = "sessions.csv"       # path,subject,day,condition,part,note
+ratings = "ratings.csv"         # subject,day,condition,examiner,score
+exclusions = "exclusions.csv"   # path,epoch,reason,by
+# A blinding key (code,condition) is key.csv in this folder, or given with --key FILE. Without one,
+# codes stay codes.
+"""
+_NOT_WRITTEN = """\
+# What was not written down may be left out; the amplitude is amplitude_v or amplitude_ma.
+# frequency_hz = 130.0
+# amplitude_ma = 2.5
+# pulse_width_us = 60.0
+# electrodes = "1-2+"
+# wash_in_min = 15.0
+"""
+_TAIL = """\
+[rating]
+scale = [0.0, 3.0]   # lowest and highest score
+step = 0.5           # 0 for none
+
+[analysis]
+method = "auto"      # as --method takes it
+"""
+_OWN = (
+    "# Written by rigidimeter, which adds conditions and stimulation as sessions are recorded,"
+    f'\n# until you change a line.\n# {FIELD.decode()}{ZEROS}"\n'
+)
 
 
 def _optional(unit: str, low: float, high: float) -> Any:
     return Field(None, ge=low, le=high, json_schema_extra={"unit": unit})
 
 
-def _text(default: Any, least: int = 1, most: int = 200) -> Any:
-    return Field(default, min_length=least, max_length=most)
+def _text(default: Any, shortest: int = 1, longest: int = 200) -> Any:
+    return Field(default, min_length=shortest, max_length=longest)
 
 
 class SimulatedTable(Section):
@@ -175,3 +220,67 @@ def read_study_toml(path: Path) -> StudyToml:
         Naming each offending key, its value, and what would be right.
     """
     return read_section(path, STUDY_SCHEMA, StudyToml)
+
+
+def study_text(
+    title: str, reference: str, other: str, conditions: Mapping[str, ConditionTable]
+) -> str:
+    """Return a `study.toml`, with comments on what may be filled in.
+
+    Parameters
+    ----------
+    title, reference, other : str
+    conditions : mapping of str to ConditionTable
+        What is known of the stimulation in each; reference and other at least.
+    """
+    head = _HEAD.format(
+        schema=STUDY_SCHEMA,
+        title=_quoted(title),
+        reference=_quoted(reference),
+        other=_quoted(other),
+    )
+    return "\n".join([head, *(_condition(*one, reference) for one in conditions.items()), _TAIL])
+
+
+def own_text(text: str) -> str:
+    """Return a `study.toml` marked as the program's own."""
+    return with_checksum(text_bytes(_OWN + text)).decode("utf-8")
+
+
+def is_own(content: bytes) -> bool:
+    """Whether a `study.toml` is as the program wrote it."""
+    return checksum_holds(content)
+
+
+def pair_of(recorded: list[str], known: list[str]) -> tuple[str, str]:
+    """Return reference and other: conditions that were recorded, filled up with known ones.
+
+    A name that is not known may be a code.
+
+    Examples
+    --------
+    >>> pair_of(["DBS", "OFF"], ["OFF", "DBS"]), pair_of(["code A"], ["OFF", "DBS"])
+    (('OFF', 'DBS'), ('OFF', 'DBS'))
+    """
+    named = [name for name in recorded if name in known]
+    first, second = list(dict.fromkeys([*named, *known, OFF, DBS]))[:2]
+    return (second, first) if second == OFF else (first, second)
+
+
+def _condition(name: str, table: ConditionTable, reference: str) -> str:
+    given = table.model_dump(exclude_unset=True, exclude={"title"})
+    lines = [f"[conditions.{toml_key(name)}]"]
+    lines.append(f"title = {_quoted(table.title or _TITLES.get(name, ''))}")
+    lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in given.items()
+              if value is not None]  # fmt: skip
+    ending = _NOT_WRITTEN if not given and name != reference else ""
+    return "\n".join(lines) + "\n" + ending
+
+
+def toml_key(name: str) -> str:
+    """Return a name as a key of TOML, quoted where it must be."""
+    return name if name.isidentifier() and name.isascii() else _quoted(name)
+
+
+def _quoted(value: str) -> str:
+    return json.dumps(value, ensure_ascii=False)

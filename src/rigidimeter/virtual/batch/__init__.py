@@ -7,15 +7,4 @@ from rigidimeter.virtual.batch.batch_simulate import (
     simulate_chunks,
     simulate_epochs,
 )
-from rigidimeter.virtual.batch.compiled_steps import numbers, with_helpers
-
-__all__ = [
-    "Batch",
-    "Bench",
-    "bench",
-    "draw_inputs",
-    "epoch_generator",
-    "simulate_chunks",
-    "simulate_epochs",
-    "simulate_inputs",
-]
+from rigidimeter.virtual.batch.compiled_steps import enum_numbers, with_helpers

@@ -86,7 +86,7 @@ class Sampling(NamedTuple):
     parts: Floats
 
 
-class Columns(NamedTuple):
+class EpochColumns(NamedTuple):
     """What is recorded, one entry a tick; written in place."""
 
     torque_nm: Floats
@@ -108,7 +108,7 @@ def run_epoch(
     filtered: BiquadState,
     guard: GuardState,
     state: DriveState,
-    columns: Columns,
+    columns: EpochColumns,
 ) -> tuple[int, int, float, int]:
     """Run one epoch until the perturbation ends or the guard latches.
 

@@ -5,7 +5,6 @@ Numbers are drawn from the streams that the simulated rig draws from.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -106,7 +105,12 @@ def draw_sampling(
     tick_s = np.arange(ticks) * interval_s
     until_s = tick_s + SAME_TIME_S
     blocks = sample_time_blocks_s(sensor.rate_hz, sensor.latency_s, sensor.jitter_s, rng)
-    taken_s = np.concatenate(list(_through(until_s[-1], blocks)))
+    taken = []
+    for times_s in blocks:
+        taken.append(times_s)
+        if times_s[-1] > until_s[-1]:
+            break
+    taken_s = np.concatenate(taken)
     # Samples are taken and handed over in order: none overtakes the one before.
     in_order_s = np.maximum.accumulate(taken_s)
     in_order_s = in_order_s[in_order_s <= until_s[-1]]
@@ -123,29 +127,21 @@ def draw_sampling(
     for row, length_s in enumerate(lengths_s.tolist()):
         parts[row] = drive(rig.drive_bandwidth_hz, rig.drive_damping_ratio, length_s)
     newest = np.searchsorted(np.maximum.accumulate(arrives_s), until_s, side="right") - 1
-    taken = np.searchsorted(in_order_s, until_s, side="right")
+    n_taken = np.searchsorted(in_order_s, until_s, side="right")
     assert newest[0] >= 0  # each sensor has a sample before the first tick
     seen_s = (arrives_s - sensor.stamp_latency_s)[newest]
     return Sampling(
-        _whole(taken, np.uint32),
-        _whole(newest, np.uint32),
+        _frozen_integers(n_taken, np.uint32),
+        _frozen_integers(newest, np.uint32),
         readonly(seen_s),
         readonly(np.arange(ticks) / rig.tick_rate_hz - seen_s),
-        _whole(part, np.int32),
+        _frozen_integers(part, np.int32),
         readonly(left),
         readonly(parts),
     )
 
 
-def _through(end_s: float, blocks: Iterator[NDArray[np.float64]]) -> Iterator[NDArray[np.float64]]:
-    """Yield blocks of times up to the one that passes the end."""
-    for times_s in blocks:
-        yield times_s
-        if times_s[-1] > end_s:
-            return
-
-
-def _whole(values: NDArray[Any], kind: type[np.integer[Any]]) -> NDArray[Any]:
+def _frozen_integers(values: NDArray[Any], kind: type[np.integer[Any]]) -> NDArray[Any]:
     array = values.astype(kind)
     array.setflags(write=False)
     return array

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,7 @@ from rigidimeter.core.records import Channel, Epoch, Outcome, readonly
 from rigidimeter.core.settings import Settings
 from rigidimeter.model import BiquadState, DriveState, JointDynamics
 from rigidimeter.rig.guard import Cause, guard_state, why_ended
-from rigidimeter.virtual.batch.batch_epoch import Columns, Joint
+from rigidimeter.virtual.batch.batch_epoch import EpochColumns, Joint
 from rigidimeter.virtual.batch.batch_rig import Bench, EpochInputs
 from rigidimeter.virtual.batch.compiled_steps import compiled
 
@@ -113,7 +113,7 @@ def _fresh(name: str, stamps_s: NDArray[np.float64], values: NDArray[np.float64]
     return Channel(name, stamps_s[fresh], values[fresh])
 
 
-Rows = Mapping[str, NDArray[Any]]
+_Rows = Mapping[str, NDArray[Any]]
 
 _STAMPS = {"torque_time_s": "torque", "motion_time_s": "motion"}  # and the sensor of each
 _ONE_EACH = {"ticks": np.int64, "cause": np.int64, "limited_ticks": np.int64}
@@ -169,21 +169,21 @@ def perturbation_rows(perturbation_nm: ArrayLike, n_epochs: int) -> NDArray[np.f
     return np.broadcast_to(readonly(given), (n_epochs, ticks))
 
 
-def empty_rows(n_epochs: int, bench: Bench) -> Rows:
+def empty_rows(n_epochs: int, bench: Bench) -> _Rows:
     """Return columns to be written, one row an epoch.
 
     The stamps of a sensor that keeps time are the same in every epoch: they have no rows.
     """
     columns = {
         name: np.empty((n_epochs, bench.ticks), np.int8 if name == "limited" else np.float64)
-        for name in (*Columns._fields, *_jittering(bench))
+        for name in (*EpochColumns._fields, *_jittering(bench))
     }
     counts = {name: np.empty(n_epochs, dtype) for name, dtype in _ONE_EACH.items()}
     return {**columns, **counts, "limit_time_s": np.empty(n_epochs)}
 
 
 def run_row(
-    rows: Rows, row: int, bench: Bench, perturbation_nm: NDArray[np.float64], inputs: EpochInputs
+    rows: _Rows, row: int, bench: Bench, perturbation_nm: NDArray[np.float64], inputs: EpochInputs
 ) -> None:
     """Run one epoch from rest into a row; rows may be run at the same time."""
     lengths = {perturbation_nm.size, inputs.torque.taken.size, inputs.motion.taken.size}
@@ -204,7 +204,7 @@ def run_row(
         BiquadState(),
         guard_state(bench.coefficients.limits),
         DriveState(),
-        Columns(*(rows[name][row] for name in Columns._fields)),
+        EpochColumns(*(rows[name][row] for name in EpochColumns._fields)),
     )
     jittering = _jittering(bench)
     for name in jittering:
@@ -213,12 +213,12 @@ def run_row(
         rows[name][row] = value
     rows["ticks"][row] = ticks
     if ticks < bench.ticks:
-        for name in (*Columns._fields, *jittering):
+        for name in (*EpochColumns._fields, *jittering):
             rows[name][row, ticks:] = 0 if name == "limited" else np.nan
 
 
 def batch_of(
-    rows: Rows,
+    rows: _Rows,
     bench: Bench,
     perturbation_nm: NDArray[np.float64],
     joints: Sequence[JointDynamics],
@@ -228,7 +228,15 @@ def batch_of(
     first: int = 0,
 ) -> Batch:
     """Return written rows as a batch."""
-    columns: Rows = {**rows, **dict(_kept_time(bench, rows["ticks"]))}
+    columns = {**rows}
+    ticks = rows["ticks"]
+    ended = np.arange(bench.ticks) >= ticks[:, None] if ticks.min() < bench.ticks else None
+    for name, sensor in _STAMPS.items():  # those that every epoch has in common
+        sampling = getattr(bench, sensor)
+        if sampling is not None:
+            shared = np.broadcast_to(sampling.seen_s, (ticks.size, bench.ticks))
+            # Copied only if one ended early.
+            columns[name] = shared if ended is None else np.where(ended, np.nan, shared)
     return Batch(
         settings=bench.settings,
         source=source,
@@ -244,13 +252,3 @@ def batch_of(
 def _jittering(bench: Bench) -> list[str]:
     """Return the stamps that differ from epoch to epoch."""
     return [name for name, sensor in _STAMPS.items() if getattr(bench, sensor) is None]
-
-
-def _kept_time(bench: Bench, ticks: NDArray[np.int64]) -> Iterator[tuple[str, NDArray[np.float64]]]:
-    """Yield the stamps that every epoch has in common, as rows; copied only if one ended early."""
-    ended = np.arange(bench.ticks) >= ticks[:, None] if ticks.min() < bench.ticks else None
-    for name, sensor in _STAMPS.items():
-        sampling = getattr(bench, sensor)
-        if sampling is not None:
-            rows = np.broadcast_to(sampling.seen_s, (ticks.size, bench.ticks))
-            yield name, rows if ended is None else np.where(ended, np.nan, rows)

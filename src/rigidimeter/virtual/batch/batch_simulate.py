@@ -29,8 +29,6 @@ from rigidimeter.virtual.batch.batch_run import (
 CHUNK = 32
 """Epochs held at once: about 50 MB of 20 s epochs at 1 kHz."""
 
-Progress = Callable[[int], None]
-
 
 def epoch_generator(seed: int, number: int) -> np.random.Generator:
     """Return the generator of one epoch, counted from 0."""
@@ -55,7 +53,7 @@ def simulate_chunks(
     seed: int | None = None,
     first: int = 0,
     workers: int = 1,
-    progress: Progress = lambda _: None,
+    progress: Callable[[int], None] = lambda _: None,
 ) -> Iterator[Batch]:
     """Simulate PRBS epochs and yield them a chunk at a time, so that memory stays as it is.
 

@@ -76,9 +76,9 @@ def compiled() -> Compiled:
                 "quantised": inlined(quantised),
                 "guard_step": inlined(
                     step.guard_step,
-                    Limited=numbers(step.Limited),
+                    Limited=enum_numbers(step.Limited),
                     energy_after=inlined(watch.energy_after),
-                    found_wrong=inlined(watch.found_wrong, Cause=numbers(Cause)),
+                    found_wrong=inlined(watch.found_wrong, Cause=enum_numbers(Cause)),
                     outside=inlined(watch.outside),
                     _gravest=inlined(step._gravest),
                     _fastest_toward=inlined(
@@ -116,7 +116,7 @@ def with_helpers(function: Callable[..., Any], helpers: dict[str, Any]) -> Funct
     )
 
 
-def numbers(members: type[IntEnum]) -> Any:
+def enum_numbers(members: type[IntEnum]) -> Any:
     """Return the members as plain numbers under the same names."""
     make: Any = namedtuple
     return make(members.__name__, members.__members__)(*(int(member) for member in members))

@@ -8,13 +8,11 @@ import pytest
 from tests.version_1 import as_version_1
 
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import FIELD, ZEROS, checksum_holds, with_checksum
 from rigidimeter.core.session import (
-    FIELD,
-    SCHEMA,
+    SAMPLE_SCHEMA,
     TOGETHER,
-    ZEROS,
     SampleLog,
-    checksum_holds,
     read_events,
     read_samples,
     read_session,
@@ -22,7 +20,6 @@ from rigidimeter.core.session import (
     scan_events,
     scan_samples,
     session_settings,
-    with_checksum,
 )
 
 BATCH = 100
@@ -275,8 +272,8 @@ def test_a_damaged_batch_of_a_long_stream_costs_no_other(tmp_path, batch, checke
     count = 2 * TOGETHER + 3
     whole = stream(path, count)
     if not checked:
-        with pa.ipc.new_stream(str(path), SCHEMA, options=LZ4) as plain:
-            plain.write_table(pa.table(whole.columns, SCHEMA), max_chunksize=BATCH)
+        with pa.ipc.new_stream(str(path), SAMPLE_SCHEMA, options=LZ4) as plain:
+            plain.write_table(pa.table(whole.columns, SAMPLE_SCHEMA), max_chunksize=BATCH)
         whole = scan_samples(path.read_bytes(), path)
     assert (whole.columns["tick"].size, whole.lost) == (count * BATCH, ())
     message = whole.stream.batches[batch]

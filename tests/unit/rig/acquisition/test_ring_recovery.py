@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.session import Sample, append_line, read_events, read_samples
+from rigidimeter.core.files import append_line
+from rigidimeter.core.session import Sample, read_events, read_samples
 from rigidimeter.core.session import folder as folder_module
 from rigidimeter.core.settings import Settings
 from rigidimeter.rig.acquisition.processes import (

@@ -276,7 +276,7 @@ def test_what_is_compiled_also_runs_in_the_interpreter():
     inputs = draw_inputs(table, settings.subject["OFF"], epoch_generator(1, 0))
     wanted = prbs_nm(settings.prbs, 1000.0)
     batch = simulate_inputs(table, wanted, [inputs])
-    columns = plain.Columns(*(np.empty(1000) for _ in range(5)), np.empty(1000, np.int8))
+    columns = plain.EpochColumns(*(np.empty(1000) for _ in range(5)), np.empty(1000, np.int8))
     joint = plain.Joint(*dataclasses.astuple(inputs.joint))
     plain.run_epoch(
         table.coefficients,

@@ -25,7 +25,7 @@ from rigidimeter.analysis.estimation.closedloop.drive_motion import DrivenAt, dr
 from rigidimeter.analysis.estimation.signals import Array, motion_channels
 from rigidimeter.core.records import Channel, Epoch
 from rigidimeter.core.settings import EstimationSettings, RigSettings
-from rigidimeter.model import EVEN, ArmMotion, DriveModel, lowpass
+from rigidimeter.model import ON_EDGE, ArmMotion, DriveModel, lowpass
 
 Complex = NDArray[np.complex128]
 
@@ -175,7 +175,7 @@ def phases_s(command: Channel, time_s: Array) -> Array:
     Samples that do not keep step with the ticks see the acceleration at many times.
     """
     _, after_s = since_ticks(command, time_s, 0.0)
-    if np.ptp(after_s) * command.mean_rate_hz < 2 * EVEN:
+    if np.ptp(after_s) * command.mean_rate_hz < 2 * ON_EDGE:
         return np.asarray(np.mean(after_s, keepdims=True))
     return np.quantile(after_s, np.linspace(0.05, 0.95, 10))
 
@@ -189,11 +189,11 @@ def step_kept_s(command: Channel, time_s: Array) -> float | None:
     _, after_s = since_ticks(command, time_s, 0.0)
     turns = np.exp(2j * np.pi * after_s / interval_s)
     mean = complex(np.mean(turns))
-    if abs(mean) > 1.0 - EVEN**2 or abs(mean) < SCATTERED / np.sqrt(time_s.size):
+    if abs(mean) > 1.0 - ON_EDGE**2 or abs(mean) < SCATTERED / np.sqrt(time_s.size):
         return None
     return float(np.angle(mean) / (2 * np.pi) % 1.0) * interval_s
 
 
 def in_step(tick: NDArray[np.intp], after_s: Array, interval_s: float) -> bool:
     """Return whether samples (`since_ticks`) were taken once a tick, as long after each."""
-    return bool(np.all(np.diff(tick) == 1)) and float(np.ptp(after_s)) < 2 * EVEN * interval_s
+    return bool(np.all(np.diff(tick) == 1)) and float(np.ptp(after_s)) < 2 * ON_EDGE * interval_s

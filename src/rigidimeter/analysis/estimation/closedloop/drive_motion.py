@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.core.records import Channel
-from rigidimeter.model import EVEN, SAME_TIME_S, ArmMotion, DriveModel, HeldCommand
+from rigidimeter.model import ON_EDGE, SAME_TIME_S, ArmMotion, DriveModel, HeldCommand
 
 UNEVEN = 1e-3
 """Ticks that differ by less than this share of one came evenly."""
@@ -46,7 +46,7 @@ def lengths_s(command: Channel) -> float | Array:
 
 
 def since_ticks(
-    command: Channel, time_s: Array, delay_s: float, even: float = EVEN
+    command: Channel, time_s: Array, delay_s: float, even: float = ON_EDGE
 ) -> tuple[NDArray[np.intp], Array]:
     """Return the last tick whose command acts at the times, and for how long it has."""
     # From the first tick on: on a clock that counts from 1970 a delay is below the rounding.

@@ -19,7 +19,7 @@ from rigidimeter.analysis.reading.formats.columns import seconds
 from rigidimeter.analysis.reading.formats.gaps import Rows, longest_s
 from rigidimeter.analysis.reading.formats.table import Table, label_text
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import EPOCHS
+from rigidimeter.core.files import MAX_EPOCHS
 from rigidimeter.core.records import Notice
 
 ROWS_A_LABEL = 100
@@ -44,11 +44,11 @@ def by_label(
     A label that returns after something else is another epoch: the second run of `1` is named
     `1 (2)`, and a notice says so.
     """
-    runs = _runs(column, 2 * EPOCHS)
+    runs = _runs(column, 2 * MAX_EPOCHS)
     if not runs:
         raise UserError(
-            f"{source}: the epoch column changes more than {2 * EPOCHS} times; name the column of "
-            "the epochs with --column epoch=NAME"
+            f"{source}: the epoch column changes more than {2 * MAX_EPOCHS} times; name the column "
+            "of the epochs with --column epoch=NAME"
         )
     stretches: list[Stretch] = []
     notices: list[Notice] = []
@@ -81,10 +81,10 @@ def by_length(source: str, clock: Rows, length_s: float) -> tuple[list[Stretch],
     """
     time_s, step_s = clock.time_s, clock.step_s
     elapsed = time_s - time_s[0]
-    if not elapsed[-1] + step_s <= EPOCHS * length_s:
+    if not elapsed[-1] + step_s <= MAX_EPOCHS * length_s:
         raise UserError(
-            f"{source} lasts {seconds(float(elapsed[-1]))}, which is more than {EPOCHS} epochs of "
-            f"--epoch-length-s {length_s:g}; give a longer one"
+            f"{source} lasts {seconds(float(elapsed[-1]))}, which is more than {MAX_EPOCHS} epochs "
+            f"of --epoch-length-s {length_s:g}; give a longer one"
         )
     # A quarter of an interval keeps a stamp that rounding put just before its boundary.
     index = np.floor((elapsed + 0.25 * step_s) / length_s).astype(np.int64)

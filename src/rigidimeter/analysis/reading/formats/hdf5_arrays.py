@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.analysis.reading.formats.stored_arrays import Expansion, Stored, check_count
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import CELLS, COLUMNS, NESTING
+from rigidimeter.core.files import CELLS, MAX_COLUMNS, NESTING
 
 _OPAQUE = 3
 """MATLAB's mark of an object of a class."""
@@ -137,7 +137,7 @@ def _stored(path: Path, h5py: Any, dataset: Any, name: str, expansion: Expansion
 def _elements(h5py: Any, dataset: Any, prefix: str, key: str) -> Iterator[tuple[str, Any]]:
     """Yield a field of a structure, or of each element of an array of structures."""
     references = h5py.check_ref_dtype(dataset.dtype) is not None and not _kind(dataset)
-    if not (references and prefix and 0 < dataset.size <= COLUMNS):
+    if not (references and prefix and 0 < dataset.size <= MAX_COLUMNS):
         yield f"{prefix}{key}", dataset
         return
     parts = [dataset.file[reference] for reference in np.asarray(dataset[()]).reshape(-1)]

@@ -26,7 +26,7 @@ from rigidimeter.analysis.reading.formats.stored_arrays import Expansion, Stored
 from rigidimeter.analysis.reading.formats.table import Table
 from rigidimeter.analysis.reading.formats.text_head import Layout
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import COLUMNS, RECORDING_BYTES, open_regular
+from rigidimeter.core.files import MAX_COLUMNS, RECORDING_BYTES, open_regular
 
 _VALUE_BYTES = 8
 _VALUES = "__function_workspace__"
@@ -163,7 +163,7 @@ def _is_signals(value: object) -> bool:
     if not isinstance(value, list) or not all(isinstance(one, Mapping) for one in value):
         return False
     fields = [field for one in value for field in one.values()]
-    return 0 < len(fields) <= COLUMNS and any(
+    return 0 < len(fields) <= MAX_COLUMNS and any(
         isinstance(field, np.ndarray) and field.dtype.kind in "fiu" and field.size > 1
         for field in fields
     )

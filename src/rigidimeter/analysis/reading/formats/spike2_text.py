@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rigidimeter.analysis.reading.formats.clocked_table import Stream, table_of_streams
 from rigidimeter.analysis.reading.formats.table import Table
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import COLUMNS, printable
+from rigidimeter.core.files import MAX_COLUMNS, printable
 
 FIRST = b'"INFORMATION"'
 
@@ -38,8 +38,8 @@ def spike2_table(source: str, text: bytes) -> Table:
         values = np.concatenate([values for _, values in pieces])
         streams.append(Stream(f"channel {number}", time_s, {name: values}))
         units.append({name: title[3].strip()})
-    if len(streams) > COLUMNS:
-        raise UserError(f"{source}: has {len(streams)} channels; at most {COLUMNS} are read")
+    if len(streams) > MAX_COLUMNS:
+        raise UserError(f"{source}: has {len(streams)} channels; at most {MAX_COLUMNS} are read")
     return table_of_streams(source, streams, units)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import COLUMNS, EXPANDED_BYTES, EXPANSION, size_text
+from rigidimeter.core.files import EXPANDED_BYTES, EXPANSION, MAX_COLUMNS, size_text
 
 
 @dataclass(frozen=True)
@@ -126,12 +126,12 @@ def check_count(path: Path, n_entries: int) -> None:
     Raises
     ------
     UserError
-        If there are more than `COLUMNS`.
+        If there are more than `MAX_COLUMNS`.
     """
-    if n_entries > COLUMNS:
+    if n_entries > MAX_COLUMNS:
         raise UserError(
-            f"{path}: holds {n_entries} entries; at most {COLUMNS} are read, so save the columns "
-            "of the recording alone"
+            f"{path}: holds {n_entries} entries; at most {MAX_COLUMNS} are read, so save the "
+            "columns of the recording alone"
         )
 
 

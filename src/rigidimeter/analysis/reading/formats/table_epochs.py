@@ -37,7 +37,7 @@ from rigidimeter.analysis.reading.formats.gaps import (
 from rigidimeter.analysis.reading.formats.read_options import ReadOptions
 from rigidimeter.analysis.reading.formats.table import Table, nearest
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import EPOCHS, MAGNITUDE, SAMPLING_RATE_HZ
+from rigidimeter.core.files import MAGNITUDE, MAX_EPOCHS, SAMPLING_RATE_HZ
 from rigidimeter.core.records import Channel, Epoch, Notice, Task
 
 _FEWEST = 2
@@ -95,9 +95,9 @@ def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], 
 
 
 def _check_epochs(source: str, n_epochs: int) -> None:
-    if n_epochs > EPOCHS:
+    if n_epochs > MAX_EPOCHS:
         raise UserError(
-            f"{source}: has more than {EPOCHS} epochs or pieces between gaps; check the epoch "
+            f"{source}: has more than {MAX_EPOCHS} epochs or pieces between gaps; check the epoch "
             "column and the time, or split the recording"
         )
 

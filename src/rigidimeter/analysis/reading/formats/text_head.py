@@ -16,7 +16,7 @@ from rigidimeter.analysis.reading.formats.grouped_numbers import GROUPED
 from rigidimeter.analysis.reading.formats.table import MISSING
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import (
-    NUMBER,
+    NUMBER_TEXT,
     cells_of,
     checked_names,
     first_line_names,
@@ -149,7 +149,7 @@ def _standard(source: str, lines: Sequence[str], example: str) -> Head | None:
     """Return the head where the first line, and at most a row of units below it, is no row."""
     delimiter = next((mark for mark in DELIMITERS[:3] if mark in lines[0]), ",")
     names = cells_of(lines[0], delimiter)
-    if len(names) < 2 or any(NUMBER.fullmatch(name.strip()) for name in names):
+    if len(names) < 2 or any(NUMBER_TEXT.fullmatch(name.strip()) for name in names):
         return None
     units = units_row(lines[1], delimiter) if len(lines) > 1 else None
     below = lines[2 if units else 1 :][:3]
@@ -268,4 +268,4 @@ def units_row(line: str, delimiter: str) -> list[str] | None:
 
 
 def _is_number(cell: str) -> bool:
-    return any(form.fullmatch(cell.strip()) for form in (NUMBER, GROUPED))
+    return any(form.fullmatch(cell.strip()) for form in (NUMBER_TEXT, GROUPED))

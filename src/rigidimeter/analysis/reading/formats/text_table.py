@@ -40,11 +40,11 @@ from rigidimeter.core.files import (
     RECORDING_BYTES,
     as_read,
     content,
+    joined_names,
     printable,
     read_utf8,
     records,
     trimmed,
-    whole_names,
 )
 
 _DECIMAL_COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")
@@ -70,7 +70,7 @@ def read_text_recording(path: Path, layout: Layout | None = None) -> Table:
         If it is not such a file; the sentence names the line where there is one.
     """
     example = "time_s,torque_nm,angle_rad"
-    whole = whole_names(without_later_heads(read_utf8(path, RECORDING_BYTES)))
+    whole = joined_names(without_later_heads(read_utf8(path, RECORDING_BYTES)))
     if whole.startswith(_LABCHART) and b"\n" + _LABCHART in whole:
         raise UserError(
             f"{path}: holds {whole.count(_LABCHART)} blocks of LabChart, each with a head and a "

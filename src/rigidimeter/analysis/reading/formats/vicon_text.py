@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rigidimeter.analysis.reading.formats.clocked_table import Stream, table_of_streams, unique
 from rigidimeter.analysis.reading.formats.table import Table
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import COLUMNS, cells_of, printable
+from rigidimeter.core.files import MAX_COLUMNS, cells_of, printable
 
 _HEAD = re.compile(
     rb"[^\n,;\t]*[^\W\d][^\n,;\t]*[,;\t]*\n\s*[\d.,]+[,;\t]*\n[^\n]*\nFrame([,;\t])Sub Frame"
@@ -85,7 +85,7 @@ def _section(
                             for line in lines[2:_LINES_OF_HEAD])  # fmt: skip
     while below and not below[-1]:
         below.pop()
-    if not 2 < len(below) <= COLUMNS:
+    if not 2 < len(below) <= MAX_COLUMNS:
         raise ValueError(f"it names {len(below)} columns")
     columns, owner = [], ""
     for place, own in enumerate(below[2:], start=2):

@@ -20,14 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import lock
+from rigidimeter.core.files import append_line, lock
 from rigidimeter.core.session import (
     BATCH_S,
     EVENTS,
     SAMPLES,
     SampleLog,
     append_event,
-    append_line,
     checked_line,
     close_files,
     read_events,

@@ -1,7 +1,8 @@
-"""Folders of tables: a CSV or Parquet file for each clock, others for epochs and estimates.
+"""Tables for other programs: one for each clock, others for epochs and estimates.
 
-Each sample has the labels of its epoch, so that a program finds them in any of the tables.
-`session.json` holds the document.
+They are a folder of CSV or Parquet files, in which `session.json` holds the document, or a MATLAB
+file of version 5 with a structure for each. Each sample has the labels of its epoch, so that a
+program finds them in any of the tables.
 """
 
 from __future__ import annotations
@@ -10,14 +11,17 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
+import scipy.io
+from numpy.typing import NDArray
 
-from rigidimeter.analysis.export.document_tables import document_tables, sample_labels
+from rigidimeter.analysis.export.document_tables import columns_of, document_tables, sample_labels
 from rigidimeter.analysis.export.exported_sessions import ExportedSession
 from rigidimeter.analysis.reading.formats.clocked_table import Stream
-from rigidimeter.core.files import csv_text, write_json, write_text
+from rigidimeter.core.files import csv_text, json_text, write_json, write_text
 
 DOCUMENT = "session.json"
 
@@ -64,3 +68,37 @@ def _stream_table(stream: Stream, about: Mapping[str, Any]) -> pa.Table:
         arrays.append(pa.array(texts, pa.string(), mask=texts == ""))
         fields.append(pa.field(name, pa.string()))
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
+
+
+_SHOWN = ("software", "virtual", "subject", "day", "condition", "part", "source")
+
+
+def write_mat(session: ExportedSession, path: Path) -> None:
+    """Write one session; `torque.time_s` and `torque.torque_nm` are columns of one length.
+
+    `torque.epoch`, `condition` and `task` have a row of letters for each sample, as for `cellstr`.
+    The character array `document` is the whole document as JSON, for `jsondecode`.
+    """
+    about = session.about
+    values: dict[str, Any] = {
+        stream.name: {
+            "time_s": stream.time_s,
+            **stream.columns,
+            **{name: texts.astype(str) for name, texts in sample_labels(stream, about).items()},
+        }
+        for stream in session.streams
+    }
+    for name, rows in document_tables(about).items():
+        values[name] = {key: _cells(cells) for key, cells in columns_of(rows).items()}
+    values["session"] = {key: about[key] for key in _SHOWN}
+    values["document"] = json_text(about)
+    scipy.io.savemat(path, values, oned_as="column", do_compression=True, long_field_names=True)
+
+
+def _cells(cells: list[Any]) -> NDArray[Any]:
+    """Return numbers as a column of doubles, texts as a cell array."""
+    if all(isinstance(cell, float) for cell in cells):
+        return np.array(cells)
+    found = np.empty(len(cells), dtype=object)
+    found[:] = cells
+    return found

@@ -32,10 +32,10 @@ from rigidimeter.model import (
     median_joint,
     voluntary_motion_sd,
 )
-from rigidimeter.planning.demand import demand
+from rigidimeter.planning.motion_demand import demand
 from rigidimeter.planning.perturbation_band import check_band
 from rigidimeter.planning.perturbations import prbs_nm
-from rigidimeter.planning.precision import Precision, predicted_precision
+from rigidimeter.planning.precision import predicted_precision
 
 _VOLUNTARY_SDS = 3.0
 _HALVINGS = 30
@@ -64,12 +64,6 @@ class Candidate:
     angle_sd_rad: float
     peak_angle_rad: float
     covered: bool
-
-
-def _relative(precision: Precision) -> Array:
-    """Return the covariance of the relative errors, in %²."""
-    values = np.array(precision.values)
-    return precision.covariance * 1e4 / np.outer(values, values)
 
 
 CRITERIA: Mapping[str, Callable[[Array], float]] = {
@@ -239,7 +233,10 @@ def _candidate(
     amplitude = amplitude_of(torque)
     if amplitude == 0.0:
         return None
-    relative = {name: _relative(found) / amplitude**2 for name, found in precisions.items()}
+    relative = {  # covariances in %²
+        name: found.covariance * 1e4 / np.outer(found.values, found.values) / amplitude**2
+        for name, found in precisions.items()
+    }
     prbs = unit.model_copy(update={"amplitude_nm": amplitude})
     errors = {name: np.sqrt(np.diag(matrix)).tolist() for name, matrix in relative.items()}
     return Candidate(

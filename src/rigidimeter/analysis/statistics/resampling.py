@@ -14,13 +14,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
+from rigidimeter.analysis.statistics.summary import Array
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import BOOTSTRAP_COUNTS
 
-Array = NDArray[np.float64]
 Statistic = Callable[..., Array]
 
 

@@ -9,22 +9,22 @@ from typing import Any
 from rigidimeter.core.files import plain_values
 from rigidimeter.core.units import rad_from_deg
 from rigidimeter.model import Margins
-from rigidimeter.planning.demand import time_constant_s
 from rigidimeter.planning.epochs_needed import Detection
 from rigidimeter.planning.joint_bandwidth import Corner
-from rigidimeter.planning.optimise import Candidate
+from rigidimeter.planning.motion_demand import time_constant_s
 from rigidimeter.planning.overview import Design
-from rigidimeter.planning.perturbations import period_s
-from rigidimeter.planning.precision import PARAMETERS, Errors, Precision
+from rigidimeter.planning.perturbations import prbs_period_s
+from rigidimeter.planning.precision import PARAMETER_NAMES, Errors, PredictedPrecision
+from rigidimeter.planning.search import Candidate
 
-SCHEMA = "rigidimeter.design/1"
+DESIGN_SCHEMA = "rigidimeter.design/1"
 
 
 def design_document(design: Design) -> dict[str, Any]:
     """Return all numbers of a design; what was not asked for, and what is not finite, is None."""
     multisine, ranked = design.multisine, design.ranked
     document = {
-        "schema": SCHEMA,
+        "schema": DESIGN_SCHEMA,
         **_commanded(design),
         "stability": {
             "conditions": {n: _margins(m) for n, m in design.stability.conditions.items()},
@@ -62,7 +62,7 @@ def _commanded(design: Design) -> dict[str, Any]:
         "prbs": {
             **settings.prbs.model_dump(),
             "tick_rate_hz": settings.rig.tick_rate_hz,
-            "period_s": period_s(settings.prbs),
+            "period_s": prbs_period_s(settings.prbs),
             "level_low_nm": float(design.perturbation_nm.min()),
             "level_high_nm": float(design.perturbation_nm.max()),
             **{name: value for name, value in vars(band).items() if not name.startswith("enough")},
@@ -117,14 +117,14 @@ def _margins(margins: Margins) -> dict[str, Any]:
 
 def _named(values: Sequence[float]) -> dict[str, float]:
     """Return the last parameters by their names: all three, or B and K."""
-    return dict(zip(PARAMETERS[-len(values) :], values, strict=True))
+    return dict(zip(PARAMETER_NAMES[-len(values) :], values, strict=True))
 
 
 def _errors(errors: Errors) -> dict[str, Any]:
     return {"free": _named(errors.free), "fixed_inertia": _named(errors.fixed_inertia)}
 
 
-def _precision(found: Precision, epochs: int) -> dict[str, Any]:
+def _precision(found: PredictedPrecision, epochs: int) -> dict[str, Any]:
     pooled = _named(found.iv_pooled(epochs)) if epochs else None
     return {
         "joint": vars(found.joint),

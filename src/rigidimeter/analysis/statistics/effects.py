@@ -14,14 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from rigidimeter.analysis.statistics.bootstrap import bootstrap
-from rigidimeter.analysis.statistics.effect_from_p import rank_biserial_interval
-from rigidimeter.analysis.statistics.ranksum import RankSum, ranksum, u_sigma
-from rigidimeter.analysis.statistics.summary import checked_sample
-
-Array = NDArray[np.float64]
+from rigidimeter.analysis.statistics.published_effects import rank_biserial_interval
+from rigidimeter.analysis.statistics.ranks import RankSum, ranksum, u_sigma
+from rigidimeter.analysis.statistics.resampling import bootstrap
+from rigidimeter.analysis.statistics.summary import Array, checked_sample
 
 
 @dataclass(frozen=True)
