@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import DOCUMENT_BYTES, read_bytes, write_text
+from rigidimeter.core.files import DOCUMENT_BYTES, read_bytes, toml_text, write_text
 from rigidimeter.core.session import EVENTS, is_session, read_events, read_manifest
 from rigidimeter.core.settings import validated
 from rigidimeter.core.study_files.folder import is_study
@@ -23,7 +23,7 @@ from rigidimeter.core.study_files.recorded_sessions import (
     session_rows,
     stimulated,
 )
-from rigidimeter.core.study_files.study_text import is_own, own_text, pair_of, study_text, toml_key
+from rigidimeter.core.study_files.study_text import is_own, own_text, pair_of, study_text
 from rigidimeter.core.study_files.study_toml import STUDY_FILE, ConditionTable, read_study_toml
 from rigidimeter.core.study_files.tables import (
     add_rows,
@@ -139,7 +139,8 @@ def _added(
         if new:
             refused.append(
                 f"{path}: is not in the study, for {study / STUDY_FILE} lacks its condition "
-                f"{new[0]}: write [conditions.{toml_key(new[0])}] there and add the session again"
+                f"{new[0]}: write {toml_text({'conditions': {new[0]: {}}}).strip()} there and "
+                "add the session again"
             )
             return []
     said = _described(study, session, recorded, names)

@@ -6,24 +6,17 @@ it is theirs, and nothing is written into it any more.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 
-from rigidimeter.core.files import text_bytes
+from rigidimeter.core.files import text_bytes, toml_text
 from rigidimeter.core.session import FIELD, ZEROS, checksum_holds, with_checksum
 from rigidimeter.core.study_files.study_toml import STUDY_SCHEMA, ConditionTable
 
 OFF, DBS = "OFF", "DBS"
 _TITLES = {OFF: "stimulation off", DBS: "stimulation on"}
 
-_HEAD = """\
-schema = "{schema}"
-title = {title}
-
-# Differences are reference - other.
-reference = {reference}
-other = {other}
-
+_REFERENCE = "# Differences are reference - other.\n"
+_TABLES = """\
 # The tables, below this folder. Only that of the sessions must exist.
 sessions = "sessions.csv"       # path,subject,day,condition,part,note
 ratings = "ratings.csv"         # subject,day,condition,examiner,score
@@ -64,10 +57,10 @@ def study_text(
     conditions : mapping of str to ConditionTable
         What is known of the stimulation in each; reference and other at least.
     """
-    head = _HEAD.format(
-        schema=STUDY_SCHEMA, title=_text(title), reference=_text(reference), other=_text(other)
-    )
-    return "\n".join([head, *(_condition(*one, reference) for one in conditions.items()), _TAIL])
+    about = toml_text({"schema": STUDY_SCHEMA, "title": title})
+    pair = _REFERENCE + toml_text({"reference": reference, "other": other})
+    described = (_condition(*one, reference) for one in conditions.items())
+    return "\n".join([about, pair, _TABLES, *described, _TAIL])
 
 
 def own_text(text: str) -> str:
@@ -97,18 +90,6 @@ def pair_of(recorded: list[str], known: list[str]) -> tuple[str, str]:
 
 def _condition(name: str, table: ConditionTable, reference: str) -> str:
     given = table.model_dump(exclude_unset=True, exclude={"title"})
-    lines = [f"[conditions.{toml_key(name)}]"]
-    lines.append(f"title = {_text(table.title or _TITLES.get(name, ''))}")
-    lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in given.items()
-              if value is not None]  # fmt: skip
-    ending = _NOT_WRITTEN if not given and name != reference else ""
-    return "\n".join(lines) + "\n" + ending
-
-
-def toml_key(name: str) -> str:
-    """Return a name as a key of TOML, quoted where it must be."""
-    return name if name.isidentifier() and name.isascii() else _text(name)
-
-
-def _text(value: str) -> str:
-    return json.dumps(value, ensure_ascii=False)
+    title = table.title or _TITLES.get(name, "")
+    written = toml_text({"conditions": {name: {"title": title, **given}}})
+    return written + (_NOT_WRITTEN if not given and name != reference else "")
