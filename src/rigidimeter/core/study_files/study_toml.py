@@ -61,10 +61,7 @@ class ConditionTable(Section):
 class RatingTable(Section):
     """``[rating]``: lowest and highest score, and the step of the scale (0 for none)."""
 
-    scale: list[float] = Field(
-        default_factory=lambda: [0.0, 3.0], min_length=2, max_length=2,
-        json_schema_extra={"meaning": "two numbers, the lowest and the highest score"},
-    )  # fmt: skip
+    scale: list[float] = Field(default_factory=lambda: [0.0, 3.0], min_length=2, max_length=2)
     step: float = Field(0.5, ge=0.0, le=100.0, json_schema_extra={"unit": "1"})
 
     @model_validator(mode="after")
