@@ -14,9 +14,13 @@ __all__ = ["compared"]
     ("old", "new", "told"),
     [
         ("title =", "titel =", "titel is not a setting; the nearest is title"),
-        ("frequency_hz = 130.0", "frequency_hz = -1", "at least 0 Hz and at most 1000 Hz"),
-        ("frequency_hz = 130.0", "frequency_hz = nan", "at least 0 Hz and at most 1000 Hz"),
-        ("[conditions.OFF]", "[rating]\nscale = [0, nan]\n[conditions.OFF]", "must be two numbers"),
+        ("frequency_hz = 130.0", "frequency_hz = -1.0", "than or equal to 0, in Hz"),
+        ("frequency_hz = 130.0", "frequency_hz = nan", "a finite number, in Hz"),
+        (
+            "[conditions.OFF]",
+            "[rating]\nscale = [0, nan]\n[conditions.OFF]",
+            "rating.scale[1] = nan: Input should be a finite number",
+        ),
         ("[conditions.OFF]", "[conditions]\nON = 5\n[conditions.OFF]", "be a table, as in [cond"),
         ('title = "Small study"', 'title = "T"\nratings = "/r.csv"', "outside the study folder"),
         ('title = "Small study"', 'title = "T"\nsessions = "../s.csv"', "name a file in it"),

@@ -14,13 +14,12 @@ import sys
 import textwrap
 from collections.abc import Iterable, Sequence
 from itertools import compress, groupby
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.text import Text
 
 WIDEST = 100
 """Longer lines are hard to read, however wide the terminal."""
@@ -29,6 +28,8 @@ NARROWEST = 40
 
 _GAP = 2
 _LEAST_WORDS = 8
+_ANY_WIDTH = 100_000
+"""Of the console: the widths are chosen here, so that rich cuts nothing off."""
 
 
 class Heading(str):
@@ -88,11 +89,11 @@ def _rendered(blocks: Iterable[Block], width: int, *, terminal: bool = False) ->
 
     shown = io.StringIO()
     console = Console(
-        file=shown, width=width, force_terminal=terminal, highlight=False, legacy_windows=False
+        file=shown, width=_ANY_WIDTH, force_terminal=terminal, highlight=False, legacy_windows=False
     )
     for block in blocks:
         if isinstance(block, Table):
-            _print_table(console, _filled(block), width)
+            _print_table(console, block, width)
         else:
             _print_text(console, block, width, "bold" if isinstance(block, Heading) else "")
     return "\n".join(line.rstrip() for line in shown.getvalue().split("\n"))
@@ -102,7 +103,7 @@ def _print_text(console: Console, text: str, width: int, style: str = "") -> Non
     from rich.text import Text
 
     for line in paragraph(text, width):
-        console.print(Text(line, style=style), soft_wrap=True)
+        console.print(Text(line, style=style))
 
 
 def paragraph(text: str, width: int) -> list[str]:
@@ -126,71 +127,71 @@ def paragraph(text: str, width: int) -> list[str]:
     ) or [""]
 
 
-def _filled(table: Table) -> Table:
-    """Return a table without the columns in which no row has an entry, such as the condition."""
-    rows = [row for row in table.rows if not isinstance(row, str)]
-    filled = [any(cells) or not rows for _, *cells in zip(table.headings, *rows, strict=True)]
-
-    def cut(cells: Iterable[str]) -> tuple[str, ...]:
-        return tuple(compress(cells, filled))
-
-    return table._replace(
-        headings=cut(table.headings),
-        rows=[row if isinstance(row, str) else cut(row) for row in table.rows],
-        align="".join(cut(table.align)),
-    )
-
-
 def _print_table(console: Console, table: Table, width: int) -> None:
-    """Print a table, wider than the terminal where its numbers alone are: nothing is cut off."""
-    from rich.segment import Segment, Segments
-    from rich.style import Style
+    """Print a table, wider than the terminal where its numbers alone are: nothing is cut off.
+
+    Without the columns in which no row has an entry, such as the condition.
+    """
+    from rich.padding import Padding
     from rich.table import Table as Grid
-
-    grid = Grid(box=None, padding=(0, _GAP, 0, 0), pad_edge=False, header_style="bold")
-    for heading, side in zip(table.headings, table.align, strict=True):
-        justify: Literal["left", "right"] = "right" if side == ">" else "left"
-        grid.add_column(_cell(heading), justify=justify, no_wrap=side != "<", overflow="fold")
-    below: dict[int, list[str]] = {}
-    for cells in table.rows:
-        if isinstance(cells, str):
-            below.setdefault(grid.row_count, []).append(cells)
-        else:
-            # Each line of the grid says of which row it is, so that a text can follow that row.
-            number = Style(meta={"row": grid.row_count + 1})
-            grid.add_row(*map(_cell, cells), style=number)
-    options = console.options.update(width=max(width - table.indent, _least_width(table)))
-    indent = " " * table.indent
-
-    def row_of(line: list[Segment]) -> int:
-        return next((int(s.style.meta["row"]) for s in line if s.style and s.style.meta), 0)
-
-    for row, lines in groupby(console.render_lines(grid, options), row_of):
-        for line in lines:
-            whole = Segments([Segment(indent), *line, Segment.line()])
-            console.print(whole, end="", soft_wrap=True)
-        for text in below.get(row, ()):
-            _print_text(console, indent + text, width)
-
-
-def _least_width(table: Table) -> int:
-    """Return the width that shows every number whole, and of words `_LEAST_WORDS` letters."""
-    from rich.cells import cell_len
-
-    rows = [table.headings, *(row for row in table.rows if not isinstance(row, str))]
-    widths = []
-    for cells, side in zip(zip(*rows, strict=True), table.align, strict=True):
-        natural = max(cell_len(line) for cell in cells for line in cell.split("\n"))
-        widths.append(min(natural, _LEAST_WORDS) if side == "<" else natural)
-    return sum(widths) + _GAP * (len(widths) - 1)
-
-
-def _cell(text: str) -> Text:
     from rich.text import Text
 
     from rigidimeter.core.files import visible
 
-    return Text(visible(text, lines=True))
+    rows_of_cells = [row for row in table.rows if not isinstance(row, str)]
+    columns = zip(table.headings, *rows_of_cells, strict=True)
+    filled = [any(cells) or not rows_of_cells for _, *cells in columns]
+
+    def shown(cells: Iterable[str]) -> list[str]:
+        return [visible(cell, lines=True) for cell in compress(cells, filled)]
+
+    headings, align = shown(table.headings), list(compress(table.align, filled))
+    rows = [row if isinstance(row, str) else shown(row) for row in table.rows]
+    columns = zip(headings, *map(shown, rows_of_cells), strict=True)
+    widths = _widths(["\n".join(cells) for cells in columns], align, width - table.indent)
+
+    def print_grid(rows: Iterable[Sequence[str]], *, header: bool = False) -> None:
+        grid = Grid(
+            box=None, padding=(0, _GAP, 0, 0), pad_edge=False, show_header=header,
+            header_style="bold",
+        )  # fmt: skip
+        for heading, side, column_width in zip(headings, align, widths, strict=True):
+            grid.add_column(
+                Text(heading), justify="right" if side == ">" else "left", width=column_width,
+                overflow="fold",
+            )  # fmt: skip
+        for row in rows:
+            grid.add_row(*map(Text, row))
+        console.print(Padding.indent(grid, table.indent))
+
+    print_grid([], header=True)
+    for is_text, group in groupby(rows, lambda row: isinstance(row, str)):
+        if is_text:
+            for text in group:
+                _print_text(console, " " * table.indent + str(text), width)
+        else:
+            print_grid(group)
+
+
+def _widths(columns: Sequence[str], align: Sequence[str], room: int) -> list[int]:
+    """Return widths that fit: of the columns of words the widest is folded first.
+
+    Between words; within them only if there is no room otherwise.
+    """
+    from rich.cells import cell_len
+
+    natural = [max(map(cell_len, text.split("\n"))) for text in columns]
+    words = [max([_LEAST_WORDS, *map(cell_len, text.split())]) for text in columns]
+    widths = list(natural)
+    for least in (words, [_LEAST_WORDS] * len(columns)):
+        narrowest = [
+            min(all_, one) if side == "<" else all_
+            for all_, one, side in zip(natural, least, align, strict=True)
+        ]
+        while sum(widths) + _GAP * (len(widths) - 1) > room and widths != narrowest:
+            foldable = [w if w > n else 0 for w, n in zip(widths, narrowest, strict=True)]
+            widths[foldable.index(max(foldable))] -= 1
+    return widths
 
 
 def number_text(value: float, digits: str = ".2g") -> str:

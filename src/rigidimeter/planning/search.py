@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import toml_text
 from rigidimeter.core.settings import PrbsSettings, Settings
 from rigidimeter.core.units import rad_from_deg
 from rigidimeter.model import (
@@ -76,9 +77,8 @@ CRITERIA: Mapping[str, Callable[[Array], float]] = {
 
 def prbs_toml(prbs: PrbsSettings) -> str:
     """Return the values that a search varies as a table of settings, in TOML."""
-    return (
-        f"[prbs]\nregister_bits = {prbs.register_bits}\nclock_hz = {prbs.clock_hz!r}\n"
-        f"amplitude_nm = {prbs.amplitude_nm!r}\n"
+    return toml_text(
+        {"prbs": prbs.model_dump(include={"register_bits", "clock_hz", "amplitude_nm"})}
     )
 
 

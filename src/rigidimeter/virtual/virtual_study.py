@@ -17,7 +17,7 @@ from pathlib import Path
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.executor import each
-from rigidimeter.core.files import csv_text, write_text
+from rigidimeter.core.files import csv_text, toml_text, write_text
 from rigidimeter.core.settings import SinusoidSettings
 from rigidimeter.core.study_files import STUDY_SCHEMA
 from rigidimeter.core.units import rad_from_deg
@@ -111,26 +111,26 @@ def _write_tables(folder: Path, plans: Sequence[DayPlan], subject: str) -> None:
 
 def _study_toml(design: StudyDesign, seed: int) -> str:
     """Return the study's description; what it assumes stands in comments."""
-    low, high = design.rating_scale
-    reference, other = design.conditions[0].name, design.conditions[-1].name
-    lines = [
+    comments = [
         "# A virtual study: made by rigidimeter, of a subject that does not exist.",
         f"# Design {design.name}, seed {seed}. Its assumptions:",
         *(f"#   {name} = {value}" for name, value in _assumed(design)),
-        "",
-        f'schema = "{STUDY_SCHEMA}"',
-        f'title = "{design.title}"',
-        f'reference = "{reference}"',
-        f'other = "{other}"',
-        'sessions = "sessions.csv"',
-        'ratings = "ratings.csv"',
     ]
-    for condition in design.conditions:
-        lines += ["", f"[conditions.{condition.name}]", *_stimulation(condition)]
-        lines += ["", f"[simulated.{condition.name}]"]
-        lines += [f"{name} = {value:.6g}" for name, value in _medians(design, condition).items()]
-    lines += ["", "[rating]", f"scale = [{low:.1f}, {high:.1f}]", f"step = {design.rating_step:g}"]
-    return "\n".join(lines) + "\n"
+    described = {
+        "schema": STUDY_SCHEMA,
+        "title": design.title,
+        "reference": design.conditions[0].name,
+        "other": design.conditions[-1].name,
+        "sessions": "sessions.csv",
+        "ratings": "ratings.csv",
+        "conditions": {one.name: _stimulation(one) for one in design.conditions},
+        "simulated": {
+            one.name: {name: float(f"{x:.6g}") for name, x in _medians(design, one).items()}
+            for one in design.conditions
+        },
+        "rating": {"scale": design.rating_scale, "step": design.rating_step},
+    }
+    return "\n".join([*comments, "", toml_text(described)])
 
 
 def _medians(design: StudyDesign, condition: ConditionDesign) -> dict[str, float]:
@@ -165,12 +165,7 @@ def _assumed(design: StudyDesign) -> list[tuple[str, object]]:
     ]
 
 
-def _stimulation(condition: ConditionDesign) -> list[str]:
-    lines = [f'title = "{condition.title}"']
-    for name in ("frequency_hz", "amplitude_ma", "pulse_width_us", "wash_in_min"):
-        value = getattr(condition, name)
-        if value is not None:
-            lines.append(f"{name} = {value}")
-    if condition.electrodes:
-        lines.append(f'electrodes = "{condition.electrodes}"')
-    return lines
+def _stimulation(condition: ConditionDesign) -> dict[str, object]:
+    names = ("title", "frequency_hz", "amplitude_ma", "pulse_width_us", "wash_in_min")
+    found = {name: getattr(condition, name) for name in names}
+    return {**found, "electrodes": condition.electrodes or None}

@@ -57,6 +57,21 @@ def test_every_letter_is_shown_and_no_number_is_split(rows) -> None:
     assert all(len(line) <= 80 for line in lines)
 
 
+def test_words_stay_whole_where_there_is_room_for_them() -> None:
+    row = (
+        "study/sessions/2026-01-01T10-00-00",
+        "torque and velocity do not agree",
+        "4.5571±0.0077",
+    )
+    lines = text_lines([Table(("file", "what it says", "J"), [row], "<<>")])
+    assert lines[1:] == [
+        "  study/sessions/2026-01-01T10-00-00  torque and velocity do not   4.5571±0.0077",
+        "                                      agree",
+    ]
+    table = Table(("", "n", ""), [("present", "1" * 50, "misses the band")], "<><", indent=0)
+    assert text_lines([table], 60)[1:] == [f"present  {'1' * 50}  misses", f"{'the band':>69}"]
+
+
 def test_a_table_whose_numbers_need_more_room_is_wider_than_the_terminal() -> None:
     table = Table(("",) * 3, [("a long name of something", "1" * 30, "2" * 30)], "<>>", indent=0)
     (first, *_) = text_lines([table], 40)[1:]

@@ -17,10 +17,12 @@ from rigidimeter.core.files import (
     json_line,
     json_text,
     noted_digests,
+    parse_toml,
     read_bytes,
     read_json,
     read_toml,
     replace_file,
+    toml_text,
     write_json,
     write_text,
 )
@@ -69,6 +71,12 @@ def test_an_older_file_survives_a_failed_write(tmp_path, monkeypatch):
 def test_a_folder_is_not_written_over(tmp_path):
     with pytest.raises(UserError, match="cannot be written"):
         write_text(tmp_path, "x")
+
+
+@given(st.dictionaries(st.text(), st.text() | st.floats(allow_nan=False), max_size=3))
+def test_any_name_and_text_is_read_back_from_toml(values):
+    written = toml_text({"a": values, "none": None})
+    assert parse_toml(written.encode(), "x.toml") == {"a": values}
 
 
 def test_what_cannot_be_read_is_a_sentence(tmp_path):

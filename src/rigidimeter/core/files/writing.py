@@ -7,18 +7,16 @@ import io
 import json
 import math
 import os
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
+import tomli_w
 
 from rigidimeter.core.errors import refused
 from rigidimeter.core.files.escaping import as_written
-
-_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def write_text(path: Path, text: str) -> None:
@@ -68,34 +66,23 @@ def json_line(event: Mapping[str, Any]) -> bytes:
 
 
 def toml_text(values: Mapping[str, Any]) -> str:
-    """Return nested plain values as TOML, one line for each value; None is left out.
+    """Return nested plain values as TOML; None is left out.
 
     Examples
     --------
-    >>> print(toml_text({"seed": 1, "prbs": {"clock_hz": 20.0}, "protocol": {"rests_s": [1.0]}}))
+    >>> print(toml_text({"seed": 1, "prbs": {"clock_hz": 20.0}, "task": None}), end="")
     seed = 1
-    prbs.clock_hz = 20.0
-    protocol.rests_s = [1.0]
+    <BLANKLINE>
+    [prbs]
+    clock_hz = 20.0
     """
-    return "\n".join(_toml_lines(values, ""))
+    return tomli_w.dumps(_without_none(values))
 
 
-def _toml_lines(values: Mapping[str, Any], before: str) -> Iterator[str]:
-    for key, value in values.items():
-        name = f"{before}{key if _BARE_KEY.fullmatch(key) else json.dumps(key)}"
-        if isinstance(value, Mapping) and value:
-            yield from _toml_lines(value, f"{name}.")
-        elif value is not None:
-            yield f"{name} = {_toml_value(value)}"
-
-
-def _toml_value(value: Any) -> str:
+def _without_none(value: Any) -> Any:
     if isinstance(value, Mapping):
-        inner = (f"{json.dumps(k)} = {_toml_value(v)}" for k, v in value.items() if v is not None)
-        return "{" + ", ".join(inner) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_toml_value, value)) + "]"
-    return json.dumps(value, allow_nan=False)
+        return {key: _without_none(each) for key, each in value.items() if each is not None}
+    return [_without_none(each) for each in value] if isinstance(value, list | tuple) else value
 
 
 def plain_values(value: Any) -> Any:

@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rigidimeter.core.errors import UserError, refused
-from rigidimeter.core.files import DOCUMENT_BYTES, read_bytes, write_text
+from rigidimeter.core.files import DOCUMENT_BYTES, read_bytes, toml_text, write_text
 from rigidimeter.core.session import EVENTS, is_session, read_events, read_manifest
 from rigidimeter.core.settings import validated
 from rigidimeter.core.study_files.folder import is_study
@@ -33,7 +33,6 @@ from rigidimeter.core.study_files.study_toml import (
     pair_of,
     read_study_toml,
     study_text,
-    toml_key,
 )
 from rigidimeter.core.study_files.tables import (
     add_rows,
@@ -175,7 +174,8 @@ def _added(
         if new:
             refused.append(
                 f"{path}: is not in the study, for {study / STUDY_FILE} lacks its condition "
-                f"{new[0]}: write [conditions.{toml_key(new[0])}] there and add the session again"
+                f"{new[0]}: write {toml_text({'conditions': {new[0]: {}}}).strip()} there and "
+                "add the session again"
             )
             return []
     said = _described(study, session, recorded, names)

@@ -9,7 +9,6 @@ it is theirs, and nothing is written into it any more.
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,7 +16,14 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from rigidimeter.core.files import FIELD, ZEROS, checksum_holds, text_bytes, with_checksum
+from rigidimeter.core.files import (
+    FIELD,
+    ZEROS,
+    checksum_holds,
+    text_bytes,
+    toml_text,
+    with_checksum,
+)
 from rigidimeter.core.settings import Section, read_section
 
 STUDY_FILE = "study.toml"
@@ -26,14 +32,8 @@ STUDY_SCHEMA = "rigidimeter.study/1"
 OFF, DBS = "OFF", "DBS"
 _TITLES = {OFF: "stimulation off", DBS: "stimulation on"}
 
-_HEAD = """\
-schema = "{schema}"
-title = {title}
-
-# Differences are reference - other.
-reference = {reference}
-other = {other}
-
+_REFERENCE = "# Differences are reference - other.\n"
+_TABLES = """\
 # The tables, below this folder. Only that of the sessions must exist.
 sessions = "sessions.csv"       # path,subject,day,condition,part,note
 ratings = "ratings.csv"         # subject,day,condition,examiner,score
@@ -106,10 +106,7 @@ class ConditionTable(Section):
 class RatingTable(Section):
     """``[rating]``: lowest and highest score, and the step of the scale (0 for none)."""
 
-    scale: list[float] = Field(
-        default_factory=lambda: [0.0, 3.0], min_length=2, max_length=2,
-        json_schema_extra={"meaning": "two numbers, the lowest and the highest score"},
-    )  # fmt: skip
+    scale: list[float] = Field(default_factory=lambda: [0.0, 3.0], min_length=2, max_length=2)
     step: float = Field(0.5, ge=0.0, le=100.0, json_schema_extra={"unit": "1"})
 
     @model_validator(mode="after")
@@ -233,13 +230,10 @@ def study_text(
     conditions : mapping of str to ConditionTable
         What is known of the stimulation in each; reference and other at least.
     """
-    head = _HEAD.format(
-        schema=STUDY_SCHEMA,
-        title=_quoted(title),
-        reference=_quoted(reference),
-        other=_quoted(other),
-    )
-    return "\n".join([head, *(_condition(*one, reference) for one in conditions.items()), _TAIL])
+    about = toml_text({"schema": STUDY_SCHEMA, "title": title})
+    pair = _REFERENCE + toml_text({"reference": reference, "other": other})
+    described = (_condition(*one, reference) for one in conditions.items())
+    return "\n".join([about, pair, _TABLES, *described, _TAIL])
 
 
 def own_text(text: str) -> str:
@@ -269,18 +263,6 @@ def pair_of(recorded: list[str], known: list[str]) -> tuple[str, str]:
 
 def _condition(name: str, table: ConditionTable, reference: str) -> str:
     given = table.model_dump(exclude_unset=True, exclude={"title"})
-    lines = [f"[conditions.{toml_key(name)}]"]
-    lines.append(f"title = {_quoted(table.title or _TITLES.get(name, ''))}")
-    lines += [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in given.items()
-              if value is not None]  # fmt: skip
-    ending = _NOT_WRITTEN if not given and name != reference else ""
-    return "\n".join(lines) + "\n" + ending
-
-
-def toml_key(name: str) -> str:
-    """Return a name as a key of TOML, quoted where it must be."""
-    return name if name.isidentifier() and name.isascii() else _quoted(name)
-
-
-def _quoted(value: str) -> str:
-    return json.dumps(value, ensure_ascii=False)
+    title = table.title or _TITLES.get(name, "")
+    written = toml_text({"conditions": {name: {"title": title, **given}}})
+    return written + (_NOT_WRITTEN if not given and name != reference else "")

@@ -5,7 +5,6 @@ It says what the options of the command line say; an option comes before it.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -17,6 +16,7 @@ from rigidimeter.analysis.reading.channels.choice import LABELS
 from rigidimeter.analysis.reading.channels.quantities import QUANTITIES
 from rigidimeter.analysis.reading.formats.read_options import ReadOptions
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import toml_text
 from rigidimeter.core.settings import Section, read_section
 
 MAPPING_SCHEMA = "rigidimeter.mapping/1"
@@ -87,24 +87,18 @@ def read_mapping(path: Path) -> ReadOptions:
 
 def mapping_text(options: ReadOptions) -> str:
     """Return a mapping file that says the same as options."""
-    lines = [f'schema = "{MAPPING_SCHEMA}"']
-    for name, value in (
-        ("rate_hz", options.rate_hz),
-        ("reaction", options.reaction or None),
-        ("epoch_length_s", options.epoch_length_s),
-        ("task", options.task),
-        ("skip_rows", options.skip_rows or None),
-        ("names", list(options.names) or None),
-        ("table", options.table or None),
-    ):
-        if value is not None:
-            lines.append(f"{name} = {_toml(value)}")
     said = options.said
-    lines += [
-        f"{label}_column = {_toml(said.columns[label])}"
-        for label in LABELS
-        if label in said.columns
-    ]
+    written: dict[str, Any] = {
+        "schema": MAPPING_SCHEMA,
+        "rate_hz": options.rate_hz,
+        "reaction": options.reaction or None,
+        "epoch_length_s": options.epoch_length_s,
+        "task": options.task,
+        "skip_rows": options.skip_rows or None,
+        "names": options.names or None,
+        "table": options.table or None,
+        **{f"{label}_column": said.columns.get(label) for label in LABELS},
+    }
     for one in QUANTITIES:
         unit = said.units.get(one.standard)
         if unit is None and one.standard in said.asserted:
@@ -116,9 +110,8 @@ def mapping_text(options: ReadOptions) -> str:
             "offset": said.offsets.get(one.standard),
         }
         if any(given.values()):
-            lines += ["", f"[{one.name}]"]
-            lines += [f"{key} = {_toml(text)}" for key, text in given.items() if text]
-    return "\n".join(lines) + "\n"
+            written[one.name] = {key: text for key, text in given.items() if text}
+    return toml_text(written)
 
 
 def merged(mapping: ReadOptions, given: ReadOptions) -> ReadOptions:
@@ -132,9 +125,3 @@ def merged(mapping: ReadOptions, given: ReadOptions) -> ReadOptions:
         elif ours == getattr(default, one.name):
             changed[one.name] = theirs
     return replace(given, **changed)
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    return json.dumps(value, ensure_ascii=False)

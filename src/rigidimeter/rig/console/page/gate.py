@@ -57,7 +57,9 @@ def is_loopback(host: str) -> bool:
 def host_allowed(header: str, names: Iterable[str]) -> bool:
     """Whether a Host header names this computer: by an address, or one of `names`.
 
-    A name of a stranger that was made to point here is none of them.
+    A name of a stranger that was made to point here is none of them. Starlette's
+    `TrustedHostMiddleware` knows listed names alone, and which addresses this computer has, behind
+    a forwarded port too, cannot be listed.
 
     Examples
     --------

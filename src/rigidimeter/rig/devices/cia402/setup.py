@@ -55,11 +55,7 @@ class Cia402Settings(Section):
     guard relies on a drive that brakes at least that fast; commissioning compares the two.
     """
 
-    interface: str = Field(
-        "socketcan",
-        min_length=1,
-        json_schema_extra={"meaning": 'the name of a python-can interface, such as "socketcan"'},
-    )
+    interface: str = Field("socketcan", min_length=1)
     channel: str | int = "can0"
     bitrate: int = quantity(1_000_000, "bit/s", 10_000, 1_000_000)
     port: int = quantity(43113, "1", 1, 65535)

@@ -105,7 +105,7 @@ def test_a_mapping_says_what_the_options_said(tmp_path):
         ('schema = "rigidimeter.mapping/9"', "schema is 'rigidimeter.mapping/9'"),
         ('schema = "rigidimeter.mapping/1"\n[torqe]\ncolumn = "a"', "the nearest is torque"),
         ('schema = "rigidimeter.mapping/1"\n[torque]\nunits = "a"', "the nearest is torque.unit"),
-        ('schema = "rigidimeter.mapping/1"\nrate_hz = 0.0', "greater than 0 Hz"),
+        ('schema = "rigidimeter.mapping/1"\nrate_hz = 0.0', "greater than 0, in Hz"),
         ('schema = "rigidimeter.mapping/1"\nrate_hz = 1e300', "must be from 0.001 to 1e"),
     ],
 )
