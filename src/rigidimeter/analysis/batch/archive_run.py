@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
@@ -50,7 +51,7 @@ class BatchResult:
     failed : tuple of str
         Why inputs, or parts of them, gave nothing: one sentence each.
     lost_workers : tuple of str
-        Addresses of workers that left the cluster before the end.
+        What ended before the work did: addresses in a cluster, or a process of this machine.
     """
 
     path: Path
@@ -136,10 +137,13 @@ def batch(
         lost: list[str] = []
         for _ in range(2):  # again for a copy of an input that failed under another name
             run = partial(_answered, how=how, folder=Path.cwd() if scheduler else None)
-            for task, rows in each(run, work.left(), jobs=jobs, scheduler=scheduler,
-                                   on_death=_dead, on_lost=lost.extend):  # fmt: skip
-                work.done(task, rows)
-                progress(work.share)
+            with closing(
+                each(run, work.left(), jobs=jobs, scheduler=scheduler,
+                     on_death=_dead, on_lost=lost.extend)
+            ) as answered:  # fmt: skip
+                for task, rows in answered:
+                    work.done(task, rows)
+                    progress(work.share)
         try:
             write_table(place, work.rows())
         except UserError as error:
