@@ -16,11 +16,12 @@ from rigidimeter.analysis.batch.archive_inputs import (
     Input,
     content_bytes,
     content_digest,
+    digest_or_nothing,
     inputs_of,
 )
-from rigidimeter.analysis.batch.epoch_rows import How, Row, answer, refusal
+from rigidimeter.analysis.batch.epoch_rows import How, answer, refusal
 from rigidimeter.analysis.batch.epoch_table import ENDINGS, columns, read_table, write_table
-from rigidimeter.analysis.batch.parts import Parts
+from rigidimeter.analysis.batch.parts import Parts, Row
 from rigidimeter.analysis.estimation import method_names, no_such_method
 from rigidimeter.analysis.reading.recording import read_options
 from rigidimeter.core.errors import UserError
@@ -257,7 +258,7 @@ class _Work:
         for number, one in enumerate(self._listed):
             if self._again and (number in self._failed or self._key(number) in self._parts):
                 continue
-            digest = "" if one.refused else _digest_or_nothing(one.path)
+            digest = "" if one.refused else digest_or_nothing(one.path)
             self._digests[number] = digest, self._how.digest(one)
             key = self._key(number)
             if digest and (key in begun or key in self._parts) and not self._again:
@@ -296,11 +297,3 @@ class _Work:
                 else:
                     self.reasons.append(row["reason"])
                 yield row | about
-
-
-def _digest_or_nothing(path: Path) -> str:
-    """Return the digest of an input; nothing where it cannot be read, which reading explains."""
-    try:
-        return content_digest(path)
-    except (UserError, OSError):
-        return ""
