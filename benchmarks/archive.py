@@ -78,7 +78,6 @@ def measured(folder: Path, files: int, jobs: int) -> Measured:
                 rm.estimate(rm.read(path))
         elapsed_s = time.perf_counter() - start_s
         used_s = time.process_time() - used_s
-    end_workers()
     own, workers = map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return {
         "epochs": files * EPOCHS_A_FILE,
@@ -90,13 +89,6 @@ def measured(folder: Path, files: int, jobs: int) -> Measured:
         "told_s": told[0][1] if told else 0.0,
         "left_s": elapsed_s - told[0][0] if told else 0.0,
     }
-
-
-def end_workers() -> None:
-    """End the processes that joblib keeps for another call, so that they can be counted."""
-    from joblib.externals.loky import get_reusable_executor
-
-    get_reusable_executor().shutdown(wait=True)
 
 
 def apart(folder: Path, files: int, jobs: int) -> Measured:

@@ -77,8 +77,8 @@ def batch(
         echo(f"error: {len(done.failed) - _SHOWN} more, each a row of {out}", err=True)
     if done.lost_workers:
         echo(
-            f"warning: left the cluster before the end: {', '.join(done.lost_workers)}; others "
-            "have estimated what was begun there",
+            f"warning: ended before the work did: {', '.join(done.lost_workers)}; others have "
+            "estimated what was begun there",
             err=True,
         )
     before = f", {done.before} of them estimated before" if done.before else ""

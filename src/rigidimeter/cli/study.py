@@ -204,8 +204,14 @@ def _simulated(out: Path, design: StudyDesign, seed: int, processes: int = 2) ->
     from rigidimeter.cli.progress import Meter
     from rigidimeter.virtual import plan_study, study_length_s, write_virtual_study
 
+    lost: list[str] = []
     with Meter("simulate", study_length_s(plan_study(design, seed))) as meter:
-        return write_virtual_study(out, design, seed, processes=processes, progress=meter.reach)
+        plans = write_virtual_study(
+            out, design, seed, processes=processes, progress=meter.reach, on_lost=lost.extend
+        )
+    for name in lost:
+        echo(f"warning: ended before the work did: {name}; others have run its sessions", err=True)
+    return plans
 
 
 def _move_aside(out: Path) -> None:

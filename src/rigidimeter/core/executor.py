@@ -1,27 +1,32 @@
 """Many pieces of work: in this process, in processes of this machine, or on a Dask cluster.
 
-joblib and Dask do the scheduling. Whatever must go through many independent pieces comes here.
+Both are an executor of concurrent.futures, so the same loop gives out the work of either. Whatever
+must go through many independent pieces comes here.
 """
 
 from __future__ import annotations
 
+import os
 import signal
-import threading
-import warnings
+import sys
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import BrokenExecutor
-from contextlib import ExitStack, contextmanager
-from functools import partial
-from typing import Any, TypeVar
+from contextlib import contextmanager
+from itertools import islice
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rigidimeter.core.errors import UserError
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future, ProcessPoolExecutor
+    from multiprocessing.process import BaseProcess
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 _CONNECT_S = 10.0
 _AHEAD = 2
-"""Items that wait for each process, so that none waits for its next."""
+"""Items that each process has or waits for, so that none waits for its next."""
 
 
 def each(
@@ -37,7 +42,8 @@ def each(
     """Yield every item with its result, as they are done.
 
     Items are taken as they are needed, so an iterator of many takes no memory. With processes both
-    they and the results must pickle, and a worker must be able to import the function.
+    they and the results must pickle, and a worker must be able to import the function, so it may
+    not be one of a script. Closing the generator ends the processes.
 
     Parameters
     ----------
@@ -53,8 +59,8 @@ def each(
         Gives the result of an item that ended its process twice, such as one that needs more memory
         than there is. Without it that raises.
     on_lost : callable
-        Called at the end with the addresses of the workers that were in the cluster at the
-        beginning and have left it. Others have done what they had begun.
+        Called at the end with the workers that ended or left before: their addresses in a cluster,
+        or a name for processes of this machine. Others have done what they had begun.
 
     Raises
     ------
@@ -65,115 +71,115 @@ def each(
         for item in items:
             yield item, function(item)
         return
-    with ExitStack() as stack:
-        new_call, deaths = _workers(jobs, scheduler, in_order, stack, on_lost)
-        waiting = _Given(items)
-        ended = False
-        while not ended:
-            try:
-                with _ended(new_call()(_tasks(function, waiting))) as done:
-                    for number, result in done:
-                        yield waiting.given.pop(number), result
-                ended = True
-            except deaths:
-                if on_death is None:
-                    raise
-            # One of those that were begun ended its process: which, shows when each runs alone.
-            # Threads of the call that ended may still take items, which are here the next time.
-            for number in list(waiting.given):
-                item = waiting.given[number]
+    from concurrent.futures import FIRST_COMPLETED, wait
+
+    left = enumerate(items)
+    begun: dict[Future[Result], tuple[int, Item]] = {}
+    suspects: dict[int, Item] = {}
+    done: dict[int, tuple[Item, Result]] = {}
+    yielded, died = 0, False
+    with _cluster(scheduler) if scheduler else _machine(jobs) as (submit, size, death, gone):
+        while True:
+            if not suspects:
+                new = [*islice(left, _AHEAD * size - len(begun))]
+            else:
+                # One of those that were begun ended its process: which, shows when each runs alone.
+                new = [] if begun else [*suspects.items()][:1]
+            begun |= {submit(function, item): (number, item) for number, item in new}
+            if not begun:
+                break
+            for future in wait(begun, return_when=FIRST_COMPLETED).done:
+                number, item = begun.pop(future)
                 try:
-                    ((_, result),) = new_call()(_tasks(function, [(number, item)]))
-                except deaths:
-                    assert on_death is not None  # else nothing is left after a process ended
+                    result = future.result()
+                except death:
+                    died = True
+                    if number not in suspects:
+                        suspects[number] = item
+                        continue
+                    if on_death is None:
+                        raise
                     result = on_death(item)
-                del waiting.given[number]
-                yield item, result
+                suspects.pop(number, None)
+                done[number if in_order else yielded] = item, result
+                while yielded in done:
+                    yield done.pop(yielded)
+                    yielded += 1
+        if names := gone() or ["a process of this machine"] * died:
+            on_lost(names)
+
+
+_Workers = tuple[Callable[..., "Future[Any]"], int, type[Exception], Callable[[], list[str]]]
+"""What begins a piece, how many run at a time, what a piece raises whose process ended, and the
+addresses of workers that have left."""
 
 
 @contextmanager
-def _ended(results: Generator[Any, None, None]) -> Iterator[Generator[Any, None, None]]:
-    """End what still runs when the results are not wanted any more."""
+def _machine(jobs: int) -> Iterator[_Workers]:
+    from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    def new_pool() -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(jobs, get_context("spawn"), _begin)
+
+    pool = new_pool()
+
+    def submit(function: Callable[[Item], Result], item: Item) -> Future[Result]:
+        nonlocal pool
+        with _script_hidden():
+            try:
+                return pool.submit(function, item)
+            except BrokenExecutor:
+                broken, pool = pool, new_pool()
+                _end(broken)
+                return pool.submit(function, item)
+
     try:
-        yield results
+        yield submit, jobs, BrokenExecutor, list
     finally:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # joblib warns that it does
-            results.close()
+        _end(pool)
 
 
-def _tasks(function: Callable[[Item], Any], numbered: Iterable[tuple[int, Item]]) -> Iterator[Any]:
-    from joblib import delayed
-
-    # In a tuple: joblib would send a large item to one worker of a cluster, to be lost with it.
-    return (delayed(_run)(function, (number, item)) for number, item in numbered)
-
-
-def _run(function: Callable[[Item], Result], numbered: tuple[int, Item]) -> tuple[int, Result]:
-    if threading.current_thread() is threading.main_thread():
-        # An interrupt from the keyboard goes to all processes; the first ends the others.
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-    number, item = numbered
-    return number, function(item)
+@contextmanager
+def _script_hidden() -> Iterator[None]:
+    """Start processes that do not run the user's script again, which would start processes too."""
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
 
 
-class _Given(Iterator[tuple[int, Item]]):
-    """Items with their numbers; those that were given out, until they are taken from `given`.
+def _begin() -> None:
+    """Prepare a process before it imports NumPy."""
+    from multiprocessing import parent_process
+    from threading import Thread
 
-    joblib takes items in threads of its own, one at a time except after a process ended.
-    """
-
-    def __init__(self, items: Iterable[Item]) -> None:
-        self.given: dict[int, Item] = {}
-        self._items = enumerate(items)
-        self._lock = threading.Lock()
-
-    def __next__(self) -> tuple[int, Item]:
-        with self._lock:
-            number, item = next(self._items)
-            self.given[number] = item
-            return number, item
+    # An interrupt from the keyboard goes to all processes; the first ends the others.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM"):
+        os.environ[f"{library}_NUM_THREADS"] = "1"
+    Thread(target=_end_with, args=(parent_process(),), daemon=True).start()
 
 
-def _workers(
-    jobs: int,
-    scheduler: str,
-    in_order: bool,
-    stack: ExitStack,
-    on_lost: Callable[[list[str]], None],
-) -> tuple[Callable[[], Any], tuple[type[BaseException], ...]]:
-    """Return what makes a call that runs tasks, and the exceptions that say that a process ended.
-
-    Each call is used once: after a process ended, results of its tasks can still come in.
-    """
-    from joblib import Parallel, parallel_config
-
-    deaths: tuple[type[BaseException], ...] = (BrokenExecutor,)
-    if scheduler:
-        client, killed = _client(scheduler, stack)
-        begun_with = list(client.scheduler_info(n_workers=-1)["workers"])
-        stack.callback(_lost, client, begun_with, on_lost)
-        deaths = (killed,)
-        stack.enter_context(parallel_config(backend="dask", client=client))
-    else:
-        stack.enter_context(parallel_config(backend="loky", inner_max_num_threads=1))
-    new_call = partial(
-        Parallel,
-        n_jobs=-1 if scheduler else jobs,
-        return_as="generator" if in_order else "generator_unordered",
-        batch_size=1,
-        pre_dispatch=f"{_AHEAD} * n_jobs",
-    )
-    return new_call, deaths
+def _end_with(parent: BaseProcess) -> None:
+    """End this process when the first was killed: nothing else would tell it."""
+    parent.join()
+    os._exit(1)
 
 
-def _lost(client: Any, before: list[str], on_lost: Callable[[list[str]], None]) -> None:
-    now = client.scheduler_info(n_workers=-1)["workers"]
-    if gone := [address for address in before if address not in now]:
-        on_lost(gone)
+def _end(pool: ProcessPoolExecutor) -> None:
+    """End what still runs too, whose results nobody wants (from Python 3.14 on: kill_workers)."""
+    for process in [*pool._processes.values()]:
+        process.kill()
+    pool.shutdown()
 
 
-def _client(scheduler: str, stack: ExitStack) -> tuple[Any, type[BaseException]]:
+@contextmanager
+def _cluster(scheduler: str) -> Iterator[_Workers]:
+    from concurrent.futures import CancelledError
+
     try:
         from distributed import Client, KilledWorker
     except ImportError:
@@ -182,14 +188,28 @@ def _client(scheduler: str, stack: ExitStack) -> tuple[Any, type[BaseException]]
         ) from None
     connect: Callable[..., Any] = Client
     try:
-        client = stack.enter_context(connect(scheduler, timeout=_CONNECT_S, set_as_default=False))
+        client = connect(scheduler, timeout=_CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
         raise UserError(
             f"--scheduler {scheduler}: cannot be reached ({error}); give the address that "
             "`dask scheduler` printed, such as tcp://host:8786"
         ) from None
-    if not client.scheduler_info()["workers"]:
-        raise UserError(
-            f"--scheduler {scheduler}: has no worker; start one with `dask worker {scheduler}`"
-        )
-    return client, KilledWorker
+
+    with client:
+        before = client.ncores()
+        if not before:
+            raise UserError(
+                f"--scheduler {scheduler}: has no worker; start one with `dask worker {scheduler}`"
+            )
+        executor = client.get_executor(pure=False)  # else an equal piece would not be tried again
+        try:
+            yield (
+                executor.submit,
+                sum(before.values()),
+                KilledWorker,
+                lambda: sorted(before.keys() - client.ncores().keys()),
+            )
+        except CancelledError:
+            raise UserError(f"--scheduler {scheduler}: was lost before the end") from None
+        finally:
+            executor.shutdown(wait=False)

@@ -38,6 +38,7 @@ def write_virtual_study(
     *,
     processes: int = 2,
     progress: Callable[[float], None] = lambda _: None,
+    on_lost: Callable[[list[str]], None] = lambda _: None,
 ) -> list[DayPlan]:
     """Run every session of a virtual study and write its folder; return what was planned.
 
@@ -52,6 +53,8 @@ def write_virtual_study(
         Sessions that run at a time, each in a process of its own; with 1, in this one.
     progress : callable
         Takes how much of `study_length_s` is done, in s.
+    on_lost : callable
+        Takes what ended before its sessions did, which others have run again.
 
     Raises
     ------
@@ -69,7 +72,7 @@ def write_virtual_study(
     run = partial(_run, folder=folder)
     try:
         with closing(
-            each(run, plans, jobs=processes)
+            each(run, plans, jobs=processes, on_death=_dead, on_lost=on_lost)
         ) as done:  # what runs ends before it is removed
             for plan, _ in done:
                 done_s += session_length_s(plan.settings)
@@ -86,7 +89,15 @@ def write_virtual_study(
     return plans
 
 
+def _dead(plan: DayPlan) -> None:
+    raise UserError(
+        f"{plan.folder}: the process that ran this session ended twice, such as for want of "
+        "memory; use fewer processes"
+    )
+
+
 def _run(plan: DayPlan, folder: Path) -> None:
+    shutil.rmtree(folder / plan.folder, ignore_errors=True)  # of a process that ended
     result = run_virtual_session(plan.settings, folder / plan.folder, created_utc=plan.created_utc)
     if result.outcome == "abort":  # a session closes in order when it is interrupted
         raise KeyboardInterrupt

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import multiprocessing
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -38,8 +39,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_two_processes_write_the_same_bytes(folder: Path, tmp_path: Path) -> None:
+    """Though one of them is killed in the middle."""
     seen: list[float] = []
-    write_virtual_study(tmp_path / "study", tiny(), 3, processes=2, progress=seen.append)
+
+    def progress(time_s: float) -> None:
+        if not seen:
+            multiprocessing.active_children()[0].kill()
+        seen.append(time_s)
+
+    write_virtual_study(tmp_path / "study", tiny(), 3, processes=2, progress=progress)
     one, two = bytes_of(folder), bytes_of(tmp_path / "study")
     assert one == two
     assert len(one) == 4 * 3 + 3

@@ -74,6 +74,14 @@ def content_digest(path: Path) -> str:
     return digest.hexdigest()
 
 
+def digest_or_nothing(path: Path) -> str:
+    """Return the digest of a content; nothing where it cannot be read, which reading explains."""
+    try:
+        return content_digest(path)
+    except (UserError, OSError):
+        return ""
+
+
 def content_bytes(path: Path) -> int:
     """Return how much there is to read; 0 of what cannot be looked at."""
     try:

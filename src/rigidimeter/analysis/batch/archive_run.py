@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
@@ -15,11 +16,12 @@ from rigidimeter.analysis.batch.archive_inputs import (
     Input,
     content_bytes,
     content_digest,
+    digest_or_nothing,
     inputs_of,
 )
-from rigidimeter.analysis.batch.epoch_rows import How, Row, answer, refusal
+from rigidimeter.analysis.batch.epoch_rows import How, answer, refusal
 from rigidimeter.analysis.batch.epoch_table import ENDINGS, columns, read_table, write_table
-from rigidimeter.analysis.batch.parts import Parts
+from rigidimeter.analysis.batch.parts import Parts, Row
 from rigidimeter.analysis.estimation import method_names, no_such_method
 from rigidimeter.analysis.reading.recording import read_options
 from rigidimeter.core.errors import UserError
@@ -50,7 +52,7 @@ class BatchResult:
     failed : tuple of str
         Why inputs, or parts of them, gave nothing: one sentence each.
     lost_workers : tuple of str
-        Addresses of workers that left the cluster before the end.
+        What ended before the work did: addresses in a cluster, or a process of this machine.
     """
 
     path: Path
@@ -136,10 +138,13 @@ def batch(
         lost: list[str] = []
         for _ in range(2):  # again for a copy of an input that failed under another name
             run = partial(_answered, how=how, folder=Path.cwd() if scheduler else None)
-            for task, rows in each(run, work.left(), jobs=jobs, scheduler=scheduler,
-                                   on_death=_dead, on_lost=lost.extend):  # fmt: skip
-                work.done(task, rows)
-                progress(work.share)
+            with closing(
+                each(run, work.left(), jobs=jobs, scheduler=scheduler,
+                     on_death=_dead, on_lost=lost.extend)
+            ) as answered:  # fmt: skip
+                for task, rows in answered:
+                    work.done(task, rows)
+                    progress(work.share)
         try:
             write_table(place, work.rows())
         except UserError as error:
@@ -253,7 +258,7 @@ class _Work:
         for number, one in enumerate(self._listed):
             if self._again and (number in self._failed or self._key(number) in self._parts):
                 continue
-            digest = "" if one.refused else _digest_or_nothing(one.path)
+            digest = "" if one.refused else digest_or_nothing(one.path)
             self._digests[number] = digest, self._how.digest(one)
             key = self._key(number)
             if digest and (key in begun or key in self._parts) and not self._again:
@@ -292,11 +297,3 @@ class _Work:
                 else:
                     self.reasons.append(row["reason"])
                 yield row | about
-
-
-def _digest_or_nothing(path: Path) -> str:
-    """Return the digest of an input; nothing where it cannot be read, which reading explains."""
-    try:
-        return content_digest(path)
-    except (UserError, OSError):
-        return ""

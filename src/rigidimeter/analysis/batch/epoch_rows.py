@@ -13,7 +13,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.analysis.batch.archive_inputs import Input, content_digest
+from rigidimeter.analysis.batch.archive_inputs import Input, content_digest, digest_or_nothing
+from rigidimeter.analysis.batch.parts import Row
 from rigidimeter.analysis.reading.formats import ReadOptions
 from rigidimeter.analysis.reading.recording import read_as
 from rigidimeter.analysis.study import analysis_warnings, estimate
@@ -25,8 +26,6 @@ from rigidimeter.core.files import plain_values
 from rigidimeter.core.records import Analysis, Epoch, Notice
 from rigidimeter.core.settings import Settings, changed_settings, dump_settings
 from rigidimeter.core.version import __version__
-
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -65,25 +64,16 @@ class How:
         }
         if one.study is not None:
             folder = one.study.folder
+            mapping = folder.sessions[0]["mapping"] or folder.about.mapping
             rows = [row.cells for row in (*folder.sessions, *folder.exclusions)]
             said["study"] = {
                 "rows": rows,
                 "names": asdict(one.study.names),
                 "about": folder.about.model_dump(mode="json"),
-                "mappings": [_mapping_digest(one)],
+                "mappings": [digest_or_nothing(folder.folder / mapping) if mapping else ""],
             }
         text = json.dumps(plain_values(said), sort_keys=True, ensure_ascii=False)
         return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _mapping_digest(one: Input) -> str:
-    assert one.study is not None
-    folder = one.study.folder
-    named = folder.sessions[0]["mapping"] or folder.about.mapping
-    try:
-        return content_digest(folder.folder / named) if named else ""
-    except (UserError, OSError):
-        return ""  # reading says what is wrong
 
 
 def refusal(reason: str) -> list[Row]:

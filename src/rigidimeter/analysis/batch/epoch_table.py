@@ -9,13 +9,11 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
+from rigidimeter.analysis.batch.parts import Row
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import as_read, csv_text, in_place
 from rigidimeter.core.records import Analysis, Fit, Outcome, Score
-
-Row = dict[str, Any]
 
 ENDINGS = (".parquet", ".csv")
 BATCH_SCHEMA = "rigidimeter.batch/1"

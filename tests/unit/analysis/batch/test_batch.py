@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import errno
 import math
+import multiprocessing
 import shutil
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import numpy as np
@@ -39,8 +41,16 @@ def test_rows_are_what_estimate_gives(archive: Path, tmp_path: Path) -> None:
 
 
 def test_two_processes_write_the_same_bytes(archive: Path, tmp_path: Path) -> None:
+    """Though one of them is killed in the middle."""
+    killed: list[BaseProcess] = []
+
+    def progress(share: float) -> None:
+        if not killed:
+            killed.append(multiprocessing.active_children()[0])
+            killed[0].kill()
+
     one = rm.batch(archive, tmp_path / "one.parquet")
-    two = rm.batch(archive, tmp_path / "two.parquet", jobs=2)
+    two = rm.batch(archive, tmp_path / "two.parquet", jobs=2, progress=progress)
     assert two.path.read_bytes() == one.path.read_bytes()
 
 

@@ -102,7 +102,7 @@ def taken(request, monkeypatch) -> None:
     """Take inputs one by one, or all before the first is done, as many processes do."""
 
     def at_once(function, items, **_):
-        return [(item, function(item)) for item in [*items]]
+        yield from [(item, function(item)) for item in [*items]]
 
     if request.param == "at once":
         monkeypatch.setattr(run, "each", at_once)
