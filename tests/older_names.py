@@ -12,8 +12,8 @@ from rigidimeter.core.settings import RENAMED
 def older(settings: dict[str, Any]) -> dict[str, Any]:
     """Return nested settings under the names that they had."""
     before = dict(settings)
-    for table, names in RENAMED.items():
-        old = {new: old for old, new in names.items()}
+    for table in RENAMED.keys() & settings.keys():
+        old = {new: old for old, new in RENAMED[table].items()}
         before[table] = {old.get(key, key): value for key, value in settings[table].items()}
     return before
 

@@ -8,6 +8,7 @@ from typing import Any
 from rigidimeter.core.errors import UserError
 
 RENAMED: Mapping[str, Mapping[str, str]] = {
+    "guard": {"least_inertia_kg_m2": "min_inertia_kg_m2"},
     "estimation": {
         "shortest_epoch_s": "min_epoch_s",
         "longest_delay_s": "max_delay_s",

@@ -31,7 +31,7 @@ LIMITS = ("guard", "loop", "zeroing", "prbs", "sinusoid")
 EXACT = ("reaction_time_s", "stale_s", "duration_s")
 """Numbers among them that must be the same."""
 
-FLOORS = ("least_inertia_kg_m2",)
+FLOORS = ("min_inertia_kg_m2",)
 """Numbers among them that may be larger, never smaller."""
 
 

@@ -266,8 +266,8 @@ def test_a_session_with_older_names_of_settings_is_read_with_one_notice(recorded
     assert session_settings(folder) == session_settings(folder.with_name("now"))
     assert notice.level == "warning"
     assert notice.text.startswith(
-        f"{folder}/manifest.json, settings: estimation.shortest_epoch_s is now "
-        "estimation.min_epoch_s, "
+        f"{folder}/manifest.json, settings: guard.least_inertia_kg_m2 is now "
+        "guard.min_inertia_kg_m2, "
     )
 
 
