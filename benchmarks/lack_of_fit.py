@@ -2,7 +2,7 @@
 
 Recordings of one and of four epochs of the same PRBS. Without a misfit the share of p below 0.05
 should be 5 %, and below 0.001 0.1 %; `lack_of_fit` needs less than 1e-4 over all tests of a
-recording, and a misfit above `lack_of_fit_most_percent`. `band_sensitivity` is counted where it
+recording, and a misfit above `max_lack_of_fit_percent`. `band_sensitivity` is counted where it
 doubts the fit to all epochs, whose interval is the narrowest. In the last rows the torque went
 through a low-pass filter that its stamps do not know of: what the perturbation causes is then not
 J, B and K.

@@ -198,7 +198,7 @@ class RobotDrive(_Part):
     class Settings(_Part.Settings):
         """And how fast it may become."""
 
-        most_rad_s: float = quantity(3.0, "rad/s", 0.01, 10.0)
+        max_rad_s: float = quantity(3.0, "rad/s", 0.01, 10.0)
 
     _ready = _enabled = False
 
@@ -226,7 +226,7 @@ class RobotDrive(_Part):
         """Ask for a velocity; return what was asked for."""
         if self._robot is None or not self._enabled or not math.isfinite(velocity_rad_s):
             velocity_rad_s = 0.0
-        most = self._settings.most_rad_s
+        most = self._settings.max_rad_s
         velocity_rad_s = max(-most, min(most, velocity_rad_s))
         if self._robot is not None and self._enabled:
             self._robot.ask(MOVE, velocity_rad_s)

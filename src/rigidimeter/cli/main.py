@@ -11,6 +11,7 @@ import io
 import os
 import signal
 import sys
+import warnings
 from pathlib import Path
 from types import FrameType
 from typing import Annotated
@@ -127,6 +128,11 @@ def _say_interrupted() -> None:
     echo("rigidimeter: interrupted", err=True)
 
 
+def _warned(message: Warning | str, *_: object, **__: object) -> str:
+    """Return a warning as notices are printed: where in our code it was given helps nobody."""
+    return f"warning: {message}\n"
+
+
 def main() -> None:
     """Run the command line; a mistake of the user ends with one sentence and status 1."""
     # Before NumPy is imported: matrices here are small, and a second thread mostly waits, in a busy
@@ -138,6 +144,7 @@ def main() -> None:
         signal.signal(number, _terminated)
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as `nohup` does, for a long study
         signal.signal(signal.SIGHUP, _terminated)
+    warnings.formatwarning = _warned
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without "−" is no reason to fail

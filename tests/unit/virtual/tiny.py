@@ -12,7 +12,7 @@ SHORT = {
     "prbs": {"register_bits": 6, "duration_s": 5.0},
     "sinusoid": {"duration_s": 5.0, "motion_s": 5.0},
     "scores": {"cycles": 3},
-    "estimation": {"shortest_epoch_s": 3.0, "trim_s": 0.5},
+    "estimation": {"min_epoch_s": 3.0, "trim_s": 0.5},
     "zeroing": {"duration_s": 0.1},
 }
 

@@ -104,14 +104,14 @@ def _estimate(source: str, epochs: Sequence[PreparedEpoch]) -> Delay:
     used = (known or sound)[:MOST_EPOCHS]
     motions = [motion_of(one) for one in used]
     estimation = used[0].settings.estimation
-    longest_s = estimation.longest_delay_s
+    longest_s = estimation.max_delay_s
     try:
         total_s, error_s, values = _settled(used, motions, perturbed=bool(known))
         if not np.isfinite(total_s) or abs(total_s) > longest_s - SCAN_STEP_S / 2:
             return Delay(
                 source,
                 remark=f"no delay of the torque within ±{1e3 * longest_s:g} ms explains it "
-                "(estimation.longest_delay_s)",
+                "(estimation.max_delay_s)",
             )
         found = Delay(source, total_s, error_s)
         if not known:
@@ -158,7 +158,7 @@ def _settled(
     delay without moving anything. The error of the zero is that of what is left over its slope,
     by how much a move of the torque changes it.
     """
-    longest_s = epochs[0].settings.estimation.longest_delay_s
+    longest_s = epochs[0].settings.estimation.max_delay_s
 
     def left_after(move_s: float, near: Array | None = None) -> LineFit:
         moved = [epoch.moved(move_s) if move_s else epoch for epoch in epochs]

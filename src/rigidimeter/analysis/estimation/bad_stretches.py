@@ -50,20 +50,18 @@ def without_bad_stretches(epoch: Epoch, settings: Settings) -> Epoch:
     trim_s = settings.estimation.trim_s
     (before_s, _), (left_s, _) = used_s(epoch, trim_s), used_s(without, trim_s)
     taken_percent = 100.0 * (before_s - left_s) / before_s if before_s > 0 else 100.0
-    if taken_percent > diagnostics.left_out_most_percent or too_little(
-        without, settings.estimation
-    ):
+    if taken_percent > diagnostics.max_left_out_percent or too_little(without, settings.estimation):
         return epoch
     return bridged(without)
 
 
 def frozen_stretches(epoch: Epoch, settings: DiagnosticsSettings) -> list[LeftOut]:
-    """Return where a channel repeats one value for longer than `frozen_most_s`."""
+    """Return where a channel repeats one value for longer than `max_frozen_s`."""
     return [
         LeftOut(start_s, stop_s, f"{channel.name} repeats one value", "frozen")
         for channel in _fitted(epoch)
         for start_s, stop_s in zip(*_repetitions(epoch, channel, settings), strict=True)
-        if stop_s - start_s > settings.frozen_most_s
+        if stop_s - start_s > settings.max_frozen_s
     ]
 
 
@@ -83,7 +81,7 @@ def saturated_stretches(epoch: Epoch, settings: DiagnosticsSettings) -> list[Lef
     found = []
     for channel in _fitted(epoch):
         rows, starts, stops = _at_extremes(epoch, channel, settings)
-        if 100.0 * rows / len(channel) <= settings.saturated_most_percent:
+        if 100.0 * rows / len(channel) <= settings.max_saturated_percent:
             continue
         text = f"{channel.name} repeats an extreme value"
         spans = zip(channel.time_s[starts], channel.time_s[stops], strict=True)
@@ -105,7 +103,7 @@ def _at_extremes(
     kept = (stops - starts >= FEWEST_AT_EXTREME - 1) & _in_use(epoch, channel, starts, stops)
     kept &= (level == np.max(level)) | (level == np.min(level))
     for run in np.flatnonzero(kept):
-        kept[run] = not _as_told(epoch, channel, starts[run], stops[run], settings.frozen_most_s)
+        kept[run] = not _as_told(epoch, channel, starts[run], stops[run], settings.max_frozen_s)
     return int(np.sum((stops - starts + 1)[kept])), starts[kept], stops[kept]
 
 
@@ -114,7 +112,7 @@ def _repetitions(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return from when to when, in s, a channel repeats a value that nobody told it to keep."""
     starts, stops = _runs(channel.values)
-    most_s = settings.frozen_most_s
+    most_s = settings.max_frozen_s
     kept = (stops > starts) & _in_use(epoch, channel, starts, stops)
     long = kept & (channel.time_s[stops] - channel.time_s[starts] > most_s)
     for run in np.flatnonzero(long):

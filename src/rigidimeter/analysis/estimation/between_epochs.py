@@ -124,7 +124,7 @@ def between_epochs(
     half = np.array([fit.high - fit.low for fit in fits]) / 2
     degrees = _degrees(half / errors)
     found = [scatter(j, values[:, j], errors[:, j], degrees[:, j]) for j in range(3)]
-    most = settings.varying_most_percent
+    most = settings.max_varying_percent
     if by_perturbation:
         ranked = sorted(found, key=lambda one: one.p)
         sure = []

@@ -44,10 +44,10 @@ def before_fit(epoch: Epoch, settings: EstimationSettings) -> str:
         )
     start = max(float(channel.time_s[0]) for channel in (torque, *motion))
     stop = min(float(channel.time_s[-1]) for channel in (torque, *motion))
-    if stop - start < settings.shortest_epoch_s * (1 - 1e-3):
+    if stop - start < settings.min_epoch_s * (1 - 1e-3):
         return (
             f"torque and motion overlap for {max(stop - start, 0.0):.3g} s; at least "
-            f"{settings.shortest_epoch_s:g} s are needed (estimation.shortest_epoch_s)"
+            f"{settings.min_epoch_s:g} s are needed (estimation.min_epoch_s)"
         )
     if stop - start < 2 * settings.trim_s + 1:
         return (

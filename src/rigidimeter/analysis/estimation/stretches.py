@@ -139,7 +139,7 @@ def too_little(epoch: Epoch, settings: EstimationSettings) -> str:
     if not epoch.left_out:
         return ""
     left_s, _ = used_s(epoch, settings.trim_s)
-    least_s = max(settings.shortest_epoch_s - 2 * settings.trim_s, LEAST_USED_S)
+    least_s = max(settings.min_epoch_s - 2 * settings.trim_s, LEAST_USED_S)
     if left_s >= least_s * (1 - 1e-3):
         return ""
     return (

@@ -26,7 +26,7 @@ from rigidimeter.analysis.study.study_analysis import StudyRead
 from rigidimeter.analysis.study.tables import comparison_document, result_tables, table_csv
 from rigidimeter.core.errors import UserError, refused
 from rigidimeter.core.files import json_text, read_json, text_bytes, write_text
-from rigidimeter.core.settings import dump_settings
+from rigidimeter.core.settings import dump_settings, with_new_names
 from rigidimeter.core.version import __version__
 
 INPUTS_SCHEMA = "rigidimeter.analysis.study-inputs/1"
@@ -139,7 +139,8 @@ def _new_inputs(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[s
     for name in ("software", "method", "reference", "other", "seed", "resamples"):
         if before.get(name) != now[name]:
             yield f"{name}: {before.get(name)} → {now[name]}"
-    old, new = (dict(_leaves(each.get("settings") or {})) for each in (before, now))
+    settings, _ = with_new_names(before["settings"], f"{ANALYSIS}/{INPUTS}")
+    old, new = dict(_leaves(settings)), dict(_leaves(now["settings"]))
     for name in dict.fromkeys([*old, *new]):
         if old.get(name) != new.get(name):
             yield f"setting {name}: {old.get(name)} → {new.get(name)}"

@@ -90,9 +90,9 @@ def untested(c: Comparison, result: StudyResult, inertia: Comparison | None) -> 
 def negligible(c: Comparison, result: StudyResult) -> str:
     """Return that a difference is smaller than an error which no check doubts; else nothing.
 
-    How the joint moves between the samples is known to `between_samples_most_percent` alone.
+    How the joint moves between the samples is known to `max_between_samples_percent` alone.
     """
-    allowed = result.settings.diagnostics.between_samples_most_percent
+    allowed = result.settings.diagnostics.max_between_samples_percent
     if c.measure.origin not in ("fits", "fixed_inertia"):
         return ""
     size = 100.0 * _relative(*(c.summaries[name].median for name in c.pair))

@@ -30,7 +30,7 @@ from rigidimeter.core.session.folder import (
     read_manifest,
     read_session_files,
 )
-from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.core.settings import Settings, parse_settings, with_new_names
 
 CHANNELS = ("torque_nm", "angle_rad", "velocity_rad_s", "velocity_command_rad_s", "perturbation_nm")
 """The columns of samples that an epoch has."""
@@ -44,11 +44,14 @@ def is_session(path: Path) -> bool:
 
 def session_settings(folder: Path) -> Settings:
     """Return the settings a session was recorded with."""
-    return _settings(folder, read_manifest(folder))
+    return _settings(folder, read_manifest(folder))[0]
 
 
-def _settings(folder: Path, manifest: Mapping[str, Any]) -> Settings:
-    return parse_settings(manifest["settings"], source=f"{folder}/{MANIFEST}, settings")
+def _settings(folder: Path, manifest: Mapping[str, Any]) -> tuple[Settings, list[Notice]]:
+    source = f"{folder}/{MANIFEST}, settings"
+    values, renamed = with_new_names(manifest["settings"], source)
+    notices = [Notice("warning", renamed)] if renamed else []
+    return parse_settings(values, source=source), notices
 
 
 def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
@@ -64,8 +67,8 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
     """
     files = read_session_files(folder, (*CHANNELS, *_STAMPS, "epoch", "limited", "lateness_s"))
     manifest, samples, events = files.manifest, files.samples.columns, files.log.events
-    settings = _settings(folder, manifest)
-    notices = _damage(folder, files)
+    settings, notices = _settings(folder, manifest)
+    notices += _damage(folder, files)
     if files.ended is None:
         notices.append(
             Notice(

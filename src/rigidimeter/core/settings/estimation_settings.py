@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar, Literal, Self
-
-from pydantic import model_validator
+from typing import ClassVar, Literal
 
 from rigidimeter.core.settings.section import Section, quantity
 
@@ -31,6 +29,12 @@ class EstimationSettings(Section):
     it does to the torque is then done to the motion too.
     """
 
+    ascending: ClassVar = (
+        ("band_low_hz", "band_high_hz"),
+        ("band_low_hz", "band_high_unknown_hz"),
+        ("band_low_hz", "band_high_closed_loop_hz"),
+    )
+
     band_low_hz: float = quantity(0.15, "Hz", 0.001, 100.0)
     band_high_hz: float = quantity(10.0, "Hz", 0.1, 1000.0)
     band_high_unknown_hz: float = quantity(50.0, "Hz", 0.1, 1000.0)
@@ -38,21 +42,11 @@ class EstimationSettings(Section):
     torque_lowpass_hz: float = quantity(0.0, "Hz", 0.0, 100000.0)
     torque_lowpass_order: int = quantity(2, "1", 1, 8)
     trim_s: float = quantity(1.0, "s", 0.0, 60.0)
-    shortest_epoch_s: float = quantity(5.0, "s", 1.0, 600.0)
+    min_epoch_s: float = quantity(5.0, "s", 1.0, 600.0)
     published_highpass_hz: float = quantity(0.2, "Hz", 0.001, 10.0)
     published_highpass_order: int = quantity(2, "1", 1, 6)
     correct_delay: bool = True
-    longest_delay_s: float = quantity(0.04, "s", 0.001, 0.2)
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        highest = min(self.band_high_hz, self.band_high_unknown_hz, self.band_high_closed_loop_hz)
-        if self.band_low_hz >= highest:
-            raise ValueError(
-                "band_low_hz must be below band_high_hz, band_high_unknown_hz and "
-                "band_high_closed_loop_hz"
-            )
-        return self
+    max_delay_s: float = quantity(0.04, "s", 0.001, 0.2)
 
 
 class ScoreSettings(Section):
@@ -122,7 +116,7 @@ class DiagnosticLevels(Section):
 
 
 class DiagnosticsSettings(Section):
-    """Thresholds of the checks. `_least` and `_most` are the ends of what is taken as sound.
+    """Thresholds of the checks. `min_` and `max_` are the ends of what is taken as sound.
 
     `gravity_nm` is m g l, the moment of the limb's weight about the axis when the limb is
     horizontal; 0 where it is not known or the axis is vertical. `gravity_angle_deg` is the limb's
@@ -132,53 +126,53 @@ class DiagnosticsSettings(Section):
     ascending: ClassVar = (
         ("voluntary_low_hz", "voluntary_high_hz"),
         ("tremor_low_hz", "tremor_high_hz"),
-        ("inertia_least_kg_m2", "inertia_most_kg_m2"),
+        ("min_inertia_kg_m2", "max_inertia_kg_m2"),
     )
 
-    condition_number_most: float = quantity(10.0, "1", 1.0, 1e6)
-    coherence_least: float = quantity(0.5, "1", 0.0, 1.0)
-    band_share_least_percent: float = quantity(50.0, "%", 0.0, 100.0)
-    single_frequency_most_percent: float = quantity(85.0, "%", 1.0, 100.0)
-    computed_torque_least_percent: float = quantity(1e-3, "%", 0.0, 100.0)
-    static_torque_least_percent: float = quantity(0.5, "%", 0.0, 100.0)
-    residual_flatness_least: float = quantity(0.7, "1", 0.0, 1.0)
-    residual_perturbation_most_percent: float = quantity(10.0, "%", 0.0, 100.0)
-    lack_of_fit_most_percent: float = quantity(2.0, "%", 0.0, 100.0)
-    band_sensitivity_most_percent: float = quantity(3.0, "%", 0.0, 100.0)
-    r_squared_least: float = quantity(0.3, "1", -100.0, 1.0)
-    between_samples_most_percent: float = quantity(1.0, "%", 0.0, 100.0)
-    held_out_vaf_least_percent: float = quantity(0.0, "%", -1000.0, 100.0)
+    max_condition_number: float = quantity(10.0, "1", 1.0, 1e6)
+    min_coherence: float = quantity(0.5, "1", 0.0, 1.0)
+    min_band_share_percent: float = quantity(50.0, "%", 0.0, 100.0)
+    max_single_frequency_percent: float = quantity(85.0, "%", 1.0, 100.0)
+    min_computed_torque_percent: float = quantity(1e-3, "%", 0.0, 100.0)
+    min_static_torque_percent: float = quantity(0.5, "%", 0.0, 100.0)
+    min_residual_flatness: float = quantity(0.7, "1", 0.0, 1.0)
+    max_residual_perturbation_percent: float = quantity(10.0, "%", 0.0, 100.0)
+    max_lack_of_fit_percent: float = quantity(2.0, "%", 0.0, 100.0)
+    max_band_sensitivity_percent: float = quantity(3.0, "%", 0.0, 100.0)
+    min_r_squared: float = quantity(0.3, "1", -100.0, 1.0)
+    max_between_samples_percent: float = quantity(1.0, "%", 0.0, 100.0)
+    min_held_out_vaf_percent: float = quantity(0.0, "%", -1000.0, 100.0)
     voluntary_low_hz: float = quantity(0.3, "Hz", 0.01, 20.0)
     voluntary_high_hz: float = quantity(4.0, "Hz", 0.05, 50.0)
-    voluntary_share_most_percent: float = quantity(15.0, "%", 0.0, 100.0)
+    max_voluntary_share_percent: float = quantity(15.0, "%", 0.0, 100.0)
     tremor_low_hz: float = quantity(4.0, "Hz", 1.0, 50.0)
     tremor_high_hz: float = quantity(12.0, "Hz", 1.0, 50.0)
-    tremor_share_most_percent: float = quantity(3.0, "%", 0.0, 100.0)
-    loop_bias_most_percent: float = quantity(50.0, "%", 0.0, 1000.0)
+    max_tremor_share_percent: float = quantity(3.0, "%", 0.0, 100.0)
+    max_loop_bias_percent: float = quantity(50.0, "%", 0.0, 1000.0)
     active_torque_nm: float = quantity(0.1, "N·m", 0.0, 100.0, above=True)
     active_share_percent: float = quantity(50.0, "%", 0.0, 1000.0)
-    active_most_percent: float = quantity(20.0, "%", 0.0, 100.0)
+    max_active_percent: float = quantity(20.0, "%", 0.0, 100.0)
     emg_window_s: float = quantity(0.25, "s", 0.01, 10.0)
     emg_baseline_factor: float = quantity(3.0, "1", 1.0, 1000.0, above=True)
-    emg_active_most_percent: float = quantity(20.0, "%", 0.0, 100.0)
-    varying_most_percent: float = quantity(10.0, "%", 0.0, 1000.0)
+    max_emg_active_percent: float = quantity(20.0, "%", 0.0, 100.0)
+    max_varying_percent: float = quantity(10.0, "%", 0.0, 1000.0)
     varying_chance: float = quantity(0.005, "1", 0.001, 0.5)
-    saturated_most_percent: float = quantity(0.5, "%", 0.0, 100.0)
-    frozen_most_s: float = quantity(0.1, "s", 0.0, 60.0)
-    left_out_most_percent: float = quantity(50.0, "%", 0.0, 100.0)
+    max_saturated_percent: float = quantity(0.5, "%", 0.0, 100.0)
+    max_frozen_s: float = quantity(0.1, "s", 0.0, 60.0)
+    max_left_out_percent: float = quantity(50.0, "%", 0.0, 100.0)
     gravity_nm: float = quantity(0.0, "N·m", 0.0, 1000.0)
     gravity_angle_deg: float = quantity(0.0, "deg", -180.0, 180.0)
-    velocity_scale_most_percent: float = quantity(10.0, "%", 0.1, 1000.0)
-    velocity_delay_most_ms: float = quantity(5.0, "ms", 0.01, 1000.0)
-    velocity_shape_most_percent: float = quantity(5.0, "%", 0.0, 1000.0)
-    missed_ticks_most_percent: float = quantity(0.1, "%", 0.0, 100.0)
-    limited_most_percent: float = quantity(1.0, "%", 0.0, 100.0)
-    position_most_percent: float = quantity(98.0, "%", 1.0, 100.0)
-    controller_misfit_most_percent: float = quantity(20.0, "%", 0.0, 1000.0)
-    inertia_least_kg_m2: float = quantity(1e-5, "kg·m²", 0.0, 10.0)
-    inertia_most_kg_m2: float = quantity(1.0, "kg·m²", 0.0, 100.0, above=True)
-    damping_most_nm_s_rad: float = quantity(50.0, "N·m·s/rad", 0.0, 1000.0, above=True)
-    stiffness_most_nm_rad: float = quantity(2000.0, "N·m/rad", 0.0, 100000.0, above=True)
+    max_velocity_scale_percent: float = quantity(10.0, "%", 0.1, 1000.0)
+    max_velocity_delay_ms: float = quantity(5.0, "ms", 0.01, 1000.0)
+    max_velocity_shape_percent: float = quantity(5.0, "%", 0.0, 1000.0)
+    max_missed_ticks_percent: float = quantity(0.1, "%", 0.0, 100.0)
+    max_limited_percent: float = quantity(1.0, "%", 0.0, 100.0)
+    max_position_percent: float = quantity(98.0, "%", 1.0, 100.0)
+    max_controller_misfit_percent: float = quantity(20.0, "%", 0.0, 1000.0)
+    min_inertia_kg_m2: float = quantity(1e-5, "kg·m²", 0.0, 10.0)
+    max_inertia_kg_m2: float = quantity(1.0, "kg·m²", 0.0, 100.0, above=True)
+    max_damping_nm_s_rad: float = quantity(50.0, "N·m·s/rad", 0.0, 1000.0, above=True)
+    max_stiffness_nm_rad: float = quantity(2000.0, "N·m/rad", 0.0, 100000.0, above=True)
     levels: DiagnosticLevels = DiagnosticLevels()
 
 

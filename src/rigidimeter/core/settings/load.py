@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
@@ -11,13 +12,14 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import read_toml
 from rigidimeter.core.settings.messages import Model, validated
 from rigidimeter.core.settings.models import Settings
+from rigidimeter.core.settings.renamed import with_new_names
 
 REMOVED = ("intervals", "bootstrap_draws")
 """Keys of [estimation] in older sessions, from when there were three kinds of interval."""
 
 
 def parse_settings(values: Mapping[str, Any], *, source: str = "settings") -> Settings:
-    """Validate a nested mapping.
+    """Validate a nested mapping; a warning names the keys that have their older names.
 
     Raises
     ------
@@ -25,6 +27,7 @@ def parse_settings(values: Mapping[str, Any], *, source: str = "settings") -> Se
         Naming each offending key, its value, its unit and the allowed range; for an unknown key
         the nearest known one.
     """
+    values = _renamed(values, source)
     estimation = values.get("estimation")
     if isinstance(estimation, Mapping) and any(key in estimation for key in REMOVED):
         kept = {key: value for key, value in estimation.items() if key not in REMOVED}
@@ -115,7 +118,15 @@ def changed_settings(
     UserError
         As `parse_settings`; the sentence begins with `source`.
     """
+    changes = _renamed(changes, source)
     return parse_settings(_merged(dump_settings(settings), changes), source=source)
+
+
+def _renamed(values: Mapping[str, Any], source: str) -> dict[str, Any]:
+    renamed, notice = with_new_names(values, source)
+    if notice:
+        warnings.warn(notice, stacklevel=3)
+    return renamed
 
 
 def _merged(values: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -48,7 +48,7 @@ class GuardSettings(Section):
     commands should have brought it, and when a reading is older than `stale_s`. The place where the
     commands should have brought it follows the angle by at most `drift_limit_deg_s`: so much may be
     the zero offset of the drive. While zero is commanded the joint may move by at most
-    `hold_limit_deg`. `least_inertia_kg_m2` is less than the inertia of the lightest thing that can
+    `hold_limit_deg`. `min_inertia_kg_m2` is less than the inertia of the lightest thing that can
     be mounted: an accelerated joint that shows less torque than that has no working sensor.
     """
 
@@ -60,7 +60,7 @@ class GuardSettings(Section):
     following_limit_deg: float = quantity(2.0, "deg", 0.1, 45.0)
     drift_limit_deg_s: float = quantity(0.02, "deg/s", 0.0, 1.0)
     hold_limit_deg: float = quantity(1.0, "deg", 0.1, 45.0)
-    least_inertia_kg_m2: float = quantity(0.0005, "kg·m²", 0.0, 1.0)
+    min_inertia_kg_m2: float = quantity(0.0005, "kg·m²", 0.0, 1.0)
     torque_limit_nm: float = quantity(10.0, "N·m", 0.01, 200.0)
     torque_stop_nm: float = quantity(20.0, "N·m", 0.01, 400.0)
     power_limit_w: float = quantity(20.0, "W", 0.01, 1000.0)

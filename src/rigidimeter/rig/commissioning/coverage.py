@@ -13,7 +13,7 @@ from typing import Any
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import plain_values
-from rigidimeter.core.settings import Settings
+from rigidimeter.core.settings import Settings, with_new_names
 from rigidimeter.rig.commissioning.commissioning_record import (
     CommissioningRecord,
     read_record,
@@ -31,7 +31,7 @@ LIMITS = ("guard", "loop", "zeroing", "prbs", "sinusoid")
 EXACT = ("reaction_time_s", "stale_s", "duration_s")
 """Numbers among them that must be the same."""
 
-FLOORS = ("least_inertia_kg_m2",)
+FLOORS = ("min_inertia_kg_m2",)
 """Numbers among them that may be larger, never smaller."""
 
 
@@ -120,7 +120,8 @@ def check_record(
         )
     if age > timedelta(days=days):
         raise UserError(f"{path}: is of {record.made_utc[:10]}, and {valid}; {again}")
-    _same_controller(path, record.covered, plain_values(covered(settings)))
+    before, _ = with_new_names(record.covered, str(path))
+    _same_controller(path, before, plain_values(covered(settings)))
     return record
 
 

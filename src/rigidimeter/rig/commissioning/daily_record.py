@@ -213,7 +213,7 @@ def as_measured(
 ) -> Settings:
     """Return the settings with what the guard goes by as it was measured.
 
-    The bandwidth of the drive is that of the commissioning record. `guard.least_inertia_kg_m2` is
+    The bandwidth of the drive is that of the commissioning record. `guard.min_inertia_kg_m2` is
     half of what the reference inertia shows at the ticks, where ticks show it: an arm adds inertia
     to what is mounted beyond the sensor and takes none away. A value that the settings give stays,
     and nothing is lowered.
@@ -230,11 +230,11 @@ def as_measured(
     shows_inertia = answer_limits(measured).shows_inertia
     if not shows_inertia and told_hz > drive_hz:  # no more than that can be measured
         measured = settings
-    given = "least_inertia_kg_m2" in guard.model_fields_set
+    given = "min_inertia_kg_m2" in guard.model_fields_set
     if kept is None or given or not shows_inertia:
         return measured
-    floor = max(guard.least_inertia_kg_m2, FLOOR_SHARE * _shown(measured.rig) * kept.inertia_kg_m2)
-    return changed_settings(measured, {"guard": {"least_inertia_kg_m2": floor}})
+    floor = max(guard.min_inertia_kg_m2, FLOOR_SHARE * _shown(measured.rig) * kept.inertia_kg_m2)
+    return changed_settings(measured, {"guard": {"min_inertia_kg_m2": floor}})
 
 
 def _shown(rig: RigSettings) -> float:

@@ -30,7 +30,7 @@ def facts_checks(facts: Mapping[str, Any], settings: Settings) -> list[Check]:
     watchdog_s = drive["watchdog_s"]
     checks = [yes("devices read back", True, ", ".join(who), "what the rig file says", "")]
     name, what = "watchdog configured", "the drive must stop by itself when nobody commands it"
-    longest_s = settings.commissioning.watchdog_longest_s
+    longest_s = settings.commissioning.max_watchdog_s
     if watchdog_s is None:
         limit = f"at most {number(longest_s, 's')}"
         checks.append(yes(name, False, "none", limit, f"{what}; set it"))
@@ -93,9 +93,7 @@ def rate_checks(
     span_s = float(stamps[-1] - stamps[0]) if len(stamps) > 1 else 0.0
     rate_hz = (len(stamps) - 1) / span_s if span_s > 0 else 0.0
     wanted_hz = (
-        0.01
-        * settings.commissioning.least_rate_percent
-        * min(expected_hz, settings.rig.tick_rate_hz)
+        0.01 * settings.commissioning.min_rate_percent * min(expected_hz, settings.rig.tick_rate_hz)
     )
     gap_s = float(np.max(np.diff(stamps))) if len(stamps) > 1 else math.inf
     ages_s = (time_s - stamps_s)[np.isfinite(stamps_s)]

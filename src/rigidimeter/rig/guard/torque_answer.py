@@ -139,7 +139,7 @@ def answer_limits(settings: Settings) -> AnswerLimits:
     step_s = mean_of_ticks(rig.tick_rate_hz) / rig.tick_rate_hz
     decay_per_s = rig.drive_damping_ratio * 2.0 * math.pi * rig.drive_bandwidth_hz
     shows_inertia = decay_per_s <= SETTLED * rig.tick_rate_hz
-    inertia = settings.guard.least_inertia_kg_m2
+    inertia = settings.guard.min_inertia_kg_m2
     steps_rad_s2 = 2.0 * rad_from_deg(rig.motion.angle_resolution_deg) * FILTER_RAD_S**2
     short, middle, long = map(most_left, ROWS, NOISE_ORDERS)
     return AnswerLimits(

@@ -109,7 +109,7 @@ def test_a_sensor_that_hung_for_most_of_the_epoch_excludes_it():
 
 
 def test_too_little_that_is_left_excludes():
-    settings = parse_settings({"diagnostics": {"left_out_most_percent": 99.0}})
+    settings = parse_settings({"diagnostics": {"max_left_out_percent": 99.0}})
     epoch = hung(an_epoch(), "torque_nm", 3.0, 17.0)
     assert fitted(epoch, settings).outcome.kind == "excluded"
     by_hand = replace(an_epoch(), left_out=(LeftOut(3.0, 17.0),))

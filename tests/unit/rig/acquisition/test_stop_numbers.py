@@ -171,10 +171,10 @@ STALE = (1e3 * GUARD.stale_s, "ms")
             Cause.TORQUE_SILENT,
             Found(
                 0.02,
-                5.0 * AGREEMENT.answer.least_part * GUARD.least_inertia_kg_m2,
+                5.0 * AGREEMENT.answer.least_part * GUARD.min_inertia_kg_m2,
                 "N·m",
                 SHOWN_MEMORY_S,
-                "guard.least_inertia_kg_m2",
+                "guard.min_inertia_kg_m2",
                 at_least=True,
             ),
         ),

@@ -216,7 +216,7 @@ def test_a_torque_that_does_not_answer():
     account = stopped(speed_rad_s=3.0)
     assert account.cause is Cause.TORQUE_SILENT
     assert "0 N·m, for 250 ms, at least 0.0" in account.sentence
-    assert account.found.setting == "guard.least_inertia_kg_m2"
+    assert account.found.setting == "guard.min_inertia_kg_m2"
 
 
 def test_a_velocity_that_is_not_the_change_of_the_angle():

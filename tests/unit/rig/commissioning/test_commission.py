@@ -302,7 +302,7 @@ def test_a_drive_quicker_than_the_settings_say_is_no_silent_torque(
     today: Any = SimpleNamespace(reference=SimpleNamespace(inertia_kg_m2=0.0045))
     told = parse_settings({"rig": settings.rig.model_dump(), "guard": {"reaction_time_s": 0.1}})
     measured = as_measured(told, found, today)
-    floor = {"least_inertia_kg_m2": 0.5 * 0.0045}
+    floor = {"min_inertia_kg_m2": 0.5 * 0.0045}
     assert perturbed_by_100_hz(changed_settings(told, {"guard": floor})) == (
         Cause.TORQUE_SILENT,
         pytest.approx(0.03),

@@ -157,8 +157,8 @@ def measured(bandwidth_hz: float = 50.0) -> Any:
     [
         ({}, 0.002, 0.001),
         ({}, 0.0004, 0.0005),  # the default is not lowered
-        ({"least_inertia_kg_m2": 0.0007}, 0.002, 0.0007),
-        ({"least_inertia_kg_m2": 0.0}, 0.002, 0.0),
+        ({"min_inertia_kg_m2": 0.0007}, 0.002, 0.0007),
+        ({"min_inertia_kg_m2": 0.0}, 0.002, 0.0),
     ],
 )
 def test_half_the_measured_inertia_is_the_guards_floor(
@@ -167,7 +167,7 @@ def test_half_the_measured_inertia_is_the_guards_floor(
     assert record.reference is not None
     today = replace(record, reference=replace(record.reference, inertia_kg_m2=inertia_kg_m2))
     settings = as_measured(parse_settings({"guard": guard}), measured(), today)
-    assert settings.guard.least_inertia_kg_m2 == pytest.approx(floor_kg_m2, rel=0.01)
+    assert settings.guard.min_inertia_kg_m2 == pytest.approx(floor_kg_m2, rel=0.01)
     assert as_measured(settings, measured(), replace(record, reference=None)) == settings
 
 
@@ -180,12 +180,12 @@ def test_the_floor_is_half_of_what_an_even_acceleration_shows_at_the_ticks(
     seen_rad_s2 = drive.held(np.arange(100.0), 0.01).acceleration_rad_s2[-1]
     settings = as_measured(at_100_hz(), measured(bandwidth_hz), heavy(record))
     assert settings.rig.drive_bandwidth_hz == bandwidth_hz
-    assert settings.guard.least_inertia_kg_m2 == pytest.approx(0.5 * 0.02 * seen_rad_s2 / 100.0)
+    assert settings.guard.min_inertia_kg_m2 == pytest.approx(0.5 * 0.02 * seen_rad_s2 / 100.0)
 
 
 def test_ticks_that_show_no_inertia_do_not_raise_the_floor(record: DailyRecord) -> None:
     settings = as_measured(at_100_hz(), measured(53.1), heavy(record))
-    assert settings.guard.least_inertia_kg_m2 == 0.0005
+    assert settings.guard.min_inertia_kg_m2 == 0.0005
     assert settings.rig.drive_bandwidth_hz == 53.1  # at least
     told = changed_settings(at_100_hz(), {"rig": {"drive_bandwidth_hz": 200.0}})
     assert as_measured(told, measured(53.1), heavy(record)) == told

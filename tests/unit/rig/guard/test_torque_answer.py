@@ -219,7 +219,7 @@ def test_each_limit_is_the_settings_in_si_units():
     limits = answer_limits(
         parse_settings(
             {
-                "guard": {"least_inertia_kg_m2": 0.002, "reaction_time_s": 0.05},
+                "guard": {"min_inertia_kg_m2": 0.002, "reaction_time_s": 0.05},
                 "controller": {"inertia_kg_m2": 0.05, "damping_nm_s_rad": 2.0},
                 "rig": {
                     "tick_rate_hz": 500.0,

@@ -130,7 +130,7 @@ def as_they_are(prepared: PreparedEpoch, signals: Signals) -> InertiaDoubt:
     settings = prepared.settings.diagnostics
     times_s = phases_s(command, epoch.channels["torque_nm"].time_s)
     (seen,) = accelerations_seen([found.model], None, 1.0 / command.mean_rate_hz, times_s)
-    percent, most = 100.0 * abs(1.0 - seen), settings.between_samples_most_percent
+    percent, most = 100.0 * abs(1.0 - seen), settings.max_between_samples_percent
     if not percent > most:
         return NONE
     text = (

@@ -19,7 +19,7 @@ def doubt_of(
     epoch: Epoch, name: str, percent: float, drive_known: bool, settings: DiagnosticsSettings
 ) -> tuple[Finding, ...]:
     """Return the finding where the parameter of that name may be so many percent elsewhere."""
-    level, most = settings.levels.between_samples, settings.between_samples_most_percent
+    level, most = settings.levels.between_samples, settings.max_between_samples_percent
     if not drive_known and {"velocity_command_rad_s", "velocity_rad_s"} <= set(epoch.channels):
         text = (
             "no drive explains the velocity by the command, so how the joint moved between the "

@@ -86,7 +86,7 @@ def band_finding(
     p = np.minimum(change.size * np.array([found.p for found in bands]), 1.0)  # Bonferroni
     percent = 100 * np.abs(change / fit.value)
     of_half = np.abs(change) / half_widths(fit)
-    most = settings.band_sensitivity_most_percent
+    most = settings.max_band_sensitivity_percent
     contradicting = (p < CHANCE) & (percent > most) & (of_half > OF_HALF)
     if not np.any(contradicting):
         return []

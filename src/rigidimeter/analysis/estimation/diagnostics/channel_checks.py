@@ -33,7 +33,7 @@ MOST_SHOWN = 3
 
 def saturation(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     """Return the largest share of samples in which a channel repeats its extreme value."""
-    most = settings.saturated_most_percent
+    most = settings.max_saturated_percent
     left_out = _left_out(epoch, "saturation")
     if left_out:
         value = 100.0 * _seconds(left_out) / _length_s(epoch)
@@ -53,7 +53,7 @@ def saturation(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
 
 def frozen(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     """Return the longest time for which a channel repeats one value."""
-    most = settings.frozen_most_s
+    most = settings.max_frozen_s
     left_out = _left_out(epoch, "frozen")
     if left_out:
         longest = max(left_out, key=lambda stretch: stretch.stop_s - stretch.start_s)
@@ -80,7 +80,7 @@ def left_out(epoch: Epoch) -> Look:
 
 def lost_samples(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     """Return in which share of the epoch's time its samples are lost, in %."""
-    found, most = _left_out(epoch, LOST_SAMPLES), settings.left_out_most_percent
+    found, most = _left_out(epoch, LOST_SAMPLES), settings.max_left_out_percent
     if not found:
         return Look(0.0, most, False, "no samples are lost")
     lost_s = _seconds(found)
@@ -140,7 +140,7 @@ def _rest(epoch: Epoch) -> str:
 
 def missed_ticks(ticks: Ticks, settings: DiagnosticsSettings) -> Look:
     """Return in what share of the ticks that were due the loop did not run, in %."""
-    most = settings.missed_ticks_most_percent
+    most = settings.max_missed_ticks_percent
     fact = (
         f"{ticks.missed} of {ticks.ran + ticks.missed} ticks never ran "
         f"({in_full(ticks.missed_percent)} %, at most {most:g} %), and {ticks.late} were late"
@@ -163,7 +163,7 @@ def _followed(case: Case, look: Look) -> str:
 def guard_limited(ticks: Ticks, settings: DiagnosticsSettings) -> Look:
     """Return in what share of the ticks the guard changed the command, in %."""
     value = 100.0 * ticks.limited / ticks.ran
-    most = settings.limited_most_percent
+    most = settings.max_limited_percent
     return at_most(
         value,
         most,
@@ -174,7 +174,7 @@ def guard_limited(ticks: Ticks, settings: DiagnosticsSettings) -> Look:
 def position_limit(angle: Channel, limit_rad: float, settings: DiagnosticsSettings) -> Look:
     """Return how near the joint came to the position limit, in % of it."""
     value = 100.0 * float(np.max(np.abs(angle.values))) / limit_rad
-    most = settings.position_most_percent
+    most = settings.max_position_percent
     return at_most(
         value,
         most,

@@ -40,7 +40,7 @@ def push_harmless(case: Case, look: Look) -> str:
             "that something but the robot adds does not bias J, B and K; it is in their intervals"
         )
     share = case.loop_bias_percent
-    if share is not None and share <= case.settings.loop_bias_most_percent:
+    if share is not None and share <= case.settings.max_loop_bias_percent:
         return f"it biases J, B and K by {in_full(share)} % of half their intervals at most"
     return ""
 

@@ -56,7 +56,7 @@ def static_torque(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings)
     steps = np.diff(torque[np.argsort(angle, kind="stable")])
     variance = float(np.var(torque))
     value = 100.0 * float(np.mean(steps**2)) / (2.0 * variance) if variance > 0 else math.nan
-    least = settings.static_torque_least_percent
+    least = settings.min_static_torque_percent
     return at_least(
         value,
         least,
@@ -87,7 +87,7 @@ def computed_torque(epoch: Epoch, settings: DiagnosticsSettings) -> Look | None:
         ),
     }
     origin = min(shares, key=lambda name: shares[name])
-    value, least = 100.0 * shares[origin], settings.computed_torque_least_percent
+    value, least = 100.0 * shares[origin], settings.min_computed_torque_percent
     if not math.isfinite(value):
         return None
     return at_least(

@@ -49,7 +49,7 @@ def controller_misfit(prepared: PreparedEpoch, loop: Loop) -> Look | None:
     if misfit is None or np.isnan(misfit[0]):
         return None
     value, factor = misfit
-    most = prepared.settings.diagnostics.controller_misfit_most_percent
+    most = prepared.settings.diagnostics.max_controller_misfit_percent
     look = at_most(
         value,
         most,
@@ -72,7 +72,7 @@ def controller_used(prepared: PreparedEpoch) -> Loop:
     if not all(name in channels for name in ("velocity_command_rad_s", "perturbation_nm")):
         return loop
     misfit = prepared.once(misfit_of_settings)
-    most = prepared.settings.diagnostics.controller_misfit_most_percent
+    most = prepared.settings.diagnostics.max_controller_misfit_percent
     shown = _controller_shown(prepared, loop) if misfit and misfit[0] > most else None
     return loop if shown is None else replace(loop, controller=shown)
 
@@ -81,7 +81,7 @@ def _controller_shown(prepared: PreparedEpoch, loop: Loop) -> ControllerSettings
     """Return the controller that makes the recorded command, if there is one."""
     made = command_made(prepared.epoch, loop)
     shown = made.shown(loop.controller) if made is not None else None
-    most = prepared.settings.diagnostics.controller_misfit_most_percent
+    most = prepared.settings.diagnostics.max_controller_misfit_percent
     return None if made is None or shown is None or made.misfit(shown)[0] > most else shown
 
 

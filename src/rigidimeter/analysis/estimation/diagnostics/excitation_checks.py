@@ -43,7 +43,7 @@ Signals that have nothing to do with each other then still show about 0.2.
 
 def conditioning(signals: Signals, settings: DiagnosticsSettings) -> Look:
     """Return whether the regressors can be told apart, and if not which two and because of what."""
-    solution, most = signals.solution, settings.condition_number_most
+    solution, most = signals.solution, settings.max_condition_number
     if not np.all(solution.lengths > 0):
         return Look(
             math.inf,
@@ -78,7 +78,7 @@ def coherence(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> 
     shared = _coherence(cause, np.stack([signals.torque_nm, signals.velocity_rad_s]), signals)
     values = dict(zip(("torque", "velocity"), np.median(shared, axis=1).tolist(), strict=True))
     weaker = min(values, key=lambda name: values[name])
-    value, least = values[weaker], settings.coherence_least
+    value, least = values[weaker], settings.min_coherence
     return at_least(
         value,
         least,
@@ -119,7 +119,7 @@ def band_share(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) ->
         "velocity": _share(velocity, signals.rate_hz, signals.band_hz),
     }
     weaker = min(shares, key=lambda name: shares[name])
-    value, least = 100.0 * shares[weaker], settings.band_share_least_percent
+    value, least = 100.0 * shares[weaker], settings.min_band_share_percent
     low, high = signals.band_hz
     return at_least(
         value,
@@ -133,7 +133,7 @@ def band_share(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) ->
 
 def imposed_sinusoid(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     """Return whether the motion is a single sinusoid, which no fit of three parameters can use."""
-    shares, most = line_shares(epoch), settings.single_frequency_most_percent
+    shares, most = line_shares(epoch), settings.max_single_frequency_percent
     value = 100.0 * shares.angle
     return Look(
         value,

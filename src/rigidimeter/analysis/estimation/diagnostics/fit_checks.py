@@ -44,7 +44,7 @@ def residual_whiteness(residual_nm: Array, signals: Signals, settings: Diagnosti
     power = power[lines_inside(frequency, signals.band_hz)]
     groups = max(power.size // LINES_TOGETHER, 1)
     means = power[: groups * LINES_TOGETHER].reshape(groups, -1).mean(axis=1)
-    value, least = math.nan, settings.residual_flatness_least
+    value, least = math.nan, settings.min_residual_flatness
     if np.all(means > 0):
         made_up = math.log(LINES_TOGETHER) - float(digamma(LINES_TOGETHER))
         value = min(float(np.exp(np.mean(np.log(means)) + made_up) / np.mean(means)), 1.0)
@@ -82,7 +82,7 @@ def residual_perturbation(
     chance = _chance_correlation(residual, cause, signals.rate_hz, lag)
     sd = float(np.std(signals.torque_nm))
     value = 100.0 * r * float(np.std(residual)) / sd if sd > 0 else math.nan
-    most = settings.residual_perturbation_most_percent
+    most = settings.max_residual_perturbation_percent
     return Look(
         value,
         most,
@@ -122,7 +122,7 @@ def held_out_vaf(signals: Signals, settings: DiagnosticsSettings) -> Look:
     rows = np.column_stack([signals.motion, torque])[:half]
     upper = np.asarray(np.linalg.qr(rows, mode="r"))
     left = torque[half:] - signals.motion[half:] @ explained(upper[:, :-1], upper[:, -1]).values
-    variance, least = float(np.var(torque[half:])), settings.held_out_vaf_least_percent
+    variance, least = float(np.var(torque[half:])), settings.min_held_out_vaf_percent
     value = 100.0 * (1.0 - float(np.var(left)) / variance) if variance > 0 else math.nan
     return at_least(
         value,
@@ -136,7 +136,7 @@ def held_out_vaf(signals: Signals, settings: DiagnosticsSettings) -> Look:
 
 def r_squared(value: float, settings: DiagnosticsSettings) -> Look:
     """Return the share of the torque that J, B and K explain."""
-    least = settings.r_squared_least
+    least = settings.min_r_squared
     return at_least(value, least, f"R² is {in_full(value, limit=least)} (at least {least:g})")
 
 
@@ -165,12 +165,12 @@ def implausible_parameters(parameters: Array, settings: DiagnosticsSettings) -> 
     Only sizes are looked at; signs are another check's business.
     """
     J, B, K = parameters
-    least = settings.inertia_least_kg_m2
+    least = settings.min_inertia_kg_m2
     factors = {
-        f"J = {J:.3g} kg·m² is large": abs(J) / settings.inertia_most_kg_m2,
+        f"J = {J:.3g} kg·m² is large": abs(J) / settings.max_inertia_kg_m2,
         f"J = {J:.3g} kg·m² is small": least / abs(J) if J != 0 else math.inf,
-        f"B = {B:.3g} N·m·s/rad is large": abs(B) / settings.damping_most_nm_s_rad,
-        f"K = {K:.3g} N·m/rad is large": abs(K) / settings.stiffness_most_nm_rad,
+        f"B = {B:.3g} N·m·s/rad is large": abs(B) / settings.max_damping_nm_s_rad,
+        f"K = {K:.3g} N·m/rad is large": abs(K) / settings.max_stiffness_nm_rad,
     }
     worst = max(factors, key=lambda text: factors[text])
     value = factors[worst]
@@ -296,8 +296,8 @@ PARAMETER_CHECKS = (
         "a joint of a person or an animal is not like that; a machine's axis may be",
         (
             "check the units of torque (N·m) and angle (rad, not degrees) and the time (s); for an "
-            "axis that is so, set the ends of the ranges: inertia_least_kg_m2, inertia_most_kg_m2, "
-            "damping_most_nm_s_rad and stiffness_most_nm_rad in [diagnostics]"
+            "axis that is so, set the ends of the ranges: min_inertia_kg_m2, max_inertia_kg_m2, "
+            "max_damping_nm_s_rad and max_stiffness_nm_rad in [diagnostics]"
         ),
     ),
 )

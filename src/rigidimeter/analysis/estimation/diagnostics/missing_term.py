@@ -136,7 +136,7 @@ def friction_of_drive(case: Case) -> Look | None:
         return None
     if not _little_friction(case, case.prepared.once(_Found).terms):
         return None
-    most = case.settings.between_samples_most_percent
+    most = case.settings.max_between_samples_percent
     return Look(
         np.nan,
         most,

@@ -85,7 +85,7 @@ def velocity_fit(epoch: Epoch) -> tuple[float, float]:
 
 def velocity_scale(fitted: tuple[float, float], settings: DiagnosticsSettings) -> Look:
     """Return by how much the velocity's scale is off, in %."""
-    value, most = 100.0 * abs(fitted[0] - 1.0), settings.velocity_scale_most_percent
+    value, most = 100.0 * abs(fitted[0] - 1.0), settings.max_velocity_scale_percent
     end = 1.0 + math.copysign(most / 100.0, fitted[0] - 1.0)
     return at_most(
         value,
@@ -100,7 +100,7 @@ def velocity_scale(fitted: tuple[float, float], settings: DiagnosticsSettings) -
 def velocity_delay(fitted: tuple[float, float], settings: DiagnosticsSettings) -> Look:
     """Return how late the velocity is against the angle, in ms; negative where it is early."""
     scale, delay_s = fitted
-    value, most = 1e3 * delay_s / scale, settings.velocity_delay_most_ms
+    value, most = 1e3 * delay_s / scale, settings.max_velocity_delay_ms
     return Look(
         value,
         most,
@@ -139,7 +139,7 @@ def velocity_shape(
     regressors = np.column_stack([measured, changing])
     solution = np.linalg.lstsq(regressors, derived, rcond=None)[0]
     value = 100.0 * float(np.linalg.norm(derived - regressors @ solution)) / size
-    most = settings.velocity_shape_most_percent
+    most = settings.max_velocity_shape_percent
     fact = (
         f"from {band[0]:g} to {band[1]:.3g} Hz velocity_rad_s and the derivative of angle_rad "
         f"differ in shape by {in_full(value, limit=most)} % of its rms (at most {most:g} %)"

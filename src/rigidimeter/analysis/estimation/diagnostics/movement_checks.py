@@ -42,7 +42,7 @@ def voluntary_torque(voluntary_nm: Array, signals: Signals, settings: Diagnostic
     power = float(np.sum(share[lines_inside(frequency, (low, high))]))
     total = float(np.var(signals.torque_nm))
     value = 100.0 * power / total if total > 0 else float("nan")
-    most = settings.voluntary_share_most_percent
+    most = settings.max_voluntary_share_percent
     return at_most(
         value,
         most,
@@ -86,7 +86,7 @@ def active_movement(voluntary_nm: Array, signals: Signals, settings: Diagnostics
     above_nm = max(settings.active_torque_nm, share * float(np.std(signals.torque_nm)))
     active = sd_nm > above_nm
     value = 100.0 * float(np.mean(active)) if active.size else float("nan")
-    most = settings.active_most_percent
+    most = settings.max_active_percent
     when = ", ".join(f"{second:.1f} s" for second in start_s[active][:_SHOWN])
     more = " and later" if np.count_nonzero(active) > _SHOWN else ""
     return at_most(
@@ -104,7 +104,7 @@ def loop_bias(fit: Fit, unbiased: Array, settings: DiagnosticsSettings) -> Look:
     """Return how far the loop pulls least squares from the joint, in % of half the intervals."""
     bias = fit.value - unbiased
     value = 100.0 * float(np.max(np.abs(bias) / half_widths(fit)))
-    most = settings.loop_bias_most_percent
+    most = settings.max_loop_bias_percent
     if not np.isfinite(value):
         return at_most(value, most, "no J, B and K go with this torque in this loop")
     shares = 100.0 * bias / np.abs(fit.value)
@@ -141,7 +141,7 @@ def emg_activity(emg: Channel, settings: DiagnosticsSettings) -> Look:
     """
     envelope = emg_envelope_v(emg, settings.emg_window_s)
     baseline = float(np.quantile(envelope, BASELINE_QUANTILE))
-    factor, most = settings.emg_baseline_factor, settings.emg_active_most_percent
+    factor, most = settings.emg_baseline_factor, settings.max_emg_active_percent
     value = 100.0 * float(np.mean(envelope > factor * baseline))
     return at_most(
         value,

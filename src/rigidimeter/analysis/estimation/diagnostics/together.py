@@ -223,7 +223,7 @@ def lack_of_fit(
         As `misfits` gives them.
     settings : DiagnosticsSettings
     """
-    most = settings.lack_of_fit_most_percent
+    most = settings.max_lack_of_fit_percent
     sure = [part for part in found if part.p * len(found) < CHANCE and 100 * part.share > most]
     if not sure:
         return []

@@ -53,7 +53,7 @@ def tremor(voluntary_nm: Array, signals: Signals, settings: DiagnosticsSettings)
     value = 100.0 * float(running[at]) / variance if variance > 0 else math.nan
     near = slice(max(at - width // 2, 0), at + width // 2 + 1)
     centre_hz = float(np.average(frequency[near], weights=np.maximum(power[near], 1e-300)))
-    most = settings.tremor_share_most_percent
+    most = settings.max_tremor_share_percent
     return Look(
         value,
         most,

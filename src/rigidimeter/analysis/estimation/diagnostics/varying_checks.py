@@ -28,7 +28,7 @@ def varying_look(name: str, found: Variation, settings: DiagnosticsSettings) -> 
     """Return how far the parameters go with one thing, in % of their means."""
     if name not in found.p:
         return None
-    most = settings.varying_most_percent
+    most = settings.max_varying_percent
     changes = sorted(found.changes.get(name, []), key=lambda change: -change.percent)
     if not changes:
         p = p_text(found.p[name])

@@ -175,7 +175,7 @@ def test_the_guard_and_the_position_limit_are_counted(sound):
 
 
 def test_a_value_beyond_its_limit_does_not_read_as_the_limit():
-    most, least = SETTINGS.position_most_percent, SETTINGS.r_squared_least
+    most, least = SETTINGS.max_position_percent, SETTINGS.min_r_squared
     assert (most, least) == (98.0, 0.3)
     near = Channel("angle_rad", T, np.full(T.size, 0.49021))
     assert_failed(position_limit(near, 0.5, SETTINGS), "98.04 % of the position", "(at most 98 %)")

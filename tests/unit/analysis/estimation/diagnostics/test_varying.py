@@ -123,7 +123,7 @@ def test_a_change_below_the_share_that_is_set_is_no_finding(relaxed):
     drifting = with_torque(epoch, lambda t, angle: 0.25 * K * (t / 10 - 1) * angle)
     assert varying_findings(settings, drifting, "iv").keys() == {"varying_with_time"}
     lax = settings.model_copy(
-        update={"diagnostics": settings.diagnostics.model_copy(update={"varying_most_percent": 80})}
+        update={"diagnostics": settings.diagnostics.model_copy(update={"max_varying_percent": 80})}
     )
     assert varying_findings(lax, drifting, "iv") == {}
 
