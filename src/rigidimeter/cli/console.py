@@ -20,7 +20,7 @@ from rigidimeter.core.errors import UserError
 if TYPE_CHECKING:
     from rigidimeter.cli.planned_session import PlannedSession
     from rigidimeter.rig.acquisition.processes import Ended, Realtime
-    from rigidimeter.rig.console.page import Desk, StartRequest
+    from rigidimeter.rig.console.page import ServerState, StartRequest
 
 SHOWN_S = 3.0
 
@@ -64,7 +64,7 @@ def console(
     """
     from rigidimeter.core.settings import load_settings
     from rigidimeter.rig.acquisition.processes import Realtime, complete_left
-    from rigidimeter.rig.console.page import Desk, Place, extended
+    from rigidimeter.rig.console.page import Place, ServerState, extended
 
     for line in complete_left():
         echo(line, err=True)
@@ -73,12 +73,14 @@ def console(
     out.mkdir(parents=True, exist_ok=True)
     name = protocol.name if protocol is not None else "the defaults"
     place = Place(out.absolute(), settings, name, rig, settings_path=protocol)
-    desk = Desk(place)
-    for line in extended(desk.place):
+    server_state = ServerState(place)
+    for line in extended(server_state.place):
         echo(line)
-    with serving(desk, host, port, token):
-        while not desk.told_to_end:
-            lead_session(desk, desk.next_request(), Realtime(priority=priority, cpu=cpu))
+    with serving(server_state, host, port, token):
+        while not server_state.ending:
+            lead_session(
+                server_state, server_state.next_request(), Realtime(priority=priority, cpu=cpu)
+            )
 
 
 def run_on_page(
@@ -95,17 +97,17 @@ def run_on_page(
     UserError
         If the program was told to end before.
     """
-    from rigidimeter.rig.console.page import Desk, Place
+    from rigidimeter.rig.console.page import Place, ServerState
 
     require_page()
     out = out.absolute()
     out.parent.mkdir(parents=True, exist_ok=True)
     name = planned.source.name if planned.source is not None else "the defaults"
     source = planned.source
-    desk = Desk(Place(out.parent, planned.settings, name, rig, out.name, source))
-    with serving(desk, *address):
-        while not desk.told_to_end:
-            ended = lead_session(desk, desk.next_request(), realtime)
+    server_state = ServerState(Place(out.parent, planned.settings, name, rig, out.name, source))
+    with serving(server_state, *address):
+        while not server_state.ending:
+            ended = lead_session(server_state, server_state.next_request(), realtime)
             if ended is not None:
                 time.sleep(SHOWN_S)  # for the page to say how it ended
                 return ended
@@ -113,12 +115,14 @@ def run_on_page(
 
 
 @contextmanager
-def serving(desk: Desk, host: str, port: int, token: str) -> Iterator[None]:
+def serving(server_state: ServerState, host: str, port: int, token: str) -> Iterator[None]:
     """Serve the page meanwhile."""
     from rigidimeter.cli.rig_steps import rig_steps
-    from rigidimeter.rig.console.page import PageServer, Work
+    from rigidimeter.rig.console.page import Jobs, PageServer
 
-    server = PageServer(desk, Work(partial(rig_steps, desk.place.rig)), host, port, token)
+    server = PageServer(
+        server_state, Jobs(partial(rig_steps, server_state.place.rig)), host, port, token
+    )
     server.start()
     echo(f"Open {server.address} in a browser; Ctrl-C ends the program")
     try:
@@ -127,7 +131,9 @@ def serving(desk: Desk, host: str, port: int, token: str) -> Iterator[None]:
         server.stop()
 
 
-def lead_session(desk: Desk, request: StartRequest, realtime: Realtime) -> Ended | None:
+def lead_session(
+    server_state: ServerState, request: StartRequest, realtime: Realtime
+) -> Ended | None:
     """Run what the page asked for, and say on the page how it ended; None if it did not begin."""
     from rigidimeter.cli.planned_session import (
         checked_rig,
@@ -138,19 +144,19 @@ def lead_session(desk: Desk, request: StartRequest, realtime: Realtime) -> Ended
     from rigidimeter.core.session import count_epochs, rest_of
     from rigidimeter.rig.console.page import extended, in_buttons, next_buttons
 
-    folder, rig = desk.place.root / request.folder, desk.place.rig
+    folder, rig = server_state.place.root / request.folder, server_state.place.rig
     try:
-        planned = checked_rig(_planned(desk, request), rig)
+        planned = checked_rig(_planned(server_state, request), rig)
         require_packages(planned.settings)
         planned = planned.blinded() if planned.about.get("blinded") else planned
-        look = desk.console(planned.shown(virtual=rig is None), folder)
-        desk.refuse_stopped()
-        ended = run_planned(planned, folder, rig, realtime, look, desk.operator_seen_ns)
-        desk.told_to_end = bool(ended.signals)
+        look = server_state.console(planned.shown(virtual=rig is None), folder)
+        server_state.refuse_stopped()
+        ended = run_planned(planned, folder, rig, realtime, look, server_state.operator_seen_ns)
+        server_state.ending = bool(ended.signals)
         good, of = count_epochs(ended.folder)
         left = len(rest_of(ended.folder).epochs)
     except UserError as error:
-        desk.over(folder, "not run", tuple(map(in_buttons, error.lines)))
+        server_state.over(folder, "not run", tuple(map(in_buttons, error.lines)))
         for line in error.lines:
             echo(line, err=True)
         return None
@@ -159,25 +165,27 @@ def lead_session(desk: Desk, request: StartRequest, realtime: Realtime) -> Ended
         sentences.append(f"It ended with {ended.outcome or 'no outcome'}: {ended.reason}.")
     if planned.settings.sharing.nwb_at_close:
         sentences.append(write_nwb_beside(ended.folder))
-    sentences += [*ended.remarks, *extended(desk.place)]
+    sentences += [*ended.remarks, *extended(server_state.place)]
     echo(" ".join(sentences))
     sentences.append(next_buttons(closed=bool(ended.outcome), good=good, left=left))
-    desk.over(ended.folder, ended.outcome or "no outcome", tuple(map(in_buttons, sentences)))
+    server_state.over(
+        ended.folder, ended.outcome or "no outcome", tuple(map(in_buttons, sentences))
+    )
     return ended
 
 
-def _planned(desk: Desk, request: StartRequest) -> PlannedSession:
+def _planned(server_state: ServerState, request: StartRequest) -> PlannedSession:
     """Return what is to be run, in which a silent page is lost sooner than a silent terminal."""
     from rigidimeter.cli.planned_session import new_session, rest_of_session
     from rigidimeter.core.settings import changed_settings
     from rigidimeter.rig.console.page import SILENT_S
 
     if request.settings is None:
-        virtual = desk.place.rig is None
-        folder = desk.place.root / request.resume
+        virtual = server_state.place.rig is None
+        folder = server_state.place.root / request.resume
         planned = rest_of_session(folder, virtual=virtual, epoch=request.epoch, left=request.left)
     else:
-        planned = new_session(request.settings, request.about, desk.place.settings_path)
+        planned = new_session(request.settings, request.about, server_state.place.settings_path)
     lost_s = min(SILENT_S, planned.settings.loop.console_lost_s)
     settings = changed_settings(planned.settings, {"loop": {"console_lost_s": lost_s}})
     return replace(planned, settings=settings)

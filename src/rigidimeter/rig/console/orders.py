@@ -32,11 +32,11 @@ def order_of(text: str) -> Order | None:
             return Order(Command.CHANGE, words[1], float(words[2]))
         except ValueError:
             return None
-    said = " ".join(words).lower()
-    if said == "stop":  # in a hurry one types the word: it ends what moves, now
+    typed = " ".join(words).lower()
+    if typed == "stop":  # in a hurry one types the word: it ends what moves, now
         return Order(Command.ABORT)
     by_name = {command.name.lower().replace("_", " "): command for command in KEYS.values()}
-    command = (KEYS | by_name).get(said)
+    command = (KEYS | by_name).get(typed)
     return Order(command) if command is not None else None
 
 

@@ -22,8 +22,8 @@ from rigidimeter.rig.console import (
     RecentSamples,
     RecorderState,
     SessionPlan,
+    all_indicators,
     facts,
-    lamps,
     limit_distances,
     recent_samples,
 )
@@ -154,14 +154,14 @@ def test_distances_are_in_the_units_of_the_limits():
 
 def lit(loop=RUNNING, recent=QUIET, recorder=WELL, energy_j=0.5, left_s=60.0):
     distances = limit_distances(SETTINGS.guard, recent, energy_j)
-    made = lamps(SETTINGS, loop, recent, distances, recorder, left_s)
-    return {lamp.name: lamp for lamp in made}
+    made = all_indicators(SETTINGS, loop, recent, distances, recorder, left_s)
+    return {indicator.name: indicator for indicator in made}
 
 
 def test_all_lamps_are_good_and_say_what_they_know():
     found = lit()
     assert list(found) == ["limits", "sensor", "drive", "lateness", "recorder", "disk"]
-    assert {lamp.level for lamp in found.values()} == {Level.GOOD}
+    assert {indicator.level for indicator in found.values()} == {Level.GOOD}
     assert found["limits"].words == "angle 10.0 of 40 deg (25 %)"
     assert found["sensor"].words == "torque 1 ms old, limit 100 ms"
     assert found["lateness"].words == (
@@ -212,7 +212,7 @@ def test_a_lamp_tells_what_is_wrong(name, level, changed):
 )
 def test_the_lamp_of_a_cause_says_it(cause, names):
     found = lit(RUNNING._replace(cause=int(cause)))
-    assert [name for name, lamp in found.items() if lamp.level is Level.BAD] == names
+    assert [name for name, indicator in found.items() if indicator.level is Level.BAD] == names
     assert all(found[name].words == cause.sentence for name in names)
 
 
