@@ -109,8 +109,8 @@ EQUIVALENT: dict[str, str] = {
     "stop_report.py : if TYPE_CHECKING: ... → if False: ...": "it is never true where it runs",
     "stop_report.py _stalled: if math.isfinite(latched.measured): ... → if True: ...": "of a "
     "number and NaN after it the number is the larger",
-    "ramp.py ramp_to_rest: 0 → 1": RAMP,
-    "ramp.py ramp_to_rest: 0 → -1": RAMP,
+    "control_modes.py ramp_to_rest: 0 → 1": RAMP,
+    "control_modes.py ramp_to_rest: 0 → -1": RAMP,
     "ring_writer.py SharedSupervision.__init__: 3 → 4": "one look at both clocks more",
     "tick.py run_tick: 0 → 1": RAMP,
     "tick.py run_tick: 0 → -1": RAMP,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from rigidimeter.core.session import Sample
 from rigidimeter.core.settings import Settings
@@ -32,9 +32,6 @@ from rigidimeter.rig.guard import (
     outside,
 )
 
-if TYPE_CHECKING:
-    from rigidimeter.rig.acquisition.tick import ControlLoop
-
 
 class Latched(NamedTuple):
     """The tick at which the guard latched.
@@ -52,21 +49,6 @@ class Latched(NamedTuple):
     elapsed_ticks: int
     late_in_a_row: int
     measured: float
-
-    @classmethod
-    def of(cls, loop: ControlLoop, sample: Sample) -> Latched:
-        """Return what the loop knows of its last tick."""
-        return cls(
-            loop.settings,
-            sample,
-            loop.limits,
-            loop.guard,
-            loop.agreement,
-            loop.consistency,
-            loop.elapsed_ticks,
-            loop.late_in_a_row,
-            loop.supervision.measured,
-        )
 
 
 class Found(NamedTuple):

@@ -42,7 +42,6 @@ from rigidimeter.rig.guard import (
     guard_limits,
     guard_state,
     guard_step,
-    released,
 )
 
 REST = -1
@@ -173,13 +172,6 @@ def set_admittance(loop: ControlLoop, inertia_kg_m2: float, damping_nm_s_rad: fl
     ]
 
 
-def skip_passed_ticks(loop: ControlLoop) -> None:
-    """Leave out the ticks that went by while the rig was enabled, which takes its time."""
-    while (late := ticks_late(loop)) > 0:
-        loop.rig.read(late)
-        loop.tick += late
-
-
 def ticks_late(loop: ControlLoop) -> int:
     """Wait for the tick that is due, and return how many whole ticks late that is."""
     return math.floor(loop.clock.wait_until(loop.time_s) * loop.rate_hz) - loop.tick
@@ -221,16 +213,26 @@ def run_ticks(
     return TickResult(loop.limit_time_s, loop.cause, *counts, interrupted)
 
 
-def release(loop: ControlLoop) -> None:
-    """Let the loop go on after a hold; see `guard.released`."""
-    loop.guard, loop.stop = released(loop.guard), None
-
-
 def _account(loop: ControlLoop) -> None:
     """Say why the guard latched; the first cause is kept."""
     if loop.stop is None and loop.sample is not None:
-        loop.stop = stop_account(Latched.of(loop, loop.sample))
+        loop.stop = stop_account(latched_tick(loop, loop.sample))
         loop.latched(loop.stop, loop.sample.time_s)
+
+
+def latched_tick(loop: ControlLoop, sample: Sample) -> Latched:
+    """Return what the loop knows of its last tick."""
+    return Latched(
+        loop.settings,
+        sample,
+        loop.limits,
+        loop.guard,
+        loop.agreement,
+        loop.consistency,
+        loop.elapsed_ticks,
+        loop.late_in_a_row,
+        loop.supervision.measured,
+    )
 
 
 def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: int = 0) -> int:

@@ -22,7 +22,7 @@ from rigidimeter.rig.acquisition.processes import (
     SampleRing,
     SessionMemory,
     SharedStatus,
-    full_disk,
+    recorder,
     recover_from_rings,
 )
 
@@ -217,9 +217,9 @@ def disk(rig, monkeypatch):
     """Give what the recorder knows of its disk, and a clock that stands still."""
     clock = SimpleNamespace(now_s=1000.0)
     clock.monotonic = lambda: clock.now_s
-    monkeypatch.setattr(full_disk, "time", clock)
+    monkeypatch.setattr(recorder, "time", clock)
     recording = Recording(rig.folder, Settings(), virtual=True)
-    disk = full_disk.FullDisk(recording, rig.shared, Patience(), os.getppid())
+    disk = recorder.FullDisk(recording, rig.shared, Patience(), os.getppid())
     return disk, clock
 
 

@@ -17,6 +17,7 @@ from rigidimeter.rig.acquisition import (
     Found,
     Latched,
     StopAccount,
+    latched_tick,
     stop_account,
 )
 from rigidimeter.rig.guard import (
@@ -348,7 +349,7 @@ def test_what_the_loop_knows_of_its_last_tick_is_taken():
     loop.elapsed_ticks, loop.late_in_a_row = 3, 2
     loop.supervision.measured = 0.7
     sample = latched(Cause.SIGNAL).sample
-    found = Latched.of(loop, sample)
+    found = latched_tick(loop, sample)
     assert found.sample is sample
     assert (found.settings, found.limits, found.guard) == (SETTINGS, loop.limits, loop.guard)
     assert (found.agreement, found.consistency) == (loop.agreement, loop.consistency)

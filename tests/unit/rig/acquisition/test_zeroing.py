@@ -7,7 +7,7 @@ from tests.unit.rig.acquisition.exact_rig import Desk
 from tests.unit.rig.acquisition.whole_session import RATE_HZ, SENSOR, VALUES, session
 
 from rigidimeter.core.settings import parse_settings
-from rigidimeter.rig.acquisition import FEWEST_ZEROING_SAMPLES, Command, moved
+from rigidimeter.rig.acquisition import MIN_ZEROING_SAMPLES, Command, moved
 from rigidimeter.rig.devices.base import Reading
 from rigidimeter.rig.guard import Cause
 
@@ -119,7 +119,7 @@ def test_an_angle_that_changes_by_one_step_of_its_sensor_is_no_motion(moved_deg,
 
 def test_ten_samples_are_enough():
     """Each is read twice."""
-    assert round(VALUES["zeroing"]["duration_s"] * RATE_HZ) == 2 * FEWEST_ZEROING_SAMPLES
+    assert round(VALUES["zeroing"]["duration_s"] * RATE_HZ) == 2 * MIN_ZEROING_SAMPLES
 
     def change(k, reading):
         return reading._replace(torque_time_s=(k - k % 2) / RATE_HZ)

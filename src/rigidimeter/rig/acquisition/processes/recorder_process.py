@@ -4,7 +4,7 @@ A write only gives the samples to the system. A thread has the files put on the 
 that up for long; the recorder asks it, goes on writing, and looks later what came of it.
 
 It beats its heart between any two writes. A disk that does not take a write is tried again and
-again, and the operator told so (`full_disk`). When the loop has ended, or is not heard of, the
+again, and the operator told so (`FullDisk`). When the loop has ended, or is not heard of, the
 session is closed with that as the reason.
 """
 
@@ -21,8 +21,7 @@ from contextlib import suppress
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import SessionWriter
 from rigidimeter.rig.acquisition.processes.end_signals import raise_flags
-from rigidimeter.rig.acquisition.processes.full_disk import FullDisk
-from rigidimeter.rig.acquisition.processes.recorder import Patience, Recorder, Recording
+from rigidimeter.rig.acquisition.processes.recorder import FullDisk, Patience, Recorder, Recording
 from rigidimeter.rig.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.rig.acquisition.processes.shared_status import SharedStatus
 from rigidimeter.rig.acquisition.processes.status_values import Condition, Flag, Role

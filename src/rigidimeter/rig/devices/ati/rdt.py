@@ -44,7 +44,7 @@ from rigidimeter.rig.devices.ati.sample_clock import LONGEST_DELAY_S
 from rigidimeter.rig.devices.base import DeviceError, DeviceFacts, Now, TorqueSample
 from rigidimeter.rig.guard import Cause
 
-MOST_PACKETS_A_READ = 256
+MAX_PACKETS_A_READ = 256
 """Limit of one read, well below a tick; further packets are left for the next read."""
 
 RECEIVE_BUFFER = (socket.SOL_SOCKET, socket.SO_RCVBUF)
@@ -158,7 +158,7 @@ class AtiRdt:
         touched = backlog = False
         before_s = stream.sampled_s
         try:
-            for _ in range(MOST_PACKETS_A_READ):
+            for _ in range(MAX_PACKETS_A_READ):
                 size, notes, _, source = wire.recvmsg_into(buffers, NOTE_BYTES)
                 if source == sensor:
                     touched = True

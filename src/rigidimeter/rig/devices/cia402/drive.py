@@ -45,7 +45,7 @@ from rigidimeter.rig.devices.cia402.state_words import (
 )
 from rigidimeter.rig.guard import Cause
 
-MOST_FRAMES_A_READ = 400
+MAX_FRAMES_A_READ = 400
 """A full bus at 1 Mbit/s brings 18 frames a ms, which is 364 in a tick of 20 ms."""
 
 
@@ -190,7 +190,7 @@ class Cia402Drive:
     def read(self) -> MotionSample:
         """Return the newest sample without waiting; the previous one if there is no new one."""
         wire = self._wire
-        for _ in range(MOST_FRAMES_A_READ):
+        for _ in range(MAX_FRAMES_A_READ):
             if not wire.receive():
                 break
         else:
