@@ -51,8 +51,8 @@ EQUIVALENT: dict[str, str] = {
     SIGN + "whitened: 0.0 → -0.001 #2": OF_NOTHING,
     SIGN + "solved_for: 0 → 1": SQUARE,
     SIGN + "solved_for: 0 → -1": SQUARE,
-    CAN + "_check_watchdog: now_s - min(wire.told_s, wire.asked_s) > self._stops_itself_s → "
-    "now_s - min(wire.told_s, wire.asked_s) >= self._stops_itself_s": MOMENT,
+    CAN + "_check_watchdog: now_s - min(wire.commanded_s, wire.asked_s) > self._stops_itself_s → "
+    "now_s - min(wire.commanded_s, wire.asked_s) >= self._stops_itself_s": MOMENT,
     CAN + "_find_cause: now_s - wire.heard_s > settings.heartbeat_s + settings.lost_s → "
     "now_s - wire.heard_s >= settings.heartbeat_s + settings.lost_s": MOMENT,
     CAN + "_find_cause: now_s > self._settled_s → now_s >= self._settled_s": MOMENT,
@@ -84,7 +84,8 @@ EQUIVALENT: dict[str, str] = {
     "step.py _stoppable_speed: distance_rad <= 0.0 → distance_rad < 0.0": "the root gives 0, too",
     "session_run.py run_session: 0 → 1": "the next number where no epoch is planned: none repeats",
     "session_run.py run_session: 0 → -1": "the next number where no epoch is planned: none repeats",
-    "zeroing.py moved: range_deg <= limit_deg + settings.rig.motion.angle_resolution_deg → "
+    "zeroing.py motion_objection: "
+    "range_deg <= limit_deg + settings.rig.motion.angle_resolution_deg → "
     "range_deg < limit_deg + settings.rig.motion.angle_resolution_deg": MOMENT,
     LOOP + "self.elapsed_ticks = 1 → pass": SET,
     LOOP + "1 → 2": SET,
@@ -106,7 +107,6 @@ EQUIVALENT: dict[str, str] = {
     "sent as it was allowed is the guard's velocity already",
     "tick.py run_tick: loop.limit_time_s <= due_s → loop.limit_time_s < due_s": "a later tick is "
     "due later",
-    "stop_report.py : if TYPE_CHECKING: ... → if False: ...": "it is never true where it runs",
     "stop_report.py _stalled: if math.isfinite(latched.measured): ... → if True: ...": "of a "
     "number and NaN after it the number is the larger",
     "control_modes.py ramp_to_rest: 0 → 1": RAMP,

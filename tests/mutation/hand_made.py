@@ -257,7 +257,7 @@ HAND_MADE = tuple(
         ),
         (
             SESSION,
-            "why or moved(readings, session.settings)",
+            "why or motion_objection(readings, session.settings)",
             "why",
             "zeroed while the joint moves",
         ),

@@ -69,7 +69,7 @@ def unchanged(path: Path) -> Mutant:
 
 def title(path: Path) -> str:
     """Return the name of a module; two drivers have one called the same."""
-    devices = PACKAGE / "devices"
+    devices = PACKAGE / "rig" / "devices"
     return str(path.relative_to(devices)) if path.is_relative_to(devices) else path.name
 
 

@@ -29,7 +29,7 @@ ATTEMPTS, ATTEMPT_S = 50, 0.002
 """How often, and at what interval, the first samples after enabling are polled."""
 
 
-SAMPLES_KEPT_S = 1.0
+BUFFERED_S = 1.0
 """A sensor's samples of a longer time than this may not fit into the buffer of its connection."""
 
 
@@ -163,11 +163,11 @@ class ComposedRig:
                     f"drive: {Cause(motion.cause).sentence} as soon as it was enabled; put that "
                     "right first"
                 )
-            if torque.cause and took_s > SAMPLES_KEPT_S:
+            if torque.cause and took_s > BUFFERED_S:
                 raise DeviceError(
                     f"drive: it took {took_s:.1f} s to be enabled, so late are its answers, and "
                     "the torque sensor's samples of that time were lost; it must take less than "
-                    f"{SAMPLES_KEPT_S:g} s, so find what keeps the drive or its bus busy"
+                    f"{BUFFERED_S:g} s, so find what keeps the drive or its bus busy"
                 )
             if fresh and math.isfinite(motion.angle_rad):
                 return motion.angle_rad

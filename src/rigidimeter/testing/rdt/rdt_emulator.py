@@ -32,7 +32,7 @@ from rigidimeter.testing.rdt.rdt_records import (
 )
 from rigidimeter.testing.rdt.rdt_web_page import (
     PageFacts,
-    PageServer,
+    SensorPageServer,
     page_text,
     page_with_faults,
 )
@@ -108,7 +108,7 @@ class RdtEmulator:
         self._wire.bind((self.address, self.port))
         self.port = self._wire.getsockname()[1]
         self._foreign = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._http = PageServer(
+        self._http = SensorPageServer(
             (self.address, self.http_port), self._page_now, self.fault, self._ending
         )
         self.http_port = self._http.server_address[1]

@@ -36,8 +36,8 @@ from rigidimeter.rig.devices.ati.rdt_packets import (
 from rigidimeter.rig.devices.ati.rdt_setup import (
     AtiRdtSettings,
     SensorPage,
-    changes,
     fetch_page,
+    page_changes,
     refuse_unexpected,
 )
 from rigidimeter.rig.devices.ati.sample_clock import LONGEST_DELAY_S
@@ -242,7 +242,7 @@ class AtiRdt:
 
     def _check(self, page: SensorPage) -> None:
         refuse_unexpected(self._settings, page, self._device)
-        changed = changes(self._page, page) if self._page is not None else ""
+        changed = page_changes(self._page, page) if self._page is not None else ""
         if changed:
             raise DeviceError(
                 f"{self._device}: it came back changed ({changed}); set it back, or check it and "
