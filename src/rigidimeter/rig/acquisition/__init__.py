@@ -23,7 +23,7 @@ from rigidimeter.rig.acquisition.run_states import (
 )
 from rigidimeter.rig.acquisition.session_run import SessionResult, run_session
 from rigidimeter.rig.acquisition.stop_remedies import REMEDIES, SUSPENDED
-from rigidimeter.rig.acquisition.stop_report import Found, Latched, StopAccount, stop_account
+from rigidimeter.rig.acquisition.stop_report import Found, Latched, StopReport, report_stop
 from rigidimeter.rig.acquisition.tick import (
     REST,
     ControlLoop,
@@ -35,5 +35,5 @@ from rigidimeter.rig.acquisition.zeroing import (
     MIN_ZEROING_SAMPLES,
     angle_range_deg,
     bias_and_noise,
-    moved,
+    motion_objection,
 )

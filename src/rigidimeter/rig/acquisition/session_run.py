@@ -26,13 +26,13 @@ from rigidimeter.rig.acquisition.run_states import Command, Run, State, after, e
 from rigidimeter.rig.acquisition.session_end import end_session
 from rigidimeter.rig.acquisition.supervision import Sink, Supervision
 from rigidimeter.rig.acquisition.tick import ControlLoop
-from rigidimeter.rig.acquisition.zeroing import bias_and_noise, moved
+from rigidimeter.rig.acquisition.zeroing import bias_and_noise, motion_objection
 from rigidimeter.rig.devices.base import Reading, Rig
 from rigidimeter.rig.guard import Cause, Reaction, why_ended
 
 BeforeEpoch = Callable[[PlannedEpoch], Mapping[str, Any]]
 
-LOOK_S = 0.1
+POLL_S = 0.1
 """A paused run looks so often whether it may go on."""
 
 
@@ -177,10 +177,10 @@ def _ready_for_epoch(session: _Session) -> bool:
             if not run.may_go_on():
                 return False
         while run.is_in(State.PAUSED):
-            if not _look(run):
+            if not _stand_by(run):
                 return False
         while run.is_in(State.RUNNING) and not loop.at_rest:
-            if not _look(run):
+            if not _stand_by(run):
                 return False
         if run.is_in(State.RUNNING):
             release(loop)
@@ -192,13 +192,13 @@ def _ready_for_epoch(session: _Session) -> bool:
     return run.is_in(State.RUNNING)
 
 
-def _look(run: ControllerRun) -> bool:
+def _stand_by(run: ControllerRun) -> bool:
     """Stand still for a moment; return whether the run goes on.
 
     A hold that comes meanwhile pauses it again: what was ordered before it does not end it.
     """
     before = run.loop.reaction
-    hold(run.loop, LOOK_S)
+    hold(run.loop, POLL_S)
     return run.loop.reaction is before or run.may_go_on()
 
 
@@ -275,7 +275,7 @@ def _zero_sensor(session: _Session) -> bool:
         if not _ready_for_epoch(session):
             return False
     bias_nm, noise_sd_nm, why = bias_and_noise(readings, limits)
-    why = why or moved(readings, session.settings)
+    why = why or motion_objection(readings, session.settings)
     session.sink.event(
         "sensor_zeroed",
         time_s=run.loop.time_s,

@@ -68,7 +68,7 @@ class Found(NamedTuple):
     device: str = ""
 
 
-class StopAccount(NamedTuple):
+class StopReport(NamedTuple):
     """What a stop or a hold says of itself."""
 
     cause: Cause
@@ -110,14 +110,14 @@ class StopAccount(NamedTuple):
         }
 
 
-def stop_account(latched: Latched) -> StopAccount:
+def report_stop(latched: Latched) -> StopReport:
     """Return what a stop says, from the tick at which the guard latched."""
     cause = Cause(latched.guard.cause)
     find = _FOUND.get(cause)
     remedy = REMEDIES[cause]
     if cause is Cause.STALLED and latched.measured > latched.settings.loop.stall_s:
         remedy = SUSPENDED
-    return StopAccount(cause, find(latched) if find else Found(), remedy)
+    return StopReport(cause, find(latched) if find else Found(), remedy)
 
 
 def _time(seconds: float) -> str:

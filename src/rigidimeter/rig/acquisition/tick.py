@@ -28,7 +28,7 @@ from rigidimeter.model import (
 )
 from rigidimeter.rig.acquisition.clock import Clock
 from rigidimeter.rig.acquisition.run_states import Command, Order
-from rigidimeter.rig.acquisition.stop_report import Latched, StopAccount, stop_account
+from rigidimeter.rig.acquisition.stop_report import Latched, StopReport, report_stop
 from rigidimeter.rig.acquisition.supervision import NoSupervision, Supervision
 from rigidimeter.rig.devices.base import Reading, Rig
 from rigidimeter.rig.guard import (
@@ -105,7 +105,7 @@ class ControlLoop:
         progress: Callable[[float], None] = lambda _: None,
         supervision: Supervision | None = None,
         take_order: Callable[[Order], bool] = lambda _: False,
-        latched: Callable[[StopAccount, float], None] = lambda _, __: None,
+        latched: Callable[[StopReport, float], None] = lambda _, __: None,
     ) -> None:
         controller = settings.controller
         self.rig, self.clock, self.record = rig, clock, record
@@ -134,7 +134,7 @@ class ControlLoop:
         self.limit_time_s = math.nan
         self.angle_rad = 0.0
         self.sample: Sample | None = None
-        self.stop: StopAccount | None = None
+        self.stop: StopReport | None = None
 
     @property
     def time_s(self) -> float:
@@ -216,7 +216,7 @@ def run_ticks(
 def _account(loop: ControlLoop) -> None:
     """Say why the guard latched; the first cause is kept."""
     if loop.stop is None and loop.sample is not None:
-        loop.stop = stop_account(latched_tick(loop, loop.sample))
+        loop.stop = report_stop(latched_tick(loop, loop.sample))
         loop.latched(loop.stop, loop.sample.time_s)
 
 
@@ -265,7 +265,7 @@ def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: i
         loop.guard = loop.guard._replace(velocity_rad_s=0.0)
     was_cut = loop.guard.reaction
     motion_age_s, torque_age_s = due_s - motion_s, due_s - torque_s
-    loop.consistency, apart = consistency_step(
+    loop.consistency, disagreement = consistency_step(
         loop.agreement,
         loop.consistency,
         loop.guard.velocity_rad_s,
@@ -289,7 +289,7 @@ def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: i
         # A loop that stood still comes first: the drive's own watchdog follows from it.
         _stronger(_stronger(late, reading.cause), from_outside),
         loop.elapsed_ticks,
-        apart,
+        disagreement,
     )
     # The guard has counted this tick. Where one of the calls below fails, what follows is due at
     # the next tick: the velocity may change by one tick's worth only once a tick.

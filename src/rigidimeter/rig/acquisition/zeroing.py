@@ -48,7 +48,7 @@ def bias_and_noise(
     return bias_nm, noise_sd_nm, why
 
 
-def moved(readings: Sequence[Reading], settings: Settings) -> str:
+def motion_objection(readings: Sequence[Reading], settings: Settings) -> str:
     """Return why a torque is none at rest, if so: a joint in motion needs torque by itself."""
     limit_deg = settings.zeroing.motion_limit_deg
     range_deg = angle_range_deg(readings)

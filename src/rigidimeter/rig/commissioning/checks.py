@@ -65,7 +65,7 @@ def above(name: str, value: float, unit: str, limit: float, remedy: str) -> RigC
     return _check(name, value, unit, f"at least {with_unit(limit, unit)}", value >= limit, remedy)
 
 
-def within_percent(
+def within_tolerance(
     name: str, value: float, unit: str, wanted: float, percent: float, remedy: str
 ) -> RigCheck:
     """Return the check that a number is as wanted, but for so many percent."""

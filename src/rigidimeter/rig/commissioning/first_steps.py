@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rigidimeter.core.settings import Settings
-from rigidimeter.rig.acquisition import angle_range_deg, bias_and_noise, moved
+from rigidimeter.rig.acquisition import angle_range_deg, bias_and_noise, motion_objection
 from rigidimeter.rig.commissioning.checks import RigCheck, impossible, with_unit, yes
 from rigidimeter.rig.commissioning.motion_tests import (
     COMPLETED,
@@ -191,5 +191,5 @@ def zero_check(setup: Setup) -> ZeroFound:
     finally:
         rig.close()
     bias_nm, noise_sd_nm, why = bias_and_noise(readings, settings.zeroing)
-    why = why or moved(readings, settings)
+    why = why or motion_objection(readings, settings)
     return ZeroFound(bias_nm, noise_sd_nm, angle_range_deg(readings), why)

@@ -11,7 +11,13 @@ import math
 
 import numpy as np
 
-from rigidimeter.rig.commissioning.checks import RigCheck, impossible, untried, within_percent, yes
+from rigidimeter.rig.commissioning.checks import (
+    RigCheck,
+    impossible,
+    untried,
+    within_tolerance,
+    yes,
+)
 from rigidimeter.rig.commissioning.trials import (
     Operator,
     Setup,
@@ -49,7 +55,7 @@ def known_angle(setup: Setup) -> RigCheck:
         return impossible(ANGLE, limit, "the operator did not do it")
     turned_deg = math.degrees(_angle_rad(setup) - before_rad)
     operator.ask("Turn it back to where it was. Done?")
-    return within_percent(ANGLE, turned_deg, "deg", wanted_deg, percent, _WRONG_SCALE)
+    return within_tolerance(ANGLE, turned_deg, "deg", wanted_deg, percent, _WRONG_SCALE)
 
 
 def known_torque(setup: Setup) -> RigCheck:
@@ -74,7 +80,7 @@ def known_torque(setup: Setup) -> RigCheck:
     late = readings.torque_nm[readings.time_s > SETTLE_S]
     value = -float(np.nanmedian(late) - np.nanmedian(before)) if len(late) else math.nan
     operator.ask("Take the torque off again. Done?")
-    return within_percent(TORQUE, value, "N·m", known_nm, percent, _WRONG_SCALE)
+    return within_tolerance(TORQUE, value, "N·m", known_nm, percent, _WRONG_SCALE)
 
 
 _WRONG_SCALE = (

@@ -21,7 +21,7 @@ from rigidimeter.rig.commissioning.checks import (
     above,
     below,
     impossible,
-    within_percent,
+    within_tolerance,
     yes,
 )
 from rigidimeter.rig.commissioning.response import (
@@ -74,7 +74,7 @@ def steps(settings: Settings) -> Array:
 def small_move_check(result: TrialResult, settings: Settings) -> RigCheck:
     """Check direction and rough scale of the first motion, and its velocity if that ended it."""
     found = following(result.readings, settings.rig.drive_damping_ratio)
-    check = within_percent(
+    check = within_tolerance(
         ANGLE_PER_COMMAND, found.scale, "1", 1.0, SMALL_MOVE_PERCENT, _SCALE_REMEDY
     )
     if result.cause is Cause.VELOCITY_WRONG and check.passed:
@@ -106,7 +106,7 @@ def swing_checks(result: TrialResult, settings: Settings) -> tuple[list[RigCheck
             "yes",
             _REASON_REMEDY,
         ),
-        within_percent(ANGLE_PER_COMMAND, found.scale, "1", 1.0, percent, _SCALE_REMEDY),
+        within_tolerance(ANGLE_PER_COMMAND, found.scale, "1", 1.0, percent, _SCALE_REMEDY),
         _velocity_check(readings, settings),
         below(
             "following error",
@@ -122,7 +122,7 @@ def swing_checks(result: TrialResult, settings: Settings) -> tuple[list[RigCheck
 def _velocity_check(readings: Readings, settings: Settings) -> RigCheck:
     percent = settings.commissioning.scale_tolerance_percent
     found = velocity_per_angle(readings)
-    return within_percent(VELOCITY_PER_ANGLE, found, "1", 1.0, percent, _VELOCITY_REMEDY)
+    return within_tolerance(VELOCITY_PER_ANGLE, found, "1", 1.0, percent, _VELOCITY_REMEDY)
 
 
 def torque_sign(

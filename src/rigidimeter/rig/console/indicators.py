@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.core.settings import GuardSettings, Settings
 from rigidimeter.core.units import deg_from_rad
-from rigidimeter.rig.acquisition.processes import ROW, Condition, LoopStatus
+from rigidimeter.rig.acquisition.processes import ROW, LoopStatus, ProcessCondition
 from rigidimeter.rig.guard import Cause, Limited
 
 RECENT_S = 1.0
@@ -169,7 +169,7 @@ class RecorderState:
 
     Attributes
     ----------
-    condition : Condition
+    condition : ProcessCondition
     note : str
         The recorder's last sentence.
     age_s : float
@@ -180,7 +180,7 @@ class RecorderState:
         Room where is recorded.
     """
 
-    condition: Condition = Condition.ABSENT
+    condition: ProcessCondition = ProcessCondition.ABSENT
     note: str = ""
     age_s: float = math.inf
     waiting: int = 0
@@ -278,14 +278,14 @@ def _lateness(settings: Settings, loop: LoopStatus, recent: RecentSamples) -> In
 def _recorder(settings: Settings, recorder: RecorderState) -> Indicator:
     condition, limit_s = recorder.condition, settings.loop.recorder_lost_s
     waiting_s = recorder.waiting / settings.rig.tick_rate_hz
-    if condition is Condition.FAILED:
+    if condition is ProcessCondition.FAILED:
         return Indicator("recorder", Level.BAD, recorder.note or "it has given up")
-    if condition in (Condition.ABSENT, Condition.STARTING):
+    if condition in (ProcessCondition.ABSENT, ProcessCondition.STARTING):
         return Indicator("recorder", Level.UNKNOWN, "starts")
-    if condition is Condition.DONE:
+    if condition is ProcessCondition.DONE:
         return Indicator("recorder", Level.GOOD, "all is in the file")
     words = f"{waiting_s:.1f} s of samples wait, limit {limit_s:g} s"
-    if condition is Condition.TROUBLE:
+    if condition is ProcessCondition.TROUBLE:
         return Indicator("recorder", Level.BAD, f"the disk takes nothing; {words}")
     if recorder.age_s > 0.5 * limit_s:
         silent = f"not heard of for {recorder.age_s:.1f} s, limit {limit_s:g} s"

@@ -14,7 +14,13 @@ from collections.abc import Callable
 from typing import IO
 
 from rigidimeter.rig.acquisition import Command, Order
-from rigidimeter.rig.acquisition.processes import Condition, Flag, Role, SessionMemory, SharedStatus
+from rigidimeter.rig.acquisition.processes import (
+    Flag,
+    ProcessCondition,
+    Role,
+    SessionMemory,
+    SharedStatus,
+)
 from rigidimeter.rig.console.indicators import Level
 from rigidimeter.rig.console.observer import Observer
 from rigidimeter.rig.console.orders import order_of, save_to
@@ -96,7 +102,7 @@ class LineView:
         notes = [
             status.note(role)
             for role in (Role.RECORDER, Role.ESTIMATOR)
-            if status.condition(role) is Condition.TROUBLE
+            if status.condition(role) is ProcessCondition.TROUBLE
         ]
         texts = tuple(filter(None, (facts.stop_words, *self._observer.cautions, *notes)))
         for text in texts:

@@ -57,7 +57,7 @@ class Observer:
         """Return the facts now."""
         self._read_events()
         rate_hz = self._plan.settings.rig.tick_rate_hz
-        rows, _ = self._samples.read(most=round(RECENT_S * rate_hz))
+        rows, _ = self._samples.read(max_rows=round(RECENT_S * rate_hz))
         rows = np.concatenate((self._rows, rows))
         if rows.size:
             rows = rows[rows["time_s"] > rows["time_s"][-1] - RECENT_S]

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from rigidimeter.rig.acquisition import Command, Order
-from rigidimeter.rig.acquisition.processes import Condition, Role, SharedStatus
+from rigidimeter.rig.acquisition.processes import ProcessCondition, Role, SharedStatus
 
 KEYS = {
     "p": Command.PAUSE,
@@ -71,7 +71,7 @@ def _note(text: str, status: SharedStatus) -> str:
 
 def save_to(name: str, status: SharedStatus) -> str:
     """Ask the recorder for another folder, if it can write nothing to the one it has."""
-    if status.condition(Role.RECORDER) is not Condition.TROUBLE:
+    if status.condition(Role.RECORDER) is not ProcessCondition.TROUBLE:
         return "the recorder can write: another folder is for when it cannot"
     folder = Path(name).expanduser()
     try:

@@ -16,9 +16,9 @@ from rigidimeter.rig.acquisition import (
     SUSPENDED,
     Found,
     Latched,
-    StopAccount,
+    StopReport,
     latched_tick,
-    stop_account,
+    report_stop,
 )
 from rigidimeter.rig.guard import (
     OLD_SHARE,
@@ -88,7 +88,7 @@ def latched(cause, **changed):
 
 
 def told(cause, **changed):
-    return stop_account(latched(cause, **changed)).found
+    return report_stop(latched(cause, **changed)).found
 
 
 def same(found, expected):
@@ -268,8 +268,8 @@ def test_what_was_found_outside_of_the_loop(cause, expected):
     ],
 )
 def test_a_suspension_has_a_remedy_of_its_own(measured, remedy):
-    assert stop_account(latched(Cause.STALLED, measured=measured)).remedy == remedy
-    silent = stop_account(latched(Cause.CONSOLE_LOST, measured=measured))
+    assert report_stop(latched(Cause.STALLED, measured=measured)).remedy == remedy
+    silent = report_stop(latched(Cause.CONSOLE_LOST, measured=measured))
     assert silent.remedy == REMEDIES[Cause.CONSOLE_LOST]
 
 
@@ -325,7 +325,7 @@ def test_how_far_the_angle_is_from_what_was_sent(age_ticks):
     ],
 )
 def test_a_sentence_tells_what_is_known(found, said):
-    account = StopAccount(Cause.ENERGY_HIGH, found, "do this")
+    account = StopReport(Cause.ENERGY_HIGH, found, "do this")
     assert account.sentence == f"{Cause.ENERGY_HIGH.sentence}{said}; do this"
     facts = account.facts()
     assert facts["sentence"] == account.sentence

@@ -12,9 +12,9 @@ from rigidimeter.rig.acquisition.processes import (
     PAUSE_NEXT,
     ROW,
     STOP_NEXT,
-    Condition,
     LiveEstimate,
     LoopStatus,
+    ProcessCondition,
 )
 from rigidimeter.rig.console import (
     Facts,
@@ -35,8 +35,8 @@ RUNNING = LoopStatus(State.RUNNING, 30_000, 1, time_s=30.0, angle_rad=0.1, until
 QUIET = RecentSamples(
     1000, 0.5, math.radians(10), math.radians(50), 1.0, 0.8, 1e-4, 1e-3, 2e-3, 0, 0, False
 )
-SMALL_DISK = RecorderState(Condition.RUNNING, "", 0.1, 0, 0, 5 * 10**8)
-WELL = RecorderState(Condition.RUNNING, "", 0.05, 100, 500, 40 * 10**9)
+SMALL_DISK = RecorderState(ProcessCondition.RUNNING, "", 0.1, 0, 0, 5 * 10**8)
+WELL = RecorderState(ProcessCondition.RUNNING, "", 0.05, 100, 500, 40 * 10**9)
 
 
 def shown(progress, loop=RUNNING, plan=PLAN, **more) -> Facts:
@@ -183,14 +183,18 @@ def test_all_lamps_are_good_and_say_what_they_know():
         ("sensor", Level.UNKNOWN, {"recent": RecentSamples()}),
         ("drive", Level.WATCH, {"recent": QUIET._replace(motion_age_s=0.06)}),
         ("lateness", Level.WATCH, {"recent": QUIET._replace(largest_lateness_s=2e-3)}),
-        ("recorder", Level.WATCH, {"recorder": RecorderState(Condition.RUNNING, "", 0.1, 1500)}),
-        ("recorder", Level.WATCH, {"recorder": RecorderState(Condition.RUNNING, "", 1.5)}),
-        ("recorder", Level.BAD, {"recorder": RecorderState(Condition.TROUBLE, "full", 0.1)}),
-        ("recorder", Level.BAD, {"recorder": RecorderState(Condition.FAILED)}),
+        (
+            "recorder",
+            Level.WATCH,
+            {"recorder": RecorderState(ProcessCondition.RUNNING, "", 0.1, 1500)},
+        ),
+        ("recorder", Level.WATCH, {"recorder": RecorderState(ProcessCondition.RUNNING, "", 1.5)}),
+        ("recorder", Level.BAD, {"recorder": RecorderState(ProcessCondition.TROUBLE, "full", 0.1)}),
+        ("recorder", Level.BAD, {"recorder": RecorderState(ProcessCondition.FAILED)}),
         ("recorder", Level.UNKNOWN, {"recorder": RecorderState()}),
-        ("recorder", Level.GOOD, {"recorder": RecorderState(Condition.DONE)}),
-        ("disk", Level.BAD, {"recorder": RecorderState(Condition.TROUBLE, "full", 0.1)}),
-        ("disk", Level.UNKNOWN, {"recorder": RecorderState(Condition.RUNNING)}),
+        ("recorder", Level.GOOD, {"recorder": RecorderState(ProcessCondition.DONE)}),
+        ("disk", Level.BAD, {"recorder": RecorderState(ProcessCondition.TROUBLE, "full", 0.1)}),
+        ("disk", Level.UNKNOWN, {"recorder": RecorderState(ProcessCondition.RUNNING)}),
         # An hour at 1000 samples of 152 bytes a second is 547 MB.
         ("disk", Level.WATCH, {"recorder": SMALL_DISK, "left_s": 3600.0}),
     ],

@@ -31,7 +31,7 @@ from rigidimeter.rig.guard import Cause
 if TYPE_CHECKING:
     from pylsl import StreamInfo, StreamOutlet
 
-LOOK_S = 0.05
+POLL_S = 0.05
 LINGER_S = 0.5
 """How long the streams stay after the session, so that all is fetched."""
 NICENESS = 5
@@ -169,7 +169,7 @@ def _send(streams: Streams, shared: SessionMemory, lost_s: float, console_pid: i
         streams.samples(rows)
         if over:
             return
-        time.sleep(LOOK_S)
+        time.sleep(POLL_S)
 
 
 def _events(shared: SessionMemory, first: int, stop: int) -> Sequence[Mapping[str, Any]]:

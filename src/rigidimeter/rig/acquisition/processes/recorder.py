@@ -37,14 +37,14 @@ from rigidimeter.core.session import (
 from rigidimeter.core.settings import Settings
 from rigidimeter.rig.acquisition.processes.ring import ROW, Event
 from rigidimeter.rig.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.rig.acquisition.processes.status_values import Condition, Flag, Role
+from rigidimeter.rig.acquisition.processes.status_values import Flag, ProcessCondition, Role
 
-SAID_S = 5.0
+REPORT_S = 5.0
 """How often the operator is told how many samples wait."""
 
 
 @dataclass(frozen=True)
-class Recording:
+class RecordingPlan:
     """What is recorded, and where: the arguments of a `SessionWriter`."""
 
     folder: Path
@@ -80,7 +80,7 @@ class Patience:
 
     Attributes
     ----------
-    look_s : float
+    poll_s : float
         The recorder looks into the rings so often.
     loop_lost_s : float
         A loop that runs and has not been heard of for so long has stopped answering.
@@ -95,7 +95,7 @@ class Patience:
         A process that has not been heard of for so long is ended.
     """
 
-    look_s: float = BATCH_S
+    poll_s: float = BATCH_S
     loop_lost_s: float = 1.0
     stopping_s: float = 10.0
     sync_s: float = 1.0
@@ -126,7 +126,7 @@ class Recorder:
         self._open_epoch: int | None = None
         self._last_time_s = 0.0
         self._own: deque[bytes] = deque()
-        self._loss_told = False
+        self._loss_reported = False
         self.closing = False
         self.ended = False
         self.epoch_ended = False
@@ -159,10 +159,10 @@ class Recorder:
         """Have the next `drain` close an open epoch and the session with fail and a reason."""
         if self.closing:
             return
-        self._tell_loss()
+        self._report_loss()
         if self._open_epoch is not None:
-            self._tell("epoch_ended", epoch=self._open_epoch, outcome="fail", reason=reason)
-        self._tell("session_ended", outcome="fail", reason=reason)
+            self._add("epoch_ended", epoch=self._open_epoch, outcome="fail", reason=reason)
+        self._add("session_ended", outcome="fail", reason=reason)
         self.closing = True
 
     def move(self, writer: SessionWriter) -> None:
@@ -174,17 +174,17 @@ class Recorder:
     def note(self, kind: str, **facts: Any) -> None:
         """Add an event of the recorder's own."""
         if not self.closing:
-            self._tell(kind, **facts)
+            self._add(kind, **facts)
 
-    def _tell(self, kind: str, **facts: Any) -> None:
+    def _add(self, kind: str, **facts: Any) -> None:
         event = {"event": kind, "time_s": self._last_time_s, **facts}
         self._own.append(json_line(event))
 
-    def _tell_loss(self) -> None:
+    def _report_loss(self) -> None:
         lost = {"samples": self._samples.refused, "events": self._events.refused}
-        if any(lost.values()) and not self._loss_told:
-            self._loss_told = True
-            self._tell("record_lost", **lost, reason="the ring before the recorder was full")
+        if any(lost.values()) and not self._loss_reported:
+            self._loss_reported = True
+            self._add("record_lost", **lost, reason="the ring before the recorder was full")
 
     def _copy(self, stop: int) -> None:
         """Write the samples up to number `stop`, a batch at a time."""
@@ -202,7 +202,7 @@ class Recorder:
         facts = event.facts
         kind = facts.get("event")
         if kind == "session_ended":
-            self._tell_loss()
+            self._report_loss()
             while self._own:
                 self._writer.line(self._own[0])
                 self._own.popleft()
@@ -221,7 +221,7 @@ class FullDisk:
 
     Parameters
     ----------
-    recording : Recording
+    recording : RecordingPlan
     shared : SessionMemory
     patience : Patience
     console_pid : int
@@ -229,13 +229,13 @@ class FullDisk:
     """
 
     def __init__(
-        self, recording: Recording, shared: SessionMemory, patience: Patience, console_pid: int
+        self, recording: RecordingPlan, shared: SessionMemory, patience: Patience, console_pid: int
     ) -> None:
         self._recording, self._shared, self._patience = recording, shared, patience
         self._console_pid = console_pid
         self._since_s: float | None = None
         self._over_s: float | None = None
-        self._said_s = -math.inf
+        self._reported_s = -math.inf
         self._asked: Path | None = None
         self._refusal = ""
 
@@ -243,15 +243,15 @@ class FullDisk:
         """Note that a write succeeded."""
         if self._since_s is not None:
             recorder.note("recording_resumed", after_s=round(time.monotonic() - self._since_s, 3))
-            self._since_s, self._said_s, self._refusal = None, -math.inf, ""
+            self._since_s, self._reported_s, self._refusal = None, -math.inf, ""
 
     def refuses(self, error: OSError) -> None:
         """Note that a write failed, and tell the operator now and then."""
         now_s = time.monotonic()
         self._since_s = self._since_s or now_s
-        if now_s - self._said_s < SAID_S:
+        if now_s - self._reported_s < REPORT_S:
             return
-        self._said_s = now_s
+        self._reported_s = now_s
         folder = self._recording.folder
         free = ""
         with suppress(OSError):
@@ -261,7 +261,7 @@ class FullDisk:
             f"{free}{self._shared.samples.lag()} samples wait in memory: make room, order "
             f"`save to FOLDER`{self._refusal}, or end with Ctrl-C, and they stay in memory"
         )
-        self._shared.status.set_condition(Role.RECORDER, Condition.TROUBLE, note)
+        self._shared.status.set_condition(Role.RECORDER, ProcessCondition.TROUBLE, note)
 
     def other_folder(self) -> SessionWriter | None:
         """Return a writer to the folder that was asked for, with all that is in the old one.
@@ -271,7 +271,7 @@ class FullDisk:
         asked = self._shared.status.asked_folder()
         if asked is None or asked == self._asked:
             return None
-        self._asked, self._said_s = asked, -math.inf
+        self._asked, self._reported_s = asked, -math.inf
         old, new = self._recording.folder, replace(self._recording, folder=asked)
         try:
             writer = new.writer()
@@ -299,9 +299,12 @@ class FullDisk:
             return False
         status, patience = self._shared.status, self._patience
         alone = os.getppid() != self._console_pid
-        over = over or status.condition(Role.LOOP) in (Condition.DONE, Condition.FAILED)
-        told = alone or status.flag(Flag.END_ASKED) or status.flag(Flag.ABORT_ASKED)
-        if not (over and told):
+        over = over or status.condition(Role.LOOP) in (
+            ProcessCondition.DONE,
+            ProcessCondition.FAILED,
+        )
+        asked = alone or status.flag(Flag.END_ASKED) or status.flag(Flag.ABORT_ASKED)
+        if not (over and asked):
             return False
         self._over_s = self._over_s or time.monotonic()
         limit_s = self._recording.settings.loop.console_lost_s if alone else patience.disk_s
@@ -309,7 +312,7 @@ class FullDisk:
 
 
 def copy_record(
-    folder: Path, writer: SessionWriter, recording: Recording, beat: Callable[[], object]
+    folder: Path, writer: SessionWriter, recording: RecordingPlan, beat: Callable[[], object]
 ) -> None:
     """Write the samples and events of a folder to another that has none yet.
 

@@ -34,10 +34,10 @@ from rigidimeter.core.session import (
     read_manifest,
     scan_samples,
 )
-from rigidimeter.rig.acquisition.processes.recorder import Patience, Recording
+from rigidimeter.rig.acquisition.processes.recorder import Patience, RecordingPlan
 from rigidimeter.rig.acquisition.processes.ring import ROW, EventRing, SampleRing
 from rigidimeter.rig.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.rig.acquisition.processes.status_values import Condition, Role
+from rigidimeter.rig.acquisition.processes.status_values import ProcessCondition, Role
 from rigidimeter.rig.acquisition.processes.watchdog import WatchedProcess
 
 
@@ -109,20 +109,20 @@ def recover_from_rings(
 
 def complete(
     shared: SessionMemory,
-    recording: Recording,
+    recording: RecordingPlan,
     recorder: WatchedProcess,
     patience: Patience,
-    look: Callable[[], object],
+    follow: Callable[[], object],
 ) -> list[str]:
     """See the recorder to its end, and do its work if that is not a good one; return remarks.
 
     Parameters
     ----------
     shared : SessionMemory
-    recording : Recording
+    recording : RecordingPlan
     recorder : WatchedProcess
     patience : Patience
-    look : callable
+    follow : callable
         Called some twenty times a second meanwhile: the heart of whoever waits beats there.
     """
     remarks: list[str] = []
@@ -130,8 +130,12 @@ def complete(
     since_s = time.monotonic()
     hung = False
     # One that has done its work no longer beats, and may take a while to leave.
-    while recorder.alive() and not hung and status.condition(Role.RECORDER) is not Condition.DONE:
-        look()
+    while (
+        recorder.alive()
+        and not hung
+        and status.condition(Role.RECORDER) is not ProcessCondition.DONE
+    ):
+        follow()
         # A heart that beat before the wait began may have been silent for a good reason.
         silent_s = min(status.age_s(Role.RECORDER), time.monotonic() - since_s)
         hung = silent_s > patience.hung_s
@@ -142,7 +146,7 @@ def complete(
         until_s = time.monotonic() + 2.0
         while recorder.alive() and time.monotonic() < until_s:
             time.sleep(0.01)
-    if status.condition(Role.RECORDER) is Condition.DONE:
+    if status.condition(Role.RECORDER) is ProcessCondition.DONE:
         late = shared.samples.lag()
         if late:
             remarks.append(f"{late} samples came after the session was closed")
@@ -166,7 +170,7 @@ def _samples(path: Path, ring: SampleRing, tick_rate_hz: float, session_id: str)
     """Add the rows that the file has not; return how many."""
     content = path.read_bytes() if path.is_file() else b""
     before = scan_samples(content, path)
-    rows = ring.kept()
+    rows = ring.held_rows()
     if before.columns["tick"].size:
         rows = rows[rows["tick"] > before.columns["tick"][-1]]
     if rows.size:

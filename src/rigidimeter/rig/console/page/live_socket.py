@@ -19,7 +19,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from rigidimeter.core.files import json_line
 from rigidimeter.rig.acquisition import Command, Order
-from rigidimeter.rig.acquisition.processes import Condition, Flag, Role, SessionMemory
+from rigidimeter.rig.acquisition.processes import Flag, ProcessCondition, Role, SessionMemory
 from rigidimeter.rig.console import BandTorque, Observer, TraceReader, save_to
 from rigidimeter.rig.console.page.page_messages import (
     PageMessage,
@@ -94,7 +94,7 @@ class _Attached:
         facts = self._observer.facts_now()
         # Of the epoch in which J, B and K are known, and of no other.
         self._known_since_s = live.since_s if live is not None and is_known(facts) else math.nan
-        full = self.memory.status.condition(Role.RECORDER) is Condition.TROUBLE
+        full = self.memory.status.condition(Role.RECORDER) is ProcessCondition.TROUBLE
         state = session_state(facts, self._observer.progress)
         return state | {"number": self.running.number, "save": full}
 

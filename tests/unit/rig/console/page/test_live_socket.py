@@ -16,8 +16,8 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings
 from rigidimeter.rig.acquisition import NOTHING, Command
 from rigidimeter.rig.acquisition.processes import (
-    Condition,
     Flag,
+    ProcessCondition,
     Role,
     SessionMemory,
     SharedStatus,
@@ -89,7 +89,7 @@ def test_another_folder_is_taken_when_the_disk_takes_nothing(said, tmp_path):
     order = {"kind": "save", "folder": str(tmp_path / "disk")}
     assert "the recorder can write" in say(order)
     assert status.asked_folder() is None
-    status.set_condition(Role.RECORDER, Condition.TROUBLE, "the disk is full")
+    status.set_condition(Role.RECORDER, ProcessCondition.TROUBLE, "the disk is full")
     assert "can only look" in say(order, "another")
     assert "whole path" in say(order | {"folder": "disk"})
     assert status.asked_folder() is None
