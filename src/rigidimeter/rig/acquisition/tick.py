@@ -201,7 +201,9 @@ def run_ticks(
     while k < n:
         k = run_tick(loop, epoch, k, command, n - 1) + 1
         if loop.guard.reaction > known:
-            _account(loop)
+            if loop.stop is None and loop.sample is not None:  # of several causes the first
+                loop.stop = report_stop(latched_tick(loop, loop.sample))
+                loop.latched(loop.stop, loop.sample.time_s)
             break
         order = loop.supervision.order()
         if order.command is not Command.NONE and loop.take_order(order):
@@ -211,13 +213,6 @@ def run_ticks(
             loop.progress(loop.time_s)
     counts = loop.limited_ticks, loop.late_ticks, loop.missed_ticks
     return TickResult(loop.limit_time_s, loop.cause, *counts, interrupted)
-
-
-def _account(loop: ControlLoop) -> None:
-    """Say why the guard latched; the first cause is kept."""
-    if loop.stop is None and loop.sample is not None:
-        loop.stop = report_stop(latched_tick(loop, loop.sample))
-        loop.latched(loop.stop, loop.sample.time_s)
 
 
 def latched_tick(loop: ControlLoop, sample: Sample) -> Latched:

@@ -143,7 +143,11 @@ def torque_sign(
         f"the {seen.strongest} looks negative, so torque and angle have opposite signs: turn the "
         "sign of the one that is wrong in the rig file; with it the loop would run away"
     )
-    return yes(name, seen.strongest_is_positive, _arm_words(seen, work_j), limit, remedy), work_j
+    words = (
+        f"J {seen.inertia_kg_m2:.3g} kg·m², B {seen.damping_nm_s_rad:.3g} N·m·s/rad, "
+        f"K {seen.stiffness_nm_rad:.3g} N·m/rad, work {1000 * work_j:.3g} mJ"
+    )
+    return yes(name, seen.strongest_is_positive, words, limit, remedy), work_j
 
 
 def step_checks(
@@ -211,13 +215,6 @@ _SCALE_REMEDY = (
     "sign, counts per turn, gear ratio or velocity units in the rig file are wrong; "
     "-1 is a wrong sign, 57.3 and 0.0175 are degrees for radians"
 )
-
-
-def _arm_words(seen: ArmFit, work_j: float) -> str:
-    return (
-        f"J {seen.inertia_kg_m2:.3g} kg·m², B {seen.damping_nm_s_rad:.3g} N·m·s/rad, "
-        f"K {seen.stiffness_nm_rad:.3g} N·m/rad, work {1000 * work_j:.3g} mJ"
-    )
 
 
 def smooth_motion(distance_rad: float, speed_rad_s: float, tick_s: float) -> Array:

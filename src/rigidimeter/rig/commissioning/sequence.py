@@ -103,7 +103,18 @@ def _try_all(setup: Setup, found: CheckResults, facts: Mapping[str, Any]) -> Non
     operator, limits = setup.operator, setup.limits
     found.checks += facts_checks(facts, setup.settings)
     at_rest(setup, found, limits.idle_s)
-    _by_hand(setup, found)
+    # By hand, without power: the mechanical stops and a known angle.
+    require_no_power(setup)
+    found.checks.append(
+        ask_operator(
+            operator,
+            "mechanical stops",
+            "Without power: lead the joint to both ends by hand, and back. Do mechanical stops end "
+            "its way on both sides, where a person's arm still bears it?",
+            "fit them; the position limit of the software believes the encoder and is none",
+        )
+    )
+    found.checks.append(known_angle(setup))
     if not power_allowed(
         setup,
         found,
@@ -119,21 +130,6 @@ def _try_all(setup: Setup, found: CheckResults, facts: Mapping[str, Any]) -> Non
     operator.say("Watchdog: nothing is written for a while; the drive must stop by itself.")
     found.checks += watchdog_checks(setup, facts["drive"]["watchdog_s"])
     found.checks += emergency_stop_checks(setup)
-
-
-def _by_hand(setup: Setup, found: CheckResults) -> None:
-    """Ask for the mechanical stops and a known angle, without power."""
-    require_no_power(setup)
-    found.checks.append(
-        ask_operator(
-            setup.operator,
-            "mechanical stops",
-            "Without power: lead the joint to both ends by hand, and back. Do mechanical stops end "
-            "its way on both sides, where a person's arm still bears it?",
-            "fit them; the position limit of the software believes the encoder and is none",
-        )
-    )
-    found.checks.append(known_angle(setup))
 
 
 def _swing(setup: Setup, found: CheckResults) -> bool:

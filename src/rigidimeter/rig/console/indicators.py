@@ -102,12 +102,9 @@ class LimitDistance:
     @property
     def text(self) -> str:
         """The value and the limit, as ``14.6 of 40 deg``."""
-        return f"{self._rounded(self.value)} of {self.limit:g} {self.unit}"
-
-    def _rounded(self, value: float) -> str:
-        """Return a value with the digits that tell a hundredth of the limit."""
-        digits = max(0, 2 - math.floor(math.log10(self.limit)))
-        return f"{value:.{digits}f}" if math.isfinite(value) else "-"
+        digits = max(0, 2 - math.floor(math.log10(self.limit)))  # a hundredth of the limit
+        value = f"{self.value:.{digits}f}" if math.isfinite(self.value) else "-"
+        return f"{value} of {self.limit:g} {self.unit}"
 
     @property
     def near(self) -> bool:

@@ -48,7 +48,11 @@ def post_typed(text: str, status: SharedStatus) -> str:
     words = text.split(maxsplit=1)
     name, rest = (words[0].lower(), words[1:]) if words else ("", [])
     if name == "note" and rest:
-        return _note(rest[0], status)
+        try:
+            number = status.post_note(json.dumps({"what": "note", "text": rest[0], "by": ""}))
+        except ValueError as error:
+            return str(error)
+        return "noted" if number is not None else "the note before is not taken yet; try again"
     if text.lower().startswith("save to "):
         return save_to(text[len("save to ") :].strip(), status)
     order = order_of(text) if name == "set" else None
@@ -59,14 +63,6 @@ def post_typed(text: str, status: SharedStatus) -> str:
     except ValueError as error:
         return str(error)
     return f"ordered: {text}"
-
-
-def _note(text: str, status: SharedStatus) -> str:
-    try:
-        number = status.post_note(json.dumps({"what": "note", "text": text, "by": ""}))
-    except ValueError as error:
-        return str(error)
-    return "noted" if number is not None else "the note before is not taken yet; try again"
 
 
 def save_to(name: str, status: SharedStatus) -> str:

@@ -111,16 +111,13 @@ class ComposedRig:
         facts = {"torque_sensor": self._sensor.configure(), "drive": self._drive.configure()}
         self._identified(facts)
         for role, found in facts.items():
-            self._check_rate(role, found)
+            if found.fastest_tick_rate_hz < self._tick_rate_hz:
+                raise DeviceError(
+                    f"{role} ({found.model or 'unknown model'}): keeps up with "
+                    f"{found.fastest_tick_rate_hz:.4g} ticks/s at most, but rig.tick_rate_hz = "
+                    f"{self._tick_rate_hz:g} Hz; lower rig.tick_rate_hz"
+                )
         return {role: asdict(found) for role, found in facts.items()}
-
-    def _check_rate(self, role: str, facts: DeviceFacts) -> None:
-        if facts.fastest_tick_rate_hz < self._tick_rate_hz:
-            raise DeviceError(
-                f"{role} ({facts.model or 'unknown model'}): keeps up with "
-                f"{facts.fastest_tick_rate_hz:.4g} ticks/s at most, but rig.tick_rate_hz = "
-                f"{self._tick_rate_hz:g} Hz; lower rig.tick_rate_hz"
-            )
 
     def enable(self) -> None:
         """Close the contact, energise the drive at zero velocity, store where the joint is.

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -200,7 +200,7 @@ def _append(log: SampleLog, rows: NDArray[np.void], tick_rate_hz: float) -> None
         batch = max(1, int(BATCH_S * tick_rate_hz))
         for first in range(0, rows.size, batch):
             some = rows[first : first + batch]
-            log.append_columns({name: some[name] for name in _names()})
+            log.append_columns({name: some[name] for name in ROW.names or ()})
         os.fsync(log.fileno())
     except OSError:
         os.ftruncate(log.fileno(), 0)  # so that it can be closed
@@ -222,9 +222,3 @@ def _lines(path: Path, ring: EventRing, session_id: str) -> list[bytes]:
         ring.recorded += 1
         return waiting[1:]
     return waiting
-
-
-def _names() -> Sequence[str]:
-    names = ROW.names
-    assert names is not None
-    return names

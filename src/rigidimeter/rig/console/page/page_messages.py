@@ -19,10 +19,8 @@ from rigidimeter.rig.acquisition.processes import NOTE_BYTES
 from rigidimeter.rig.console import (
     AT_ONCE,
     TRACES,
-    ConditionCount,
     Facts,
     Level,
-    LimitDistance,
     Progress,
     Traces,
 )
@@ -188,14 +186,28 @@ def session_state(facts: Facts, progress: Progress) -> dict[str, Any]:
         "countdown": duration(facts.countdown_s),
         "countdown_of": words.get(facts.countdown_words, facts.countdown_words or "Time left"),
         "counts": [
-            *(_count(count) for count in facts.counts),
+            *(
+                f"{count.condition}: {count.good} done"
+                f"{f', {count.bad} not good' if count.bad else ''}, {count.left} left"
+                for count in facts.counts
+            ),
             f"session: {duration(facts.session_left_s)} left",
         ],
         "live": [value.text for value in facts.live],
         "live_of": facts.live_words,
         "task": drawn.task if drawn is not None else "",
         "modelled": is_known(facts),
-        "limits": [_limit(one) for one in facts.distances if math.isfinite(one.part)],
+        "limits": [
+            {
+                "name": one.name,
+                "sign": (Level.WATCH if one.near else Level.GOOD).sign,
+                "text": one.text,
+                "part": round(one.part, 3),
+                "near": one.near,
+            }
+            for one in facts.distances
+            if math.isfinite(one.part)
+        ],
         "lamps": [
             {
                 "level": LEVELS[indicator.level],
@@ -248,18 +260,3 @@ def points(traces: Traces, *, modelled: bool) -> bytes:
     if not modelled:
         columns[-1] = np.full(traces.time_s.size, np.nan)
     return np.column_stack(columns).astype("<f8").tobytes()
-
-
-def _count(count: ConditionCount) -> str:
-    bad = f", {count.bad} not good" if count.bad else ""
-    return f"{count.condition}: {count.good} done{bad}, {count.left} left"
-
-
-def _limit(one: LimitDistance) -> dict[str, Any]:
-    return {
-        "name": one.name,
-        "sign": (Level.WATCH if one.near else Level.GOOD).sign,
-        "text": one.text,
-        "part": round(one.part, 3),
-        "near": one.near,
-    }

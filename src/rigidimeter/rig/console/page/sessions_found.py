@@ -118,7 +118,15 @@ def found_sessions(root: Path) -> tuple[list[FoundSession], list[str]]:
     """Return the sessions of a folder, newest first, and a sentence for each that is not read."""
     folders = [path for path in root.iterdir() if path.is_dir() and is_session(path)]
     folders = sorted(folders, key=lambda path: path.stat().st_mtime, reverse=True)
-    excluded, problems = _exclusions(root)
+    problems: list[str] = []
+    try:
+        rows = _rows(table_path(root, "exclusions"))
+    except UserError as error:
+        rows, problems = [], [str(error)]
+    excluded = {
+        (row["path"], row["epoch"]): row["reason"] + (f" ({row['by']})" if row.get("by") else "")
+        for row in rows
+    }
     found = []
     for folder in folders[:MAX_SESSIONS]:
         try:
@@ -226,17 +234,6 @@ def _epochs(
         for begun in events
         if begun["event"] == "epoch_started"
     ]
-
-
-def _exclusions(root: Path) -> tuple[dict[tuple[str, str], str], list[str]]:
-    try:
-        rows = _rows(table_path(root, "exclusions"))
-    except UserError as error:
-        return {}, [str(error)]
-    return {
-        (row["path"], row["epoch"]): row["reason"] + (f" ({row['by']})" if row.get("by") else "")
-        for row in rows
-    }, []
 
 
 def _rows(path: Path) -> list[dict[str, str]]:

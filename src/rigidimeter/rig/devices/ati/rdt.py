@@ -125,8 +125,17 @@ class AtiRdt:
         if self._socket is None:
             raise DeviceError(f"{self._device}: it is not connected; connect before configuring")
         self._configured = False
-        settings, page = self._settings, self._fetch()
-        self._check(page)
+        settings = self._settings
+        page = fetch_page(
+            self._sensor[0], settings.http_port, settings.timeout_s, self._device, self._now
+        )
+        refuse_unexpected(settings, page, self._device)
+        changed = page_changes(self._page, page) if self._page is not None else ""
+        if changed:
+            raise DeviceError(
+                f"{self._device}: it came back changed ({changed}); set it back, or check it and "
+                "begin a new session"
+            )
         force = settings.sign * page.newton_per_count
         torque = settings.sign * page.newton_metre_per_count
         scales = (force, force, force, torque, torque, torque)
@@ -233,21 +242,6 @@ class AtiRdt:
         self._socket = wire
         self._stream.restart(rate_hz)
         self._sample = TorqueSample(math.nan, -math.inf)
-
-    def _fetch(self) -> SensorPage:
-        settings = self._settings
-        return fetch_page(
-            self._sensor[0], settings.http_port, settings.timeout_s, self._device, self._now
-        )
-
-    def _check(self, page: SensorPage) -> None:
-        refuse_unexpected(self._settings, page, self._device)
-        changed = page_changes(self._page, page) if self._page is not None else ""
-        if changed:
-            raise DeviceError(
-                f"{self._device}: it came back changed ({changed}); set it back, or check it and "
-                "begin a new session"
-            )
 
     def _start(self, page: SensorPage) -> None:
         """Request samples until the first one arrives, soon after a request.
