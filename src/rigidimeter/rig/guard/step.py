@@ -134,16 +134,16 @@ def guard_step(
     # faster than a drive whose zero is not quite zero lets it: what is faster adds up.
     old_s = max(age, 0.0)
     ago = int(min((old_s + 0.5 * reaction_time_s) * ticks_per_s, oldest))
-    told = float(ring[newest - ago])
+    commanded = float(ring[newest - ago])
     if isnan(origin):
-        origin = angle - told
-    astray = angle - origin - told
-    if abs(astray) > 0.5 * limits.following_rad:
+        origin = angle - commanded
+    position_error = angle - origin - commanded
+    if abs(position_error) > 0.5 * limits.following_rad:
         first = int(min(max(age - reaction_time_s, 0.0) * ticks_per_s, oldest))
         last = math.ceil(min((old_s + reaction_time_s) * ticks_per_s, oldest))
-        astray = outside(ring, newest, first, last, angle - origin)
+        position_error = outside(ring, newest, first, last, angle - origin)
         drift = limits.drift_rad_s * elapsed_s
-        origin += min(max(astray, -drift), drift)
+        origin += min(max(position_error, -drift), drift)
 
     found = found_wrong(
         limits,
@@ -154,7 +154,7 @@ def guard_step(
         speed_now,
         age,
         torque_age_s,
-        astray,
+        position_error,
         energy,
         limited_s,
     )
