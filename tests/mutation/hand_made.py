@@ -54,7 +54,7 @@ HAND_MADE = tuple(
     HandMade(*fault)
     for fault in (
         # Time
-        (TICK, "        loop.rig.read(late)\n", "", "begins with readings from before enabling"),
+        (MODES, "        loop.rig.read(late)\n", "", "begins with readings from before enabling"),
         (TICK, "loop.rig.read(loop.elapsed_ticks)", "loop.rig.read()", "rig not told of missed"),
         (TICK, "    loop.tick += ticks\n", "", "a late tick is made up for: commands in a burst"),
         (TICK, "elapsed_ticks = ticks + 1", "elapsed_ticks = 1", "missed ticks told to nobody"),
@@ -136,7 +136,7 @@ HAND_MADE = tuple(
             "False",
             "no order is taken",
         ),
-        (TICK, "        apart,\n    )", "    )", "motion nobody commanded is not stopped"),
+        (TICK, "        disagreement,\n    )", "    )", "motion nobody commanded is not stopped"),
         (
             TICK,
             "        loop.elapsed_ticks,\n    )\n    loop.guard",
