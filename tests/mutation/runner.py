@@ -113,8 +113,16 @@ CPU_S, WALL_S = 30, 600
 MEMORY_BYTES, FILE_BYTES = 4 << 30, 100 << 20
 """What a mutant that records for ever may fill."""
 
-HEAVY = ("can", "canopen", "numpy", "scipy.signal", "pyarrow", "hypothesis", f"{NAME}.settings")
-KEPT = tuple(f"{NAME}.{room}" for room in ("settings", "records", "documents", "units", "errors"))
+HEAVY = (
+    "can",
+    "canopen",
+    "numpy",
+    "scipy.signal",
+    "pyarrow",
+    "hypothesis",
+    f"{NAME}.core.settings",
+)
+KEPT = tuple(f"{NAME}.core.{room}" for room in ("settings", "records", "files", "units", "errors"))
 """Rooms of the package that know no mutated module: a child takes them as they are."""
 
 
