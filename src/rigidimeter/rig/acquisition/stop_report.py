@@ -227,11 +227,11 @@ def _velocity(latched: Latched) -> Found:
     both_rad2 = means.moved_rad2 + means.reported_rad2
     limit_rad = max(latched.agreement.unseen_rad, math.sqrt(WRONG_SHARE * both_rad2))
     gain = larger_gain(means)
-    if means.apart_rad2 <= limit_rad * limit_rad and gain > WRONG_GAIN:
+    if means.disagreement_rad2 <= limit_rad * limit_rad and gain > WRONG_GAIN:
         larger = means.reported_rad2 > means.moved_rad2
         of = "times the change of the angle" if larger else "times the velocity"
         return Found(gain, WRONG_GAIN, of, SQUARED_S)
-    value_rad = math.sqrt(means.apart_rad2)
+    value_rad = math.sqrt(means.disagreement_rad2)
     return Found(deg_from_rad(value_rad), deg_from_rad(limit_rad), "deg", SUMMED_S)
 
 

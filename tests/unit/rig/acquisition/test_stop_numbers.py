@@ -62,7 +62,7 @@ def latched(cause, **changed):
     answer = means.answer._replace(shown_nm2=0.0004, moved2=25.0)
     means = means._replace(
         answer=answer,
-        apart_rad2=0.0009,
+        disagreement_rad2=0.0009,
         moved_rad2=0.005,
         reported_rad2=0.005,
         energy_j=0.7,
@@ -237,7 +237,7 @@ def test_other_means_are_told_where_they_are_the_larger_ones():
 def test_a_velocity_of_another_size_is_told_by_how_much(moved_rad2, reported_rad2, unit):
     consistency = latched(Cause.VELOCITY_WRONG).consistency
     means = consistency.means._replace(
-        moved_rad2=moved_rad2, reported_rad2=reported_rad2, apart_rad2=0.005
+        moved_rad2=moved_rad2, reported_rad2=reported_rad2, disagreement_rad2=0.005
     )
     found = told(Cause.VELOCITY_WRONG, consistency={"means": means})
     assert (found.value, found.limit) == (pytest.approx(2.0), WRONG_GAIN)

@@ -95,8 +95,8 @@ def allowed(law, at):
         "torque old": {"torque_old": 0.2 * at},
         "motion old": {"motion_old": 0.2 * at},
         "energy": {"energy_j": 4.0 * at},
-        "resolution": {"apart_rad2": 0.25 * at, "moved_rad2": 0.125, "reported_rad2": 0.125},
-        "share": {"apart_rad2": 0.375 * at, "moved_rad2": 0.5, "reported_rad2": 0.5},
+        "resolution": {"disagreement_rad2": 0.25 * at, "moved_rad2": 0.125, "reported_rad2": 0.125},
+        "share": {"disagreement_rad2": 0.375 * at, "moved_rad2": 0.5, "reported_rad2": 0.5},
     }[law]
     unseen_rad = {"resolution": 0.5, "share": 0.1}.get(law, math.inf)
     return LIMITS._replace(energy_j=4.0, unseen_rad=unseen_rad), state(angle_rad=0.0, **values)
