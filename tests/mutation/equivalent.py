@@ -40,10 +40,10 @@ EQUIVALENT: dict[str, str] = {
     ANSWER + "one_step: if steps > 0: ... → if True: ...": EMPTY,
     ANSWER + "one_step: steps > 0 → steps >= 0": EMPTY,
     ANSWER + "one_step: 0 → -1": EMPTY,
-    ANSWER + "keep_row: rows % half + half → rows % half - half": "a place below zero counts from "
+    ANSWER + "store_row: rows % half + half → rows % half - half": "a place below zero counts from "
     "the end",
-    SIGN + "table: 1.0 → 1.01": OF_NOTHING,
-    SIGN + "table: 1.0 → 0.9900990099009901": OF_NOTHING,
+    SIGN + "difference_columns: 1.0 → 1.01": OF_NOTHING,
+    SIGN + "difference_columns: 1.0 → 0.9900990099009901": OF_NOTHING,
     SIGN + "whitened: 0 → -1": "a column has one dimension",
     SIGN + "whitened: 1.0 → 1.01": BOTH_SIDES,
     SIGN + "whitened: 1.0 → 0.9900990099009901": BOTH_SIDES,

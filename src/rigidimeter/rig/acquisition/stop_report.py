@@ -237,7 +237,7 @@ def _velocity(latched: Latched) -> Found:
 
 def _silent(latched: Latched) -> Found:
     answer, limits = latched.consistency.means.answer, latched.agreement.answer
-    needed_nm = limits.least_part * limits.inertia_kg_m2 * math.sqrt(answer.moved2)
+    needed_nm = limits.min_part * limits.inertia_kg_m2 * math.sqrt(answer.moved2)
     setting, shown_nm = "guard.least_inertia_kg_m2", math.sqrt(answer.shown_nm2)
     return Found(shown_nm, needed_nm, "N·m", SHOWN_MEMORY_S, setting, at_least=True)
 

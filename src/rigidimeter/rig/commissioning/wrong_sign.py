@@ -91,7 +91,7 @@ def hiding_torque_nm(settings: Settings, condition: str) -> float:
     for n, left in zip(torque_answer.ROWS, limits.left, strict=True):
         free = n - INSTRUMENTS - 2 * left.order
         of = left.order, MARGIN * free / n * (1.0 / left.at_once - 1.0)
-        if (n + torque_answer.ROWS_A_LOOK) * row_s < free_s and spare(log_min, *of) > 0.0:
+        if (n + torque_answer.ROWS_A_TEST) * row_s < free_s and spare(log_min, *of) > 0.0:
             hides = spare(log_max, *of) < 0.0
             log_nm = scipy.optimize.brentq(spare, log_min, log_max, of) if hides else log_max
             hiding_nm = max(hiding_nm, math.exp(log_nm))

@@ -172,7 +172,7 @@ STALE = (1e3 * GUARD.stale_s, "ms")
             Cause.TORQUE_SILENT,
             Found(
                 0.02,
-                5.0 * AGREEMENT.answer.least_part * GUARD.least_inertia_kg_m2,
+                5.0 * AGREEMENT.answer.min_part * GUARD.least_inertia_kg_m2,
                 "N·m",
                 SHOWN_MEMORY_S,
                 "guard.least_inertia_kg_m2",
