@@ -76,7 +76,7 @@ EQUIVALENT: dict[str, str] = {
     NEAR + "left >= speed * (reach_s + limits.interval_s + held_s) + stopping → "
     "left > speed * (reach_s + limits.interval_s + held_s) + stopping": SLOWER,
     NEAR + "1 → 0": "a whole round of the ring is where it began",
-    "step.py _gravest: reported != _NO_CAUSE and REACTIONS[reported] >= REACTIONS[found] → "
+    "step.py _most_serious: reported != _NO_CAUSE and REACTIONS[reported] >= REACTIONS[found] → "
     "REACTIONS[reported] >= REACTIONS[found]": "no cause has the least reaction: both are none",
     "step.py guard_step: if found != _NO_CAUSE: ... → if True: ...": "no cause changes neither it "
     "nor the reaction",

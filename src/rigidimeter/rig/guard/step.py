@@ -20,7 +20,7 @@ later than `gap_s` by T lets the joint pass by at most v T, as the last command 
 The position limit wins over the acceleration limit; it only ever makes the speed toward the limit
 smaller. What `watch` finds wrong, or a device or the loop reports, latches: the velocity is ramped
 to zero, or cut, and stays there; a hold alone can be `released`. The first cause is kept, of two in
-one step the graver; the reaction can become stronger, never weaker.
+one step the more serious; the reaction can become stronger, never weaker.
 
 Like the control steps, a step only adds, multiplies, compares and takes square roots.
 """
@@ -41,7 +41,7 @@ from rigidimeter.rig.guard.watch import energy_after, found_wrong, outside
 
 
 class Limited(IntEnum):
-    """Which limit changed the command of a tick; the gravest one is named."""
+    """Which limit changed the command of a tick; the most serious one is named."""
 
     NOT = 0
     ACCELERATION = 1
@@ -158,7 +158,7 @@ def guard_step(
         energy,
         limited_s,
     )
-    found = _gravest(found, disagreement, reported)
+    found = _most_serious(found, disagreement, reported)
     if found != _NO_CAUSE:
         if cause == _NO_CAUSE:
             cause = found
@@ -191,7 +191,7 @@ LONGEST_BRAKING = 5
 """A late step brakes for at most so many ticks at once: a loop that is later has stalled."""
 
 
-def _gravest(found: int, disagreement: int, reported: int) -> int:
+def _most_serious(found: int, disagreement: int, reported: int) -> int:
     """Return which of the causes is named: a device knows better why than what was found here."""
     if REACTIONS[disagreement] > REACTIONS[found]:
         found = disagreement
