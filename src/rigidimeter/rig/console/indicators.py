@@ -138,7 +138,7 @@ def limit_distances(
 
 
 class Level(IntEnum):
-    """How grave it is."""
+    """How serious it is."""
 
     UNKNOWN = 0
     GOOD = 1
@@ -153,7 +153,7 @@ class Level(IntEnum):
 
 @dataclass(frozen=True)
 class Indicator:
-    """An indicator: what it is about, how grave it is, and its state in words."""
+    """An indicator: what it is about, how serious it is, and its state in words."""
 
     name: str
     level: Level

@@ -16,14 +16,7 @@ import numpy as np
 from rigidimeter.core.units import deg_from_rad
 from rigidimeter.rig.acquisition import Command, State
 from rigidimeter.rig.acquisition.processes import NOTE_BYTES
-from rigidimeter.rig.console import (
-    AT_ONCE,
-    TRACES,
-    Facts,
-    Level,
-    Progress,
-    Traces,
-)
+from rigidimeter.rig.console import AT_ONCE, TRACES, Facts, Level, Progress, Traces
 from rigidimeter.rig.console.page.button_words import in_buttons
 
 LONGEST = 4096
@@ -249,11 +242,7 @@ def points(traces: Traces, *, modelled: bool) -> bytes:
     modelled. Angles are in degrees. The modelled torque is NaN unless `modelled`.
     """
     columns = [traces.time_s]
-    for values, names in (
-        (traces.low, TRACES),
-        (traces.high, TRACES),
-        (traces.first, AT_ONCE),
-    ):
+    for values, names in ((traces.low, TRACES), (traces.high, TRACES), (traces.first, AT_ONCE)):
         columns += [
             (deg_from_rad(1.0) if name in _DEGREES else 1.0) * values[name] for name in names
         ]
