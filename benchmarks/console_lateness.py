@@ -130,9 +130,9 @@ class _Turns:
 def _serve_page(names: tuple[str, str, str], plan: SessionPlan, folder: Path, drawn: Any) -> None:
     """Serve the page of a session that runs, and open it in Chromium; a process of its own."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    server_state = ServerState(Place(folder.parent, plan.settings, "the protocol"))
-    server_state.running = RunningSession(1, names, plan, folder)
-    server = PageServer(server_state, Jobs(), "127.0.0.1", 0)
+    state = ServerState(Place(folder.parent, plan.settings, "the protocol"))
+    state.running = RunningSession(1, names, plan, folder)
+    server = PageServer(state, Jobs(), "127.0.0.1", 0)
     server.start()
     parent = os.getppid()
     with open_browser() as opened:

@@ -157,14 +157,10 @@ def ramp_to_rest(loop: ControlLoop) -> None:
         for _ in range(ticks + SPARE_TICKS):
             if loop.guard.velocity_rad_s == 0.0:
                 return
-            run_tick(loop, REST, 0, _no_motion)
+            run_tick(loop, REST, 0, lambda *_: (0.0, 0.0, math.nan))
     except BaseException:  # also when interrupted: the arm still moves
         _ramp_unrecorded(loop)
         raise
-
-
-def _no_motion(_: Reading, __: float, ___: int) -> tuple[float, float, float]:
-    return 0.0, 0.0, math.nan
 
 
 def _brake_rad_s(loop: ControlLoop) -> float:

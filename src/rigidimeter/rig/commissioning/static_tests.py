@@ -37,38 +37,30 @@ def facts_checks(facts: Mapping[str, Any], settings: Settings) -> list[RigCheck]
     else:
         remedy = f"{what}; shorten its watchdog in the rig file"
         checks.append(below(name, watchdog_s, "s", longest_s, remedy))
-        checks.append(_stalls_first(watchdog_s, settings))
-    return [*checks, _braking(drive["values"].get(BRAKING), settings)]
-
-
-def _stalls_first(watchdog_s: float, settings: Settings) -> RigCheck:
-    """Check that a loop that stands still says so before the drive stops by itself."""
-    stall_s = settings.loop.stall_s
-    return yes(
-        "loop stalls before the watchdog",
-        stall_s < watchdog_s,
-        with_unit(stall_s, "s"),
-        f"below the drive's {with_unit(watchdog_s, 's')}",
-        f"set loop.stall_s in the settings below {watchdog_s:g} s: after a longer standstill the "
-        "drive has stopped by itself, and the loop would go on as if it had not",
-    )
-
-
-def _braking(braking_rad_s2: float | None, settings: Settings) -> RigCheck:
-    """Check that the drive brakes no slower than the guard counts on."""
+        stall_s = settings.loop.stall_s
+        checks.append(
+            yes(
+                "loop stalls before the watchdog",
+                stall_s < watchdog_s,
+                with_unit(stall_s, "s"),
+                f"below the drive's {with_unit(watchdog_s, 's')}",
+                f"set loop.stall_s in the settings below {watchdog_s:g} s: after a longer "
+                "standstill the drive has stopped by itself, and the loop would go on as if it had "
+                "not",
+            )
+        )
+    # The guard counts on a drive that brakes no slower than this.
     name, wanted = "braking of the drive", settings.guard.acceleration_limit_deg_s2
+    braking_rad_s2 = drive["values"].get(BRAKING)
     if braking_rad_s2 is None:
         why = f"the driver does not say how hard its drive brakes; let its facts have {BRAKING}"
-        return impossible(name, f"at least {wanted:.4g} deg/s²", why)
-    return above(
-        name,
-        math.degrees(braking_rad_s2),
-        "deg/s²",
-        wanted,
+        return [*checks, impossible(name, f"at least {wanted:.4g} deg/s²", why)]
+    remedy = (
         "the guard brakes for the position limit with guard.acceleration_limit_deg_s2, and this "
         "drive would cross it: raise the drive's decelerations in the rig file, or lower the "
-        "guard's limit in the settings",
+        "guard's limit in the settings"
     )
+    return [*checks, above(name, math.degrees(braking_rad_s2), "deg/s²", wanted, remedy)]
 
 
 def rate_checks(

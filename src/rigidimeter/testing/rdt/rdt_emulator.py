@@ -109,7 +109,10 @@ class RdtEmulator:
         self.port = self._wire.getsockname()[1]
         self._foreign = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._http = SensorPageServer(
-            (self.address, self.http_port), self._page_now, self.fault, self._ending
+            (self.address, self.http_port),
+            lambda: page_text(page_with_faults(self._page, self._faults)),
+            self.fault,
+            self._ending,
         )
         self.http_port = self._http.server_address[1]
         self._threads = [
@@ -171,9 +174,6 @@ class RdtEmulator:
     def fault(self, name: str, default: float) -> float | None:
         """Return the value of an active misbehaviour, None if it is not active."""
         return fault_value(self._faults, name, default)
-
-    def _page_now(self) -> bytes:
-        return page_text(page_with_faults(self._page, self._faults))
 
     def _listen(self) -> None:
         while not self._ending.is_set():

@@ -44,7 +44,7 @@ class AfterView:
 
     Parameters
     ----------
-    server_state : ServerState
+    state : ServerState
     jobs : Jobs
     in_control : callable
         Whether the page may act.
@@ -54,14 +54,14 @@ class AfterView:
 
     def __init__(
         self,
-        server_state: ServerState,
+        state: ServerState,
         jobs: Jobs,
         in_control: Callable[[], bool],
         notice: ui.label,
     ) -> None:
-        self._server_state, self._jobs, self._in_control = server_state, jobs, in_control
+        self._state, self._jobs, self._in_control = state, jobs, in_control
         self._notice = notice
-        self._root = server_state.place.root
+        self._root = state.place.root
         self._shown = -1
         self._ran = False
         self._computing = False
@@ -75,7 +75,7 @@ class AfterView:
             repeat=self._repeat,
             leave_out=self._ask_reason,
         )
-        several = not server_state.place.one_session
+        several = not state.place.one_session
         ui.label(f"Sessions in {self._root}").classes("text-lg")
         self._title = ui.input("Title of the report of the study", value=self._root.name)
         self._title.classes("entry").props("maxlength=120 data-field=title")
@@ -98,14 +98,14 @@ class AfterView:
     def _follow(self) -> None:
         """Fold the list when a session begins; when it has ended, list it and unfold it."""
         began, self._ran = (
-            self._server_state.in_session and not self._ran,
-            self._server_state.in_session,
+            self._state.in_session and not self._ran,
+            self._state.in_session,
         )
         if began:
             for row in self._rows.values():
                 row.frame.close()
-        finished = self._server_state.finished
-        if finished is not None and finished.number != self._shown and not self._server_state.busy:
+        finished = self._state.finished
+        if finished is not None and finished.number != self._shown and not self._state.busy:
             self._shown = finished.number
             self._update()
             if finished.folder.name in self._rows:
@@ -121,7 +121,7 @@ class AfterView:
                 ui.label(in_buttons(problem)).classes("problem")
         self._none.set_visibility(not sessions)
         self._study.set_visibility(bool(sessions))
-        if not self._server_state.place.one_session:
+        if not self._state.place.one_session:
             self._study_link.set_visibility(self._reported(OF_STUDY))
         for gone in self._rows.keys() - {session.name for session in sessions}:
             self._rows.pop(gone).frame.delete()
@@ -140,7 +140,7 @@ class AfterView:
 
     def _may_act(self) -> bool:
         self._follow()  # what is left of a session is what is left now
-        if self._in_control() and not self._server_state.busy:
+        if self._in_control() and not self._state.busy:
             return True
         ui.notify("not while a session runs, and only on the page in control")
         return False
@@ -160,7 +160,7 @@ class AfterView:
 
     def _run(self, session: str, **what: Any) -> None:
         folder = f"{session.rpartition('-')[0] or session}-{time.strftime('%H%M%S')}"
-        self._server_state.ask(StartRequest(folder, resume=session, **what))
+        self._state.ask(StartRequest(folder, resume=session, **what))
 
     def _ask_reason(self, session: FoundSession, epoch: FoundEpoch) -> None:
         """Leave an epoch out, after asking for a reason and a name."""
@@ -189,7 +189,7 @@ class AfterView:
         """Close the record of an interrupted session."""
         if not await self._command("recover", session.name):
             return
-        for text in extended(self._server_state.place):
+        for text in extended(self._state.place):
             ui.notify(text)
         self._update()
 
@@ -248,7 +248,7 @@ class AfterView:
 
     async def _show(self, session: FoundSession, epoch: FoundEpoch) -> None:
         """Draw an epoch: raw signals, and measured and modelled torque with their difference."""
-        if self._server_state.busy:
+        if self._state.busy:
             ui.notify("not while a session runs")
             return
         folder = self._root / session.name

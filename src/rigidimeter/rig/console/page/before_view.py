@@ -52,21 +52,19 @@ class BeforeView:
 
     Parameters
     ----------
-    server_state : ServerState
+    state : ServerState
     jobs : Jobs
     in_control : callable
         Whether the page may act.
     """
 
-    def __init__(
-        self, server_state: ServerState, jobs: Jobs, in_control: Callable[[], bool]
-    ) -> None:
-        self._server_state, self._jobs, self._in_control = server_state, jobs, in_control
-        self._base = server_state.place.settings
-        self._form = restored_form(_stored(server_state.place.root / DRAFT), self._base)
+    def __init__(self, state: ServerState, jobs: Jobs, in_control: Callable[[], bool]) -> None:
+        self._state, self._jobs, self._in_control = state, jobs, in_control
+        self._base = state.place.settings
+        self._form = restored_form(_stored(state.place.root / DRAFT), self._base)
         self._inputs: dict[str, Any] = {}
         self._entered: EnteredSession | None = None
-        place = server_state.place
+        place = state.place
         rig = "the virtual rig" if place.rig is None else place.rig.name
         with ui.row().classes("w-full items-center"):
             ui.label(f"Rig: {rig}. Protocol: {place.settings_name}.").classes("text-lg").mark(
@@ -80,7 +78,7 @@ class BeforeView:
         self._wrong_file = ui.label("").classes("problem").props('role="alert"')
         self._not_stored = ui.label("").classes("problem").props('role="alert"')
         self._rig = RigView(
-            server_state, jobs, self._may_act, in_control, self._settings, self._show_steps
+            state, jobs, self._may_act, in_control, self._settings, self._show_steps
         )
         with ui.row().classes("w-full"):
             for one in (*METADATA, NOTE):
@@ -117,7 +115,7 @@ class BeforeView:
 
     def _choose(self, name: str) -> None:
         """Begin the form anew with another protocol; of a wrong one the page says what is wrong."""
-        place = self._server_state.place
+        place = self._state.place
         if not name or not self._may_act():
             return
         try:
@@ -126,7 +124,7 @@ class BeforeView:
             self._wrong_file.text = f"{error}. The form is still that of {place.settings_name}."
             return
         path = place.protocols / name
-        self._server_state.place = replace(
+        self._state.place = replace(
             place, settings=settings, settings_name=name, settings_path=path
         )
         self._store(restored_form(self._form, settings))
@@ -194,7 +192,7 @@ class BeforeView:
     def _store(self, form: Mapping[str, str]) -> None:
         """Keep the form for a reload; say why where that is not possible."""
         try:
-            write_json(self._server_state.place.root / DRAFT, form)
+            write_json(self._state.place.root / DRAFT, form)
             self._not_stored.text = ""
         except UserError as error:
             self._not_stored.text = f"A reload would empty this form: {error}"
@@ -213,10 +211,10 @@ class BeforeView:
 
     def _show_steps(self) -> None:
         """Show the steps for what was entered, and why a session cannot start."""
-        if self._server_state.busy or self._entered is None:
+        if self._state.busy or self._entered is None:
             return
         steps = self._jobs.rig_steps(
-            self._entered.settings or self._base, self._server_state.place.settings_path
+            self._entered.settings or self._base, self._state.place.settings_path
         )
         self._rig.show(steps)
         why = start_refusal(steps)
@@ -229,7 +227,7 @@ class BeforeView:
     def _may_act(self) -> bool:
         if not self._in_control():
             ui.notify("this page can only look: another one has control")
-        elif self._server_state.busy:
+        elif self._state.busy:
             ui.notify("not while a session runs or the rig is checked")
         else:
             return True
@@ -244,9 +242,9 @@ class BeforeView:
         now = time.localtime()
         folder = f"{entered.subject}-{time.strftime('%Y%m%d-%H%M%S', now)}"
         request = StartRequest(
-            self._server_state.place.one_session or folder, entered.settings, entered.about
+            self._state.place.one_session or folder, entered.settings, entered.about
         )
-        self._server_state.ask(request)
+        self._state.ask(request)
 
     async def _predict(self) -> None:
         """Say what the session would tell, and what to change."""

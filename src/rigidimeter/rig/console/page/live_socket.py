@@ -108,11 +108,11 @@ class LiveSockets:
 
     Parameters
     ----------
-    server_state : ServerState
+    state : ServerState
     """
 
-    def __init__(self, server_state: ServerState) -> None:
-        self._server_state = server_state
+    def __init__(self, state: ServerState) -> None:
+        self._state = state
         self._pages: set[OpenPage] = set()
         self._attached: _Attached | None = None
         self._known: deque[str] = deque(maxlen=MAX_KNOWN)
@@ -133,13 +133,18 @@ class LiveSockets:
             await _close(socket)
             return
         page = OpenPage(socket, hello.page)
-        presence, now_ns = self._server_state.presence, time.monotonic_ns()
-        presence.arrive(page.secret, hello.tab, now_ns, session=self._server_state.busy)
+        presence, now_ns = self._state.presence, time.monotonic_ns()
+        presence.arrive(page.secret, hello.tab, now_ns, session=self._state.busy)
         self._pages.add(page)
         sender = asyncio.create_task(_send(page))
         try:
             while True:
-                self._hear(page, await socket.receive_text())
+                text = await socket.receive_text()
+                try:
+                    self._obey(page, parse_message(text))
+                except (RefusedMessage, ValueError) as error:
+                    is_note = text.startswith(_NOTE)
+                    page.send(_refused(str(error)) if is_note else json.dumps({"say": str(error)}))
         except (WebSocketDisconnect, KeyError):  # it is gone, or sent bytes
             pass
         finally:
@@ -147,16 +152,9 @@ class LiveSockets:
             presence.gone(page.secret)
             sender.cancel()
 
-    def _hear(self, page: OpenPage, text: str) -> None:
-        try:
-            self._obey(page, parse_message(text))
-        except (RefusedMessage, ValueError) as error:
-            is_note = text.startswith(_NOTE)
-            page.send(_refused(str(error)) if is_note else json.dumps({"say": str(error)}))
-
     def _obey(self, page: OpenPage, message: PageMessage) -> None:
         """Do what a page in control says; a page that looks is told so."""
-        presence, now_ns = self._server_state.presence, time.monotonic_ns()
+        presence, now_ns = self._state.presence, time.monotonic_ns()
         if message.kind == "beat":
             presence.beat(page.secret, now_ns)
             if self._attached is not None and presence.has_control(page.secret):
@@ -172,11 +170,11 @@ class LiveSockets:
         if message.kind == "leave":
             presence.leave(page.secret, now_ns)
         if message.kind in ("emergency", "leave"):
-            self._server_state.stop_check()
+            self._state.stop_check()
         attached = self._attached
         if attached is None:
             if message.kind == "emergency":
-                self._server_state.press_stop()
+                self._state.press_stop()
             return
         status = attached.memory.status
         if message.kind == "emergency":
@@ -192,7 +190,7 @@ class LiveSockets:
                 attached.notes.append(json_line(message.note).decode())
                 attached.post_notes()
                 score = message.note.get("score")
-                doubt = "" if score is None else off_scale(self._server_state.place, score)
+                doubt = "" if score is None else off_scale(self._state.place, score)
                 page.send(json.dumps({"noted": True} | ({"say": doubt} if doubt else {})))
             else:
                 page.send(_refused("the loop takes no notes now; send it again later"))
@@ -217,7 +215,7 @@ class LiveSockets:
 
     def _follow(self) -> None:
         """Attach to a session that began, let go of one that ended."""
-        running, attached = self._server_state.running, self._attached
+        running, attached = self._state.running, self._attached
         if attached is not None and attached.running is not running:
             attached.memory.leave()
             self._attached = None
@@ -226,17 +224,17 @@ class LiveSockets:
                 self._attached = _Attached(running)
 
     def _send_state(self) -> None:
-        server_state, attached = self._server_state, self._attached
+        state, attached = self._state, self._attached
         shown: dict[str, Any] = {
-            "starting": server_state.starting,
-            "checking": server_state.checking,
+            "starting": state.starting,
+            "checking": state.checking,
             "session": None,
             "finished": None,
         }
         if attached is not None:
             shown["session"] = attached.state()
-        elif server_state.finished is not None and not server_state.in_session:
-            finished = server_state.finished
+        elif state.finished is not None and not state.in_session:
+            finished = state.finished
             shown["finished"] = {
                 "number": finished.number,
                 "folder": finished.folder.name,
@@ -244,7 +242,7 @@ class LiveSockets:
                 "sentences": list(finished.sentences),
             }
         for page in self._pages:
-            control = server_state.presence.has_control(page.secret)
+            control = state.presence.has_control(page.secret)
             page.send(json.dumps({"state": shown, "control": control}))
 
 

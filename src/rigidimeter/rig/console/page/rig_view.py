@@ -26,7 +26,7 @@ class RigView:
 
     Parameters
     ----------
-    server_state : ServerState
+    state : ServerState
     jobs : Jobs
     may_act : callable
         Whether the page may act now; it says why not.
@@ -40,23 +40,21 @@ class RigView:
 
     def __init__(
         self,
-        server_state: ServerState,
+        state: ServerState,
         jobs: Jobs,
         may_act: Callable[[], bool],
         in_control: Callable[[], bool],
         settings: Callable[[], Settings | None],
         checked: Callable[[], None],
     ) -> None:
-        self._server_state, self._jobs = server_state, jobs
+        self._state, self._jobs = state, jobs
         self._may_act, self._in_control, self._settings = may_act, in_control, settings
         self._checked = checked
         self._steps: tuple[RigStep, ...] = ()
         self._rows()
         self._question = ui.element("div").props('role="alertdialog" aria-label="Question"')
         self._question.classes("question").set_visibility(False)
-        self._stop = ui.button("Stop the check", on_click=server_state.stop_check).mark(
-            "stop-check"
-        )
+        self._stop = ui.button("Stop the check", on_click=state.stop_check).mark("stop-check")
         self._stop.set_visibility(False)
         self._said = ui.html("", sanitize=False).classes("answer")
 
@@ -98,7 +96,7 @@ class RigView:
         if settings is None:
             ui.notify("first put right what is wrong in the form")
             return
-        if not self._server_state.begin_check(CHECKING[action]):
+        if not self._state.begin_check(CHECKING[action]):
             return
         self._stop.set_visibility(True)
         self._said.set_content(f"<p>{CHECKING[action]} …</p>")
@@ -106,11 +104,7 @@ class RigView:
             with tempfile.TemporaryDirectory(prefix="rigidimeter-check-") as name:
                 path = Path(name) / "protocol.toml"
                 path.write_text(toml_text(dump_settings(settings)), encoding="utf-8")
-                rig = (
-                    ()
-                    if self._server_state.place.rig is None
-                    else (str(self._server_state.place.rig),)
-                )
+                rig = () if self._state.place.rig is None else (str(self._state.place.rig),)
                 answer = await self._jobs.conversation(
                     "check", *rig, "--settings", str(path), "--piped",
                     *(("--zero",) if action == "zero" else ()),
@@ -119,7 +113,7 @@ class RigView:
                     going_on=self._going_on,
                 )  # fmt: skip
         finally:
-            self._server_state.end_check()
+            self._state.end_check()
             self._stop.set_visibility(False)
             self._question.set_visibility(False)
         if action == "zero":
@@ -134,8 +128,8 @@ class RigView:
         self._said.set_content(CommandResult(True, text).html())
 
     def _going_on(self) -> bool:
-        lost = self._server_state.presence.lost(time.monotonic_ns())
-        return self._in_control() and not lost and not self._server_state.check_stopped
+        lost = self._state.presence.lost(time.monotonic_ns())
+        return self._in_control() and not lost and not self._state.check_stopped
 
     async def _ask(self, question: str) -> bool:
         """Put a question on the page, beside nothing that could hide the emergency stop."""

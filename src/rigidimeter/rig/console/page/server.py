@@ -44,7 +44,7 @@ class PageServer:
 
     Parameters
     ----------
-    server_state : ServerState
+    state : ServerState
     jobs : Jobs
         What the page can have computed beside a session.
     host : str
@@ -60,7 +60,7 @@ class PageServer:
     """
 
     def __init__(
-        self, server_state: ServerState, jobs: Jobs, host: str, port: int, token: str = ""
+        self, state: ServerState, jobs: Jobs, host: str, port: int, token: str = ""
     ) -> None:
         if token and _TOKEN.fullmatch(token) is None:
             raise UserError(
@@ -68,7 +68,7 @@ class PageServer:
                 "address; use 16 or more of A-Z, a-z, digits, - and _"
             )
         self._token = token or ("" if is_loopback(host) else secrets.token_urlsafe(24))
-        self._server_state, self._jobs = server_state, jobs
+        self._state, self._jobs = state, jobs
         self._socket = _listening(host, port)
         self._host, self._port = host, self._socket.getsockname()[1]
         names = ("localhost", socket.gethostname(), host)
@@ -117,7 +117,7 @@ class PageServer:
         asyncio.run(self._server.serve(sockets=[self._socket]))
 
     def _app(self) -> FastAPI:
-        sockets = LiveSockets(self._server_state)
+        sockets = LiveSockets(self._state)
 
         @contextlib.asynccontextmanager
         async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -131,7 +131,7 @@ class PageServer:
 
         @app.get("/report/{folder}/{path:path}")
         def report(folder: str, path: str) -> Response:
-            found = report_file(self._server_state.place.root, folder, path)
+            found = report_file(self._state.place.root, folder, path)
             if found is None:
                 return PlainTextResponse("there is no such report", 404)
             return FileResponse(found, headers={"Content-Security-Policy": POLICY})
@@ -143,7 +143,7 @@ class PageServer:
         def page() -> None:
             secret = secrets.token_urlsafe(24)
             sockets.admit(secret)
-            show_page(self._server_state, self._jobs, secret)
+            show_page(self._state, self._jobs, secret)
 
         ui.page("/", title="rigidimeter")(page)
         # To compress what a page loads would hold up the beats of the page in control.
@@ -180,19 +180,19 @@ def _listening(host: str, port: int) -> socket.socket:
     return made
 
 
-def show_page(server_state: ServerState, jobs: Jobs, secret: str) -> None:
+def show_page(state: ServerState, jobs: Jobs, secret: str) -> None:
     """Build a page.
 
     Parameters
     ----------
-    server_state : ServerState
+    state : ServerState
     jobs : Jobs
     secret : str
         Of this page alone: the script says it to the socket, so the server knows both as one.
     """
 
     def in_control() -> bool:
-        return server_state.presence.has_control(secret)
+        return state.presence.has_control(secret)
 
     ui.colors(primary="#0050a0")  # white on it has a contrast of 8 to 1
     ui.add_head_html(
@@ -206,9 +206,9 @@ def show_page(server_state: ServerState, jobs: Jobs, secret: str) -> None:
     ui.html(_during(), sanitize=False).classes("rig")
     with ui.element("section").classes("view").props("id=view-before"):
         unfinished = ui.label("").classes("problem").props('role="status"')
-        BeforeView(server_state, jobs, in_control)
+        BeforeView(state, jobs, in_control)
     with ui.element("section").classes("view").props("id=view-after"):
-        AfterView(server_state, jobs, in_control, unfinished)
+        AfterView(state, jobs, in_control, unfinished)
 
 
 @cache

@@ -11,6 +11,8 @@ import itertools
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
+from operator import getitem
 from typing import Any
 
 from rigidimeter.core.errors import UserError
@@ -103,7 +105,7 @@ def empty_form(settings: Settings) -> dict[str, str]:
 
 def _shown(values: Mapping[str, Any]) -> dict[str, str]:
     """Return the settings as the form shows them: with fewer digits than they may have."""
-    shown = {one.key: f"{_at(values, one.path):.10g}" for one in SETTINGS}
+    shown = {one.key: f"{reduce(getitem, one.path.split('.'), values):.10g}" for one in SETTINGS}
     return shown | {
         "rests": "; ".join(f"{rest_s:.10g}" for rest_s in values["protocol"]["rests_s"])
     }
@@ -248,9 +250,3 @@ def _needed(text: str, what: str) -> str:
     if not entered:
         raise UserError(f"{what}: must be given")
     return entered
-
-
-def _at(values: Mapping[str, Any], path: str) -> Any:
-    for part in path.split("."):
-        values = values[part]
-    return values

@@ -155,18 +155,15 @@ class AsciiDrive:
         if not self._configured:
             raise DeviceError("drive: enable before configure; call connect and configure first")
         try:
-            self._enable()
+            self._powered, self._reported_off = True, False
+            self._talking().energise(self._state_on, self._jump)
+            self._sent = 0
+            self._start_sampling()
+            self._commanded_s = self._now()
+            self._commanding = True
         except DeviceError:
             self.disable()
             raise
-
-    def _enable(self) -> None:
-        self._powered, self._reported_off = True, False
-        self._talking().energise(self._state_on, self._jump)
-        self._sent = 0
-        self._start_sampling()
-        self._commanded_s = self._now()
-        self._commanding = True
 
     # -- the loop -----------------------------------------------------------------------------
 
