@@ -354,7 +354,7 @@ HAND_MADE = tuple(
         (SINK, "if words[ended]:", "if False:", "the arm moves on though told to end"),
         (SINK, "now_ns - words[console] > self._console_ns", "False", "nobody is there"),
         (SINK, "now_ns - words[recorder] > self._recorder_ns", "False", "nothing is recorded"),
-        (SINK, "self._samples.lag() > self._most_lag", "False", "samples are lost"),
+        (SINK, "self._samples.lag() > self._max_lag", "False", "samples are lost"),
         (SINK, "getppid() != self._console_pid", "False", "a killed console is missed for a while"),
         (SINK, "return self._status.take()", "return Order()", "the operator is not heard"),
         (

@@ -186,7 +186,7 @@ class SharedSupervision:
         self._status, self._samples = shared.status, shared.samples
         self._console_ns = round(1e9 * console_lost_s)
         self._recorder_ns = round(1e9 * recorder_lost_s)
-        self._most_lag = shared.samples.capacity // 2 if max_lag is None else max_lag
+        self._max_lag = shared.samples.capacity // 2 if max_lag is None else max_lag
         self._now_ns, self._boot_ns = now_ns, boot_ns
         # The clock that goes on is read first: what goes by between the two readings makes the
         # difference smaller, and so never looks like a suspension.
@@ -218,7 +218,7 @@ class SharedSupervision:
         if now_ns - words[recorder] > self._recorder_ns:
             self.measured = 1e-9 * (now_ns - words[recorder])
             return _RECORDER_LOST
-        if self._samples.lag() > self._most_lag:
+        if self._samples.lag() > self._max_lag:
             self.measured = float(self._samples.lag())
             return _RECORD_OVERFLOW
         return _NONE

@@ -97,10 +97,7 @@ class AfterView:
 
     def _follow(self) -> None:
         """Fold the list when a session begins; when it has ended, list it and unfold it."""
-        began, self._ran = (
-            self._state.in_session and not self._ran,
-            self._state.in_session,
-        )
+        began, self._ran = (self._state.in_session and not self._ran, self._state.in_session)
         if began:
             for row in self._rows.values():
                 row.frame.close()
