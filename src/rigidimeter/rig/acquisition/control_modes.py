@@ -34,7 +34,6 @@ from rigidimeter.rig.guard import released
 LARGEST_FACTOR = 10.0
 """A parameter may grow to so many times the protocol's value."""
 
-
 SPARE_TICKS = 10
 """A ramp to rest may take so many ticks more than the speed and the acceleration limit say."""
 

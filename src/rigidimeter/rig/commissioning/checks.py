@@ -8,7 +8,6 @@ from typing import Literal
 
 Outcome = Literal["passed", "failed", "not possible here", "not tried"]
 
-
 NOBODY = "only a person can tell; commission again without --yes"
 
 

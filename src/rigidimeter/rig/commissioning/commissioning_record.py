@@ -64,10 +64,8 @@ A_PERSON_TELLS = (
 )
 """Checks without which nobody is put into a rig of hardware; an emulated one holds no person."""
 
-
 VOLATILE = {"status", "bias", "cycle_s", "latched_faults_before"}
 """Values that devices report and that change without meaning another calibration."""
-
 
 LIMITS = ("guard", "loop", "zeroing", "prbs", "sinusoid")
 """Tables whose numbers may be smaller than those a record was made with, never larger."""

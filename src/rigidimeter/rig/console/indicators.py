@@ -23,7 +23,6 @@ from rigidimeter.rig.guard import Cause, Limited
 
 RECENT_S = 1.0
 
-
 NEAR = 0.8
 """From this part of a limit on, the joint is near it."""
 

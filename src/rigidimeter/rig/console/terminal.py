@@ -36,11 +36,9 @@ from rigidimeter.rig.console.session_progress import SessionPlan
 QUESTION = "question: "
 """With which a command begins a line that somebody must answer."""
 
-
 LEAVE = b"\x1b[0m\n"
 LEAVE_S = 0.5
 """For so long it is tried to end the line on a terminal that takes no output."""
-
 
 KEYS_HELP = (
     "SPACE or e: EMERGENCY STOP, h: halt (power off), other keys: pause now; p pause after this "

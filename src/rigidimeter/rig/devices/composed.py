@@ -28,7 +28,6 @@ from rigidimeter.rig.guard import REACTIONS, Cause
 ATTEMPTS, ATTEMPT_S = 50, 0.002
 """How often, and at what interval, the first samples after enabling are polled."""
 
-
 BUFFERED_S = 1.0
 """A sensor's samples of a longer time than this may not fit into the buffer of its connection."""
 

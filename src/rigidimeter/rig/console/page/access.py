@@ -54,7 +54,6 @@ Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
 Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
-
 MAX_CONNECTIONS = 128
 """At once, with the sockets of pages; a browser opens some eight for a page."""
 

@@ -69,7 +69,7 @@ class AfterView:
         self._acts = Acts(
             recover=self._recover,
             run_rest=self._run_rest,
-            estimate=self._estimate,
+            estimate=lambda one: self._command("estimate", one.name, *one.options),
             report=self._report,
             show=self._show,
             repeat=self._repeat,
@@ -189,10 +189,6 @@ class AfterView:
         for text in extended(self._state.place):
             ui.notify(text)
         self._update()
-
-    async def _estimate(self, session: FoundSession) -> None:
-        """Estimate J, B and K of each epoch."""
-        await self._command("estimate", session.name, *session.options)
 
     async def _report(self, session: FoundSession) -> None:
         """Make the report of a session."""

@@ -41,7 +41,6 @@ from rigidimeter.rig.console.page.session_form import (
 DRAFT = "draft.json"
 DETECTED = ("--detect", "damping=20%", "--detect", "stiffness=20%")
 
-
 MAX_FILES = 100
 OF_A_RIG = ("torque_sensor", "drive")
 """Tables that a rig file has, and no protocol."""

@@ -39,7 +39,6 @@ ORDERS = {
 Kind = Literal["hello", "beat", "leave", "emergency", "order", "note", "save"]
 KINDS = ("hello", "beat", "leave", "emergency", "order", "note", "save")
 
-
 LEVELS = {Level.UNKNOWN: "off", Level.GOOD: "ok", Level.WATCH: "warn", Level.BAD: "bad"}
 """What the page calls the levels of an indicator; each has a colour there."""
 

@@ -42,7 +42,6 @@ MAX_SESSIONS = 200
 NEVER_S = 1e9
 """When an epoch ended that nobody ended: later than any."""
 
-
 PAGE = "report.html"
 OF_STUDY = "report"
 _FOR_SESSION = "-report"
