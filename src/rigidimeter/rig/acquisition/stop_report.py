@@ -83,10 +83,10 @@ class StopReport(NamedTuple):
         known = math.isfinite(found.value)
         if known:
             parts.append(f"{found.value:.3g} {found.unit}".strip())
-        if (
-            known and math.isfinite(found.duration_s) and found.unit not in ("ms", "s")
-        ):  # they say it
-            parts.append(_time(found.duration_s))
+        lasted_s = found.duration_s
+        if known and math.isfinite(lasted_s) and found.unit not in ("ms", "s"):  # they say it
+            ms = f"{1e3 * lasted_s:.3g} ms"
+            parts.append(f"for {lasted_s:.3g} s" if lasted_s >= 1.0 else f"for {ms}")
         if known and math.isfinite(found.limit):
             limit = "at least" if found.at_least else "limit"
             where = f" ({found.setting})" if found.setting else ""
@@ -118,10 +118,6 @@ def report_stop(latched: Latched) -> StopReport:
     if cause is Cause.STALLED and latched.measured > latched.settings.loop.stall_s:
         remedy = SUSPENDED
     return StopReport(cause, find(latched) if find else Found(), remedy)
-
-
-def _time(seconds: float) -> str:
-    return f"for {seconds:.3g} s" if seconds >= 1.0 else f"for {1e3 * seconds:.3g} ms"
 
 
 def _passed_s(latched: Latched) -> float:
