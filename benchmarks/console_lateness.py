@@ -37,7 +37,7 @@ from rigidimeter.core.settings import load_settings
 from rigidimeter.rig.acquisition import Command, Order
 from rigidimeter.rig.acquisition.processes import Realtime, SessionMemory
 from rigidimeter.rig.console import SessionPlan
-from rigidimeter.rig.console.page import Desk, PageServer, Place, RunningSession, Work
+from rigidimeter.rig.console.page import Jobs, PageServer, Place, RunningSession, ServerState
 
 SETTLES_S = 1.0
 """So much of the beginning of a window does not count: the page draws what it has missed."""
@@ -130,9 +130,9 @@ class _Turns:
 def _serve_page(names: tuple[str, str, str], plan: SessionPlan, folder: Path, drawn: Any) -> None:
     """Serve the page of a session that runs, and open it in Chromium; a process of its own."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    desk = Desk(Place(folder.parent, plan.settings, "the protocol"))
-    desk.running = RunningSession(1, names, plan, folder)
-    server = PageServer(desk, Work(), "127.0.0.1", 0)
+    state = ServerState(Place(folder.parent, plan.settings, "the protocol"))
+    state.running = RunningSession(1, names, plan, folder)
+    server = PageServer(state, Jobs(), "127.0.0.1", 0)
     server.start()
     parent = os.getppid()
     with open_browser() as opened:

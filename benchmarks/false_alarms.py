@@ -185,22 +185,20 @@ def compiled() -> Callable[..., tuple[int, int]]:
     solved_for = made(torque_sign.solved_for)
     sign = made(
         torque_sign.sign_is_wrong,
-        table=made(torque_sign.table),
-        explained=made(torque_sign.explained, solved_for=solved_for),
+        difference_columns=made(torque_sign.difference_columns),
+        explained_answer=made(torque_sign.explained_answer, solved_for=solved_for),
         whitened=made(torque_sign.whitened, solved_for=solved_for),
         without=made(torque_sign.without),
         fits_better=made(
             torque_sign.fits_better,
-            least_of_each_sign=made(
-                torque_sign.least_of_each_sign, solved=made(torque_sign.solved)
-            ),
+            left_by_each_sign=made(torque_sign.left_by_each_sign, solved=made(torque_sign.solved)),
         ),
     )
     one_step = made(
         torque_answer.one_step,
         Cause=causes,
         lowpassed=made(torque_answer.lowpassed),
-        keep_row=made(torque_answer.keep_row),
+        store_row=made(torque_answer.store_row),
         a_window_shows_the_wrong_sign=made(
             torque_answer.a_window_shows_the_wrong_sign, sign_is_wrong=sign
         ),

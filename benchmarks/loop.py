@@ -34,7 +34,7 @@ from rigidimeter.rig.acquisition.processes import (
     Ended,
     LoopSide,
     Realtime,
-    Recording,
+    RecordingPlan,
     SessionMemory,
     supervise,
 )
@@ -153,7 +153,7 @@ def measure(settings: Settings, seconds: float, folder: Path, cpu: int) -> Laten
     try:
         ended = supervise(
             partial(virtual_session, settings, seconds),
-            Recording(folder, settings, virtual=True),
+            RecordingPlan(folder, settings, virtual=True),
             realtime=Realtime(priority=PRIORITY, cpu=cpu, attended=False),
             console=console,
         )

@@ -31,7 +31,7 @@ from rigidimeter.core.session import read_samples
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.planning import prbs_nm
 from rigidimeter.rig.acquisition import SimulatedClock, perturb, rest, tick
-from rigidimeter.rig.acquisition.processes import LoopSide, Realtime, Recording, supervise
+from rigidimeter.rig.acquisition.processes import LoopSide, Realtime, RecordingPlan, supervise
 from rigidimeter.rig.devices import SimulatedRig
 from rigidimeter.rig.guard import consistency_limits, consistency_state
 
@@ -81,7 +81,7 @@ def lateness(seconds: float, cpu: int) -> None:
         session = Path(folder) / "session"
         ended = supervise(
             partial(in_turn, settings, seconds),
-            Recording(session, settings, virtual=True),
+            RecordingPlan(session, settings, virtual=True),
             realtime=Realtime(priority=PRIORITY, cpu=cpu, attended=False),
         )
         samples = read_samples(session / "samples.arrows")

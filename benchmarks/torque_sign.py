@@ -39,8 +39,8 @@ from rigidimeter.rig.guard import (
     INSTRUMENTS,
     PASSES,
     Cause,
-    explained,
-    table,
+    difference_columns,
+    explained_answer,
     torque_answer,
     whitened,
 )
@@ -304,9 +304,12 @@ def ratios(settings: Settings, epochs: int) -> str:
         half = window.shape[0] // 2
         end = count % half + half + 1
         if count >= rows:
-            columns, weights = table(window[end - rows - BEFORE : end]), np.zeros(INSTRUMENTS)
+            columns, weights = (
+                difference_columns(window[end - rows - BEFORE : end]),
+                np.zeros(INSTRUMENTS),
+            )
             for _ in range(PASSES):
-                noise, answer, weights = explained(whitened(columns, weights, order))
+                noise, answer, weights = explained_answer(whitened(columns, weights, order))
             by_chance = noise * INSTRUMENTS / free
             found.append(max(float(answer[-1, -1]) - by_chance, 0.0) / noise * free / rows)
         return False

@@ -19,10 +19,10 @@ from rigidimeter.core.session import Sample
 from rigidimeter.core.settings import parse_settings
 from rigidimeter.rig.acquisition import Command, DeadlineClock
 from rigidimeter.rig.acquisition.processes import (
-    Condition,
     Patience,
+    ProcessCondition,
     Realtime,
-    Recording,
+    RecordingPlan,
     Role,
     supervise,
 )
@@ -30,7 +30,7 @@ from rigidimeter.rig.guard import Cause
 
 RATE_HZ = 500
 PR_SET_PDEATHSIG = 1  # of prctl(2)
-PATIENCE = Patience(look_s=0.05, loop_lost_s=1.0, hung_s=2.0, disk_s=1.0)
+PATIENCE = Patience(poll_s=0.05, loop_lost_s=1.0, hung_s=2.0, disk_s=1.0)
 SETTINGS = parse_settings({"loop": {"console_lost_s": 1.0, "recorder_lost_s": 1.0}})
 
 
@@ -77,7 +77,7 @@ def main() -> None:
             part = folder.with_name("pids.part")
             part.write_text(json.dumps(pids))
             part.replace(folder.with_name("pids.json"))
-        if shared_status.condition(Role.RECORDER) is Condition.TROUBLE:
+        if shared_status.condition(Role.RECORDER) is ProcessCondition.TROUBLE:
             seen["trouble"] = shared_status.note(Role.RECORDER)
             if save_to is not None:
                 shared_status.ask_folder(save_to)
@@ -89,7 +89,7 @@ def main() -> None:
 
     ended = supervise(
         partial(ticks, duration_s),
-        Recording(folder, SETTINGS, virtual=True),
+        RecordingPlan(folder, SETTINGS, virtual=True),
         realtime=Realtime(priority=0, lock_memory=False, live_estimate="live" in sys.argv),
         patience=PATIENCE,
         console=console,

@@ -22,11 +22,11 @@ from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.planning import plan
 from rigidimeter.rig.acquisition import DeadlineClock, run_session
 from rigidimeter.rig.acquisition.processes import (
-    Condition,
     LoopSide,
     Patience,
+    ProcessCondition,
     Realtime,
-    Recording,
+    RecordingPlan,
     Role,
     SessionMemory,
     supervise,
@@ -118,7 +118,7 @@ class Console:
 
     def __call__(self, shared: SessionMemory) -> None:
         shared_status = shared.status
-        if not self.said and shared_status.condition(Role.LOOP) is Condition.RUNNING:
+        if not self.said and shared_status.condition(Role.LOOP) is ProcessCondition.RUNNING:
             self.said = True
             said: dict[str, int | str] = {role.name: shared_status.pid(role) for role in Role}
             if self.memory:
@@ -138,7 +138,7 @@ def main(rig: str, folder: str, patience: str = "") -> None:
     settings = settings_for(drive_of(Path(rig)), usual)
     ended = supervise(
         partial(run_loop, settings, Path(rig)),
-        Recording(Path(folder), settings, seeds={"session": 1}),
+        RecordingPlan(Path(folder), settings, seeds={"session": 1}),
         realtime=Realtime(live_estimate=False, attended=False),
         patience=Patience() if usual else PATIENCE,
         console=Console(usual),

@@ -108,7 +108,7 @@ def test_fault_21_recorder_hangs(rig, tmp_path, shared_desk, measured):
 def test_fault_21_record_overflows(rig, tmp_path, shared_desk, measured):
     with bench(rig) as made:
         most = round(0.2 * made.rate_hz)
-        desk = shared_desk(made, most_lag=most)
+        desk = shared_desk(made, max_lag=most)
         trial = run(
             made,
             tmp_path / "s",

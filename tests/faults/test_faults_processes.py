@@ -254,7 +254,7 @@ def test_fault_21_disk_full(tmp_path, small_disk, measured):
         ballast = fill(small_disk)
         at_s = time.monotonic()
         # What waits is looked at now and then, and a batch may have had room.
-        bound_s = RECORDER_LOST_S + 4 * PATIENCE.look_s + 126 / 6000 + 0.03
+        bound_s = RECORDER_LOST_S + 4 * PATIENCE.poll_s + 126 / 6000 + 0.03
         rest_s = running.rest_s(at_s, bound_s)
         assert rest_s <= bound_s + slack_s(at_s)
         assert not running.bench.state()["power"]

@@ -15,8 +15,8 @@ from tests.faults.written_ring import Ring
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import read_events, read_samples
 from rigidimeter.rig.acquisition.processes import (
-    Condition,
     Patience,
+    ProcessCondition,
     Role,
     SharedStatus,
     complete_left,
@@ -143,8 +143,8 @@ def stopped_by_full_disk(run: Session, disk: Path) -> Path:
     run.running()
     ballast = fill(disk)
     status = status_of(run)
-    wait_for(lambda: status.condition(Role.LOOP) is Condition.DONE)
-    assert status.condition(Role.RECORDER) is Condition.TROUBLE
+    wait_for(lambda: status.condition(Role.LOOP) is ProcessCondition.DONE)
+    assert status.condition(Role.RECORDER) is ProcessCondition.TROUBLE
     status.close()
     assert run.process.poll() is None
     return ballast

@@ -46,10 +46,10 @@ EQUIVALENT: dict[str, str] = {
     ANSWER + "one_step: if steps > 0: ... → if True: ...": EMPTY,
     ANSWER + "one_step: steps > 0 → steps >= 0": EMPTY,
     ANSWER + "one_step: 0 → -1": EMPTY,
-    ANSWER + "keep_row: rows % half + half → rows % half - half": "a place below zero counts from "
+    ANSWER + "store_row: rows % half + half → rows % half - half": "a place below zero counts from "
     "the end",
-    SIGN + "table: 1.0 → 1.01": OF_NOTHING,
-    SIGN + "table: 1.0 → 0.9900990099009901": OF_NOTHING,
+    SIGN + "difference_columns: 1.0 → 1.01": OF_NOTHING,
+    SIGN + "difference_columns: 1.0 → 0.9900990099009901": OF_NOTHING,
     SIGN + "whitened: 0 → -1": "a column has one dimension",
     SIGN + "whitened: 1.0 → 1.01": BOTH_SIDES,
     SIGN + "whitened: 1.0 → 0.9900990099009901": BOTH_SIDES,
@@ -57,8 +57,8 @@ EQUIVALENT: dict[str, str] = {
     SIGN + "whitened: 0.0 → -0.001 #2": OF_NOTHING,
     SIGN + "solved_for: 0 → 1": SQUARE,
     SIGN + "solved_for: 0 → -1": SQUARE,
-    CAN + "_check_watchdog: now_s - min(wire.told_s, wire.asked_s) > self._stops_itself_s → "
-    "now_s - min(wire.told_s, wire.asked_s) >= self._stops_itself_s": MOMENT,
+    CAN + "_check_watchdog: now_s - min(wire.commanded_s, wire.asked_s) > self._stops_itself_s → "
+    "now_s - min(wire.commanded_s, wire.asked_s) >= self._stops_itself_s": MOMENT,
     CAN + "_find_cause: now_s - wire.heard_s > settings.heartbeat_s + settings.lost_s → "
     "now_s - wire.heard_s >= settings.heartbeat_s + settings.lost_s": MOMENT,
     CAN + "_find_cause: now_s > self._settled_s → now_s >= self._settled_s": MOMENT,
@@ -82,7 +82,7 @@ EQUIVALENT: dict[str, str] = {
     NEAR + "left >= speed * (reach_s + limits.interval_s + held_s) + stopping → "
     "left > speed * (reach_s + limits.interval_s + held_s) + stopping": SLOWER,
     NEAR + "1 → 0": "a whole round of the ring is where it began",
-    "step.py _gravest: reported != _NO_CAUSE and REACTIONS[reported] >= REACTIONS[found] → "
+    "step.py _most_serious: reported != _NO_CAUSE and REACTIONS[reported] >= REACTIONS[found] → "
     "REACTIONS[reported] >= REACTIONS[found]": "no cause has the least reaction: both are none",
     "step.py guard_step: if found != _NO_CAUSE: ... → if True: ...": "no cause changes neither it "
     "nor the reaction",
@@ -90,7 +90,8 @@ EQUIVALENT: dict[str, str] = {
     "step.py _stoppable_speed: distance_rad <= 0.0 → distance_rad < 0.0": "the root gives 0, too",
     "session_run.py run_session: 0 → 1": "the next number where no epoch is planned: none repeats",
     "session_run.py run_session: 0 → -1": "the next number where no epoch is planned: none repeats",
-    "zeroing.py moved: range_deg <= limit_deg + settings.rig.motion.angle_resolution_deg → "
+    "zeroing.py motion_objection: "
+    "range_deg <= limit_deg + settings.rig.motion.angle_resolution_deg → "
     "range_deg < limit_deg + settings.rig.motion.angle_resolution_deg": MOMENT,
     LOOP + "self.elapsed_ticks = 1 → pass": SET,
     LOOP + "1 → 2": SET,
@@ -112,11 +113,10 @@ EQUIVALENT: dict[str, str] = {
     "sent as it was allowed is the guard's velocity already",
     "tick.py run_tick: loop.limit_time_s <= due_s → loop.limit_time_s < due_s": "a later tick is "
     "due later",
-    "stop_report.py : if TYPE_CHECKING: ... → if False: ...": "it is never true where it runs",
     "stop_report.py _stalled: if math.isfinite(latched.measured): ... → if True: ...": "of a "
     "number and NaN after it the number is the larger",
-    "ramp.py ramp_to_rest: 0 → 1": RAMP,
-    "ramp.py ramp_to_rest: 0 → -1": RAMP,
+    "control_modes.py ramp_to_rest: 0 → 1": RAMP,
+    "control_modes.py ramp_to_rest: 0 → -1": RAMP,
     "ring_writer.py SharedSupervision.__init__: 3 → 4": "one look at both clocks more",
     "tick.py run_tick: 0 → 1": RAMP,
     "tick.py run_tick: 0 → -1": RAMP,

@@ -29,21 +29,22 @@ class HandMade(NamedTuple):
         return Mutant(path, f"{self.file}: {where} ({self.effect})", source)
 
 
-TICK, RAMP = "rig/acquisition/tick.py", "rig/acquisition/ramp.py"
+TICK = "rig/acquisition/tick.py"
 MODES = "rig/acquisition/control_modes.py"
 SESSION = "rig/acquisition/session_run.py"
+SESSION_END = "rig/acquisition/session_end.py"
 ZEROING = "rig/acquisition/zeroing.py"
 RUN = "rig/acquisition/controller_run.py"
 STATES = "rig/acquisition/run_states.py"
 SINK = "rig/acquisition/processes/ring_writer.py"
-SIGNALS, DISK, LOOP, RECORDER, RECORDS, CONSOLE = (
+SIGNALS, LOOP, RECORDER, RECORDS, CONSOLE = (
     f"rig/acquisition/processes/{name}.py"
     for name in (
-        *("end_signals", "full_disk", "loop_process", "recorder", "recorder_process"),
+        *("end_signals", "loop_process", "recorder", "recorder_process"),
         "supervisor",
     )
 )
-PAGE, PAGES_DESK = "rig/console/page/live_socket.py", "rig/console/page/desk.py"
+PAGE, SERVER_STATE = "rig/console/page/live_socket.py", "rig/console/page/server_state.py"
 STEP, WATCH, LIMITS = "rig/guard/step.py", "rig/guard/watch.py", "rig/guard/limits.py"
 AGREEMENT = "rig/guard/agreement.py"
 CONSISTENCY, ANSWER = "rig/guard/consistency.py", "rig/guard/torque_answer.py"
@@ -53,7 +54,7 @@ HAND_MADE = tuple(
     HandMade(*fault)
     for fault in (
         # Time
-        (TICK, "        loop.rig.read(late)\n", "", "begins with readings from before enabling"),
+        (MODES, "        loop.rig.read(late)\n", "", "begins with readings from before enabling"),
         (TICK, "loop.rig.read(loop.elapsed_ticks)", "loop.rig.read()", "rig not told of missed"),
         (TICK, "    loop.tick += ticks\n", "", "a late tick is made up for: commands in a burst"),
         (TICK, "elapsed_ticks = ticks + 1", "elapsed_ticks = 1", "missed ticks told to nobody"),
@@ -76,21 +77,21 @@ HAND_MADE = tuple(
         ),
         (TICK, "if from_outside == STALLED:", "if False:", "the same after a suspension"),
         (
-            RAMP,
+            MODES,
             "        loop.clock.wait_until(loop.time_s)\n        loop.rig.write(velocity)",
             "        loop.rig.write(velocity)",
             "a ramp without waiting: the arm is stopped with a blow",
         ),
         (
-            RAMP,
+            MODES,
             "max(abs(velocity) - _brake_rad_s(loop), 0.0)",
             "0.0",
             "a ramp that cannot be recorded is a blow",
         ),
-        (RAMP, "        _ramp_unrecorded(loop)\n", "", "a fault of the program leaves it moving"),
-        (RAMP, "except BaseException:", "except Exception:", "an interrupt leaves it moving"),
+        (MODES, "        _ramp_unrecorded(loop)\n", "", "a fault of the program leaves it moving"),
+        (MODES, "except BaseException:", "except Exception:", "an interrupt leaves it moving"),
         (
-            RAMP,
+            MODES,
             "math.ceil(abs(loop.guard.velocity_rad_s) / _brake_rad_s(loop))",
             "0",
             "a long ramp ends before rest and the power is cut",
@@ -135,7 +136,7 @@ HAND_MADE = tuple(
             "False",
             "no order is taken",
         ),
-        (TICK, "        apart,\n    )", "    )", "motion nobody commanded is not stopped"),
+        (TICK, "        disagreement,\n    )", "    )", "motion nobody commanded is not stopped"),
         (
             TICK,
             "        loop.elapsed_ticks,\n    )\n    loop.guard",
@@ -256,7 +257,7 @@ HAND_MADE = tuple(
         ),
         (
             SESSION,
-            "why or moved(readings, session.settings)",
+            "why or motion_objection(readings, session.settings)",
             "why",
             "zeroed while the joint moves",
         ),
@@ -286,45 +287,50 @@ HAND_MADE = tuple(
             "a hold after the order to go on is released at once",
         ),
         (
-            SESSION,
+            SESSION_END,
             "    try:\n        ramp_to_rest(run.loop)\n    finally:\n",
             "    ramp_to_rest(run.loop)\n    if True:\n",
             "a ramp that fails leaves the power on and the record open",
         ),
         (
-            SESSION,
+            SESSION_END,
             "    finally:\n        rig.disable()",
             "    except ZeroDivisionError:\n        raise\n    else:\n        rig.disable()",
             "a drive that cannot be stopped keeps its power",
         ),
         (
-            SESSION,
+            SESSION_END,
             " else run.outcome\n        finally:",
             " else run.outcome\n        except ZeroDivisionError:\n"
             "            raise\n        else:",
             "where disabling fails the record stays open",
         ),
-        (SESSION, "    if rig.powered:", "    if False:", "a drive that is not off asks for hands"),
         (
-            SESSION,
-            "moved_rad > most_rad and work_j > 0.0",
+            SESSION_END,
+            "    if rig.powered:",
+            "    if False:",
+            "a drive that is not off asks for hands",
+        ),
+        (
+            SESSION_END,
+            "moved_rad > limit_rad and work_j > 0.0",
             "False",
             "a drive that moves with its power off is a success",
         ),
         (
-            SESSION,
+            SESSION_END,
             "if loop.cause in (Cause.DRIVE_LOST, Cause.DRIVE_STATE):",
             "if False:",
             "a drive that no longer obeys is not told to brake",
         ),
-        (SESSION, "            hold(loop, BRAKE_S)\n", "            pass\n", "falls unbraked"),
+        (SESSION_END, "            hold(loop, BRAKE_S)\n", "            pass\n", "falls unbraked"),
         (
             SESSION,
             '        run.outcome, run.reason = "fail", reason\n',
             "",
             "a program that failed ends with success",
         ),
-        (SESSION, "if run.open_epoch is not None:", "if False:", "an epoch stays open"),
+        (SESSION_END, "if run.open_epoch is not None:", "if False:", "an epoch stays open"),
         # Orders
         (RUN, "self._rig.disable()", "pass", "a halt leaves the power on for a tick"),
         (
@@ -348,7 +354,7 @@ HAND_MADE = tuple(
         (SINK, "if words[ended]:", "if False:", "the arm moves on though told to end"),
         (SINK, "now_ns - words[console] > self._console_ns", "False", "nobody is there"),
         (SINK, "now_ns - words[recorder] > self._recorder_ns", "False", "nothing is recorded"),
-        (SINK, "self._samples.lag() > self._most_lag", "False", "samples are lost"),
+        (SINK, "self._samples.lag() > self._max_lag", "False", "samples are lost"),
         (SINK, "getppid() != self._console_pid", "False", "a killed console is missed for a while"),
         (SINK, "return self._status.take()", "return Order()", "the operator is not heard"),
         (
@@ -412,12 +418,12 @@ HAND_MADE = tuple(
             "an epoch has ended in a record that lacks its samples",
         ),
         (
-            DISK,
+            RECORDER,
             "            self._over_s = None\n",
             "",
             "a disk with room again is given up at once",
         ),
-        (DISK, "        self._recording = new\n", "", "the operator is told of another disk"),
+        (RECORDER, "        self._recording = new\n", "", "the operator is told of another disk"),
         # The page
         (
             PAGE,
@@ -439,6 +445,6 @@ HAND_MADE = tuple(
             "a page that only looks keeps the arm moving",
         ),
         (PAGE, "            presence.gone(page.secret)\n", "", "a page that is gone keeps control"),
-        (PAGES_DESK, "still=self._still", "still=True", "the arm moves on without a page"),
+        (SERVER_STATE, "still=self._still", "still=True", "the arm moves on without a page"),
     )
 )

@@ -67,12 +67,12 @@ TESTS = {
     "rig/guard/watch.py": ("rig/guard/test_watch.py", *_STEP),
     "rig/acquisition/control_modes.py": ("rig/acquisition/test_modes.py", *_RUN),
     "rig/acquisition/controller_run.py": ("rig/acquisition/test_controller_run.py", *_RUN),
-    "rig/acquisition/ramp.py": _RUN,
     "rig/acquisition/run_states.py": (
         "rig/acquisition/test_states.py",
         "rig/acquisition/test_session_run.py",
     ),
     "rig/acquisition/session_run.py": ("rig/acquisition/test_session_run.py", *_RUN),
+    "rig/acquisition/session_end.py": ("rig/acquisition/test_session_end.py", *_RUN),
     "rig/acquisition/zeroing.py": (
         "rig/acquisition/test_zeroing.py",
         "rig/acquisition/test_session_run.py",
@@ -98,12 +98,11 @@ TESTS = {
 _WATCHED = ("rig/acquisition/test_watched_processes.py",)
 BY_HAND = {
     "rig/acquisition/processes/end_signals.py": ("rig/acquisition/test_signals.py",),
-    "rig/acquisition/processes/full_disk.py": ("rig/acquisition/test_ring_recovery.py",),
     "rig/acquisition/processes/loop_process.py": _WATCHED,
     "rig/acquisition/processes/recorder.py": ("rig/acquisition/test_ring_recovery.py",),
     "rig/acquisition/processes/recorder_process.py": _WATCHED,
     "rig/acquisition/processes/supervisor.py": _WATCHED,
-    "rig/console/page/desk.py": ("rig/console/page/test_presence.py",),
+    "rig/console/page/server_state.py": ("rig/console/page/test_presence.py",),
     "rig/console/page/live_socket.py": ("rig/console/page/test_live_socket.py",),
 }
 """The same of modules in which only the faults made by hand are looked for."""

@@ -13,7 +13,7 @@ import pytest
 from tests.lateness import ordinary_priority, same_priority
 from tests.wire.cia402_wire import GROUP, SLACK, emulated_arm, free_port, run_loop, wait_until
 
-from rigidimeter.rig.devices import Cia402Drive, Cia402Settings, State, state_of
+from rigidimeter.rig.devices import Cia402Drive, Cia402Settings, Cia402State, state_of
 from rigidimeter.rig.guard import Cause
 from rigidimeter.testing import Cia402Emulator
 
@@ -92,7 +92,7 @@ def test_a_drive_in_another_process_runs_and_is_missed_when_it_is_killed(started
         drive.enable()
         sample = run_loop(drive, 0.5, for_s=0.5)
         assert sample.cause == Cause.NONE
-        assert state_of(sample.status & 0xFFFF) is State.OPERATION_ENABLED
+        assert state_of(sample.status & 0xFFFF) is Cia402State.OPERATION_ENABLED
         assert sample.velocity_rad_s == pytest.approx(0.5, abs=0.01)
         emulator.kill()
         killed_s = time.monotonic()

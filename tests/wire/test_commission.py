@@ -21,7 +21,7 @@ from rigidimeter.rig.commissioning import (
     CommissioningRecord,
     Operator,
     check_record,
-    commission,
+    commission_rig,
     read_record,
     record_path,
     write_record,
@@ -60,7 +60,7 @@ def tried(
     **operator: Any,
 ) -> tuple[CommissioningRecord, list[str]]:
     rigfile, chosen = load_rig(rig), chosen.model_copy(update={"commissioning": QUICK})
-    record = commission(
+    record = commission_rig(
         setup(rigfile, chosen, Operator(ask=ask, **{"present": False, **operator})),
         rigfile,
         made_utc="2026-01-01T00:00:00+00:00",

@@ -11,7 +11,13 @@ import pytest
 from tests.wire.rig_process import RigProcess
 from tests.wire.trial_setup import settings, setup
 
-from rigidimeter.rig.commissioning import Compared, DailyRecord, Operator, Reference, daily_check
+from rigidimeter.rig.commissioning import (
+    Compared,
+    DailyRecord,
+    Operator,
+    ReferenceInertia,
+    daily_check,
+)
 from rigidimeter.rig.devices import load_rig
 
 pytest.importorskip("can")
@@ -44,7 +50,9 @@ def checked(bench: Any) -> DailyRecord:
             rigfile,
             lambda _: COMMISSIONED,
             compared=Compared(
-                reference=Reference(CUFF_KG_M2, 2e-5, "2026-01-01", COMMISSIONED.digest, "first")
+                reference=ReferenceInertia(
+                    CUFF_KG_M2, 2e-5, "2026-01-01", COMMISSIONED.digest, "first"
+                )
             ),
             made_utc="2026-01-02T08:00:00+00:00",
             software="0",

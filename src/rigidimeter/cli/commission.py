@@ -23,7 +23,7 @@ from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
     from rigidimeter.core.settings import Settings
-    from rigidimeter.rig.commissioning import Check, Operator, Setup
+    from rigidimeter.rig.commissioning import Operator, RigCheck, Setup
     from rigidimeter.rig.devices import RigFile
 
 
@@ -95,8 +95,7 @@ def commission(
 
     from rigidimeter.core.settings import load_settings
     from rigidimeter.core.version import __version__
-    from rigidimeter.rig.commissioning import commission as try_rig
-    from rigidimeter.rig.commissioning import record_path, sign_words, write_record
+    from rigidimeter.rig.commissioning import commission_rig, record_path, sign_words, write_record
     from rigidimeter.rig.devices import load_rig
 
     if eds is not None:
@@ -118,7 +117,7 @@ def commission(
         )
     asked = operator(yes=yes, known_torque_nm=known_torque, known_angle_deg=known_angle)
     with claimed(rigfile, chosen, path, "commission again", asked) as setup:
-        found = try_rig(
+        found = commission_rig(
             setup,
             rigfile,
             made_utc=datetime.now(UTC).isoformat(timespec="seconds"),
@@ -139,14 +138,14 @@ def commission(
 
 
 def _compare_eds(eds: Path, rig: Path | None) -> None:
-    from rigidimeter.rig.devices import Cia402Settings, fits, load_rig
+    from rigidimeter.rig.devices import Cia402Settings, compare_eds, load_rig
 
     chosen: object = Cia402Settings()
     if rig is not None:
         _, chosen = load_rig(rig).devices["drive"]
     if not isinstance(chosen, Cia402Settings):
         raise UserError(f'{rig}: its drive has no EDS; --eds is for driver = "cia402"')
-    found = fits(eds, chosen)
+    found = compare_eds(eds, chosen)
     rows = [("ok" if row.fits else "FAIL", row.label, row.found, row.needed) for row in found]
     show([Table(("", "object", "the drive", "the driver"), rows, "=<<<", indent=0)])
     wrong = [row.label for row in found if not row.fits]
@@ -213,7 +212,7 @@ def _check_known(known: Mapping[str, float | None]) -> None:
             raise UserError(f"{option} {value:g}: must be a number other than 0")
 
 
-def table(checks: Sequence[Check]) -> Table:
+def table(checks: Sequence[RigCheck]) -> Table:
     """Return the checks, each with its remedy below where it has one."""
     marks = {"passed": "ok", "failed": "FAIL"}
     rows: list[Sequence[str] | str] = []

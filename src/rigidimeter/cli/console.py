@@ -20,7 +20,7 @@ from rigidimeter.core.errors import UserError
 if TYPE_CHECKING:
     from rigidimeter.cli.planned_session import PlannedSession
     from rigidimeter.rig.acquisition.processes import Ended, Realtime
-    from rigidimeter.rig.console.page import Desk, StartRequest
+    from rigidimeter.rig.console.page import ServerState, StartRequest
 
 SHOWN_S = 3.0
 
@@ -64,7 +64,7 @@ def console(
     """
     from rigidimeter.core.settings import load_settings
     from rigidimeter.rig.acquisition.processes import Realtime, complete_left
-    from rigidimeter.rig.console.page import Desk, Place, extended
+    from rigidimeter.rig.console.page import Place, ServerState, extended
 
     for line in complete_left():
         echo(line, err=True)
@@ -73,12 +73,12 @@ def console(
     out.mkdir(parents=True, exist_ok=True)
     name = protocol.name if protocol is not None else "the defaults"
     place = Place(out.absolute(), settings, name, rig, settings_path=protocol)
-    desk = Desk(place)
-    for line in extended(desk.place):
+    state = ServerState(place)
+    for line in extended(state.place):
         echo(line)
-    with serving(desk, host, port, token):
-        while not desk.told_to_end:
-            lead_session(desk, desk.next_request(), Realtime(priority=priority, cpu=cpu))
+    with serving(state, host, port, token):
+        while not state.ending:
+            lead_session(state, state.next_request(), Realtime(priority=priority, cpu=cpu))
 
 
 def run_on_page(
@@ -95,17 +95,17 @@ def run_on_page(
     UserError
         If the program was told to end before.
     """
-    from rigidimeter.rig.console.page import Desk, Place
+    from rigidimeter.rig.console.page import Place, ServerState
 
     require_page()
     out = out.absolute()
     out.parent.mkdir(parents=True, exist_ok=True)
     name = planned.source.name if planned.source is not None else "the defaults"
     source = planned.source
-    desk = Desk(Place(out.parent, planned.settings, name, rig, out.name, source))
-    with serving(desk, *address):
-        while not desk.told_to_end:
-            ended = lead_session(desk, desk.next_request(), realtime)
+    state = ServerState(Place(out.parent, planned.settings, name, rig, out.name, source))
+    with serving(state, *address):
+        while not state.ending:
+            ended = lead_session(state, state.next_request(), realtime)
             if ended is not None:
                 time.sleep(SHOWN_S)  # for the page to say how it ended
                 return ended
@@ -113,12 +113,12 @@ def run_on_page(
 
 
 @contextmanager
-def serving(desk: Desk, host: str, port: int, token: str) -> Iterator[None]:
+def serving(state: ServerState, host: str, port: int, token: str) -> Iterator[None]:
     """Serve the page meanwhile."""
     from rigidimeter.cli.rig_steps import rig_steps
-    from rigidimeter.rig.console.page import PageServer, Work
+    from rigidimeter.rig.console.page import Jobs, PageServer
 
-    server = PageServer(desk, Work(partial(rig_steps, desk.place.rig)), host, port, token)
+    server = PageServer(state, Jobs(partial(rig_steps, state.place.rig)), host, port, token)
     server.start()
     echo(f"Open {server.address} in a browser; Ctrl-C ends the program")
     try:
@@ -127,7 +127,7 @@ def serving(desk: Desk, host: str, port: int, token: str) -> Iterator[None]:
         server.stop()
 
 
-def lead_session(desk: Desk, request: StartRequest, realtime: Realtime) -> Ended | None:
+def lead_session(state: ServerState, request: StartRequest, realtime: Realtime) -> Ended | None:
     """Run what the page asked for, and say on the page how it ended; None if it did not begin."""
     from rigidimeter.cli.planned_session import (
         checked_rig,
@@ -138,19 +138,19 @@ def lead_session(desk: Desk, request: StartRequest, realtime: Realtime) -> Ended
     from rigidimeter.core.session import count_epochs, rest_of
     from rigidimeter.rig.console.page import extended, in_buttons, next_buttons
 
-    folder, rig = desk.place.root / request.folder, desk.place.rig
+    folder, rig = state.place.root / request.folder, state.place.rig
     try:
-        planned = checked_rig(_planned(desk, request), rig)
+        planned = checked_rig(_planned(state, request), rig)
         require_packages(planned.settings)
         planned = planned.blinded() if planned.about.get("blinded") else planned
-        look = desk.console(planned.shown(virtual=rig is None), folder)
-        desk.refuse_stopped()
-        ended = run_planned(planned, folder, rig, realtime, look, desk.operator_seen_ns)
-        desk.told_to_end = bool(ended.signals)
+        look = state.console(planned.shown(virtual=rig is None), folder)
+        state.refuse_stopped()
+        ended = run_planned(planned, folder, rig, realtime, look, state.operator_seen_ns)
+        state.ending = bool(ended.signals)
         good, of = count_epochs(ended.folder)
         left = len(rest_of(ended.folder).epochs)
     except UserError as error:
-        desk.over(folder, "not run", tuple(map(in_buttons, error.lines)))
+        state.over(folder, "not run", tuple(map(in_buttons, error.lines)))
         for line in error.lines:
             echo(line, err=True)
         return None
@@ -159,25 +159,25 @@ def lead_session(desk: Desk, request: StartRequest, realtime: Realtime) -> Ended
         sentences.append(f"It ended with {ended.outcome or 'no outcome'}: {ended.reason}.")
     if planned.settings.sharing.nwb_at_close:
         sentences.append(write_nwb_beside(ended.folder))
-    sentences += [*ended.remarks, *extended(desk.place)]
+    sentences += [*ended.remarks, *extended(state.place)]
     echo(" ".join(sentences))
     sentences.append(next_buttons(closed=bool(ended.outcome), good=good, left=left))
-    desk.over(ended.folder, ended.outcome or "no outcome", tuple(map(in_buttons, sentences)))
+    state.over(ended.folder, ended.outcome or "no outcome", tuple(map(in_buttons, sentences)))
     return ended
 
 
-def _planned(desk: Desk, request: StartRequest) -> PlannedSession:
+def _planned(state: ServerState, request: StartRequest) -> PlannedSession:
     """Return what is to be run, in which a silent page is lost sooner than a silent terminal."""
     from rigidimeter.cli.planned_session import new_session, rest_of_session
     from rigidimeter.core.settings import changed_settings
     from rigidimeter.rig.console.page import SILENT_S
 
     if request.settings is None:
-        virtual = desk.place.rig is None
-        folder = desk.place.root / request.resume
+        virtual = state.place.rig is None
+        folder = state.place.root / request.resume
         planned = rest_of_session(folder, virtual=virtual, epoch=request.epoch, left=request.left)
     else:
-        planned = new_session(request.settings, request.about, desk.place.settings_path)
+        planned = new_session(request.settings, request.about, state.place.settings_path)
     lost_s = min(SILENT_S, planned.settings.loop.console_lost_s)
     settings = changed_settings(planned.settings, {"loop": {"console_lost_s": lost_s}})
     return replace(planned, settings=settings)

@@ -142,10 +142,10 @@ def run_planned(
 ) -> Ended:
     """Run a session that was checked, to its end."""
     from rigidimeter.cli.realtime_rig import run_loop
-    from rigidimeter.rig.acquisition.processes import Recording, supervise
+    from rigidimeter.rig.acquisition.processes import RecordingPlan, supervise
 
     home_rad = planned.continues.get("origin_rad") if rig is not None else None
-    recording = Recording(
+    recording = RecordingPlan(
         out,
         planned.settings,
         tuple(asdict(epoch) for epoch in planned.protocol.epochs),

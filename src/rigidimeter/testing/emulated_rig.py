@@ -87,7 +87,9 @@ class EmulatedRig:
         seed: int = 1,
     ) -> None:
         self._kind = drive
-        _raise_priority()
+        # For the threads started later, if the system permits.
+        with contextlib.suppress(OSError, AttributeError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
         self._push_nm = 0.0
         self._voluntary = _voluntary(voluntary_sd_nm, seed)
         self.arm = EmulatedArm(
@@ -315,12 +317,6 @@ def _voluntary(sd_nm: float, seed: int) -> Callable[[float], float]:
     amplitude = sd_nm * math.sqrt(2.0 / SINES)
     sines = [(2 * math.pi * rng.uniform(0.3, 4.0), rng.uniform(0, 7.0)) for _ in range(SINES)]
     return lambda time_s: amplitude * sum(math.sin(w * time_s + p) for w, p in sines)
-
-
-def _raise_priority() -> None:
-    """Ask for real-time priority for the threads started later, if the system permits."""
-    with contextlib.suppress(OSError, AttributeError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
 
 
 def _free_udp_port() -> int:

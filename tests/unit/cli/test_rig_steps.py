@@ -18,24 +18,24 @@ from rigidimeter.rig.commissioning import (
     A_PERSON_TELLS,
     DAILY_MUST_PASS,
     MUST_PASS,
-    Check,
     CommissioningRecord,
     DailyRecord,
+    RigCheck,
     covered,
     daily_path,
     record_path,
     write_daily,
     write_record,
 )
-from rigidimeter.rig.console.page import refusal
+from rigidimeter.rig.console.page import start_refusal
 from rigidimeter.rig.devices import RigFile
 
 NOW = datetime.now(UTC).replace(microsecond=0)
 SETTINGS = Settings()
 
 
-def passed(*names: str) -> tuple[Check, ...]:
-    return tuple(Check(name, 1.0, "1", "", "passed") for name in names)
+def passed(*names: str) -> tuple[RigCheck, ...]:
+    return tuple(RigCheck(name, 1.0, "1", "", "passed") for name in names)
 
 
 @pytest.fixture
@@ -98,7 +98,7 @@ def refusal_of_run(rig: Path) -> str:
 
 def test_a_rig_that_is_ready_says_since_when_with_whom_and_which_margin(rig: Path) -> None:
     steps = {step.title: step for step in rig_steps(rig, SETTINGS)}
-    assert refusal(tuple(steps.values())) == refusal_of_run(rig) == ""
+    assert start_refusal(tuple(steps.values())) == refusal_of_run(rig) == ""
     found = steps[COMMISSIONED].found
     assert f"{(NOW - timedelta(days=2)).astimezone():%Y-%m-%d %H:%M}" in found
     assert "with a person, signed by A. Weber" in found
@@ -124,7 +124,7 @@ def test_a_rig_that_is_ready_says_since_when_with_whom_and_which_margin(rig: Pat
 )
 def test_the_page_refuses_in_the_words_of_run(rig: Path, spoil: Any, words: str) -> None:
     spoil(rig)
-    why = refusal(rig_steps(rig, SETTINGS))
+    why = start_refusal(rig_steps(rig, SETTINGS))
     assert any(part in why for part in words.split("|"))
     assert why == refusal_of_run(rig)
 
@@ -138,4 +138,4 @@ def test_a_record_without_a_person_says_so(rig: Path) -> None:
 
 
 def test_nobody_asks_for_the_steps_of_the_virtual_rig() -> None:
-    assert refusal(rig_steps(None, SETTINGS)) == ""
+    assert start_refusal(rig_steps(None, SETTINGS)) == ""

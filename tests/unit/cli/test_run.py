@@ -15,7 +15,7 @@ from rigidimeter.core.session import SessionWriter
 from rigidimeter.core.settings import parse_settings
 from rigidimeter.planning import plan
 from rigidimeter.rig.acquisition.processes import Realtime
-from rigidimeter.rig.console.page import Desk, Place, StartRequest
+from rigidimeter.rig.console.page import Place, ServerState, StartRequest
 from rigidimeter.rig.devices import Home, RigFile, load_rig
 
 RIG = """
@@ -195,7 +195,7 @@ def test_a_session_on_the_page_runs_only_while_the_page_is_there(tmp_path, monke
 
     monkeypatch.setattr("rigidimeter.rig.acquisition.processes.supervise", supervise)
     settings = parse_settings({})
-    desk = Desk(Place(tmp_path, settings, "the defaults"))
-    assert lead_session(desk, StartRequest("s", settings), Realtime()) is None
-    assert told["operator_seen_ns"] == desk.operator_seen_ns
-    assert desk.finished.sentences == ("that is enough",)
+    state = ServerState(Place(tmp_path, settings, "the defaults"))
+    assert lead_session(state, StartRequest("s", settings), Realtime()) is None
+    assert told["operator_seen_ns"] == state.operator_seen_ns
+    assert state.finished.sentences == ("that is enough",)

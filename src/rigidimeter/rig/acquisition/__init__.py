@@ -1,13 +1,17 @@
-"""The only place with time: the clock, the control loop, and the run of a session.
-
-`session_run` is not imported here: the recorder's and the console's processes do without it, and
-start sooner.
-"""
+"""The only place with time: the clock, the control loop, and the run of a session."""
 
 from rigidimeter.rig.acquisition.clock import Clock, DeadlineClock, SimulatedClock, relative_sleep
-from rigidimeter.rig.acquisition.control_modes import change_parameter, follow, hold, perturb, rest
+from rigidimeter.rig.acquisition.control_modes import (
+    change_parameter,
+    follow,
+    hold,
+    perturb,
+    ramp_to_rest,
+    release,
+    rest,
+    skip_passed_ticks,
+)
 from rigidimeter.rig.acquisition.controller_run import ControllerRun
-from rigidimeter.rig.acquisition.ramp import ramp_to_rest
 from rigidimeter.rig.acquisition.run_states import (
     NOTHING,
     Command,
@@ -19,18 +23,17 @@ from rigidimeter.rig.acquisition.run_states import (
 )
 from rigidimeter.rig.acquisition.session_run import SessionResult, run_session
 from rigidimeter.rig.acquisition.stop_remedies import REMEDIES, SUSPENDED
-from rigidimeter.rig.acquisition.stop_report import Found, Latched, StopAccount, stop_account
+from rigidimeter.rig.acquisition.stop_report import Found, Latched, StopReport, report_stop
 from rigidimeter.rig.acquisition.tick import (
     REST,
     ControlLoop,
-    release,
+    latched_tick,
     run_ticks,
     set_admittance,
-    skip_passed_ticks,
 )
 from rigidimeter.rig.acquisition.zeroing import (
-    FEWEST_ZEROING_SAMPLES,
+    MIN_ZEROING_SAMPLES,
     angle_range_deg,
     bias_and_noise,
-    moved,
+    motion_objection,
 )

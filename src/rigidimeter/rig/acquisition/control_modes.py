@@ -5,6 +5,9 @@ stable. A heavier or more damped admittance is more stable, a lighter one less. 
 checked for the protocol's own values, so they are the lower bound. The perturbation may only become
 smaller. A change makes no bump: the velocity, the controller's only memory, stays as it is, and
 what follows is limited by the guard like anything else.
+
+The ramp to rest comes last: the velocity becomes zero within the acceleration limit, whatever
+fails.
 """
 
 from __future__ import annotations
@@ -20,13 +23,31 @@ from rigidimeter.rig.acquisition.tick import (
     REST,
     ControlLoop,
     TickResult,
+    run_tick,
     run_ticks,
     set_admittance,
+    ticks_late,
 )
 from rigidimeter.rig.devices.base import Reading
+from rigidimeter.rig.guard import released
 
 LARGEST_FACTOR = 10.0
 """A parameter may grow to so many times the protocol's value."""
+
+SPARE_TICKS = 10
+"""A ramp to rest may take so many ticks more than the speed and the acceleration limit say."""
+
+
+def skip_passed_ticks(loop: ControlLoop) -> None:
+    """Leave out the ticks that went by while the rig was enabled, which takes its time."""
+    while (late := ticks_late(loop)) > 0:
+        loop.rig.read(late)
+        loop.tick += late
+
+
+def release(loop: ControlLoop) -> None:
+    """Let the loop go on after a hold; see `guard.released`."""
+    loop.guard, loop.stop = released(loop.guard), None
 
 
 def perturb(loop: ControlLoop, epoch: int, perturbation_nm: Sequence[float]) -> TickResult:
@@ -121,3 +142,37 @@ def change_parameter(
         now = {**before, name: value}
         set_admittance(loop, now["inertia_kg_m2"], now["damping_nm_s_rad"])
     return {**facts, "before": before[name]}
+
+
+def ramp_to_rest(loop: ControlLoop) -> None:
+    """Ramp the velocity to zero within the acceleration limit, however long that takes.
+
+    A tick that fails, say because its sample cannot be recorded, does not end the ramp. It goes
+    on without reading and recording, and the failure is raised after it.
+    """
+    try:
+        # The guard takes as much off at every tick; some more for how floats are rounded.
+        ticks = math.ceil(abs(loop.guard.velocity_rad_s) / _brake_rad_s(loop))
+        for _ in range(ticks + SPARE_TICKS):
+            if loop.guard.velocity_rad_s == 0.0:
+                return
+            run_tick(loop, REST, 0, lambda *_: (0.0, 0.0, math.nan))
+    except BaseException:  # also when interrupted: the arm still moves
+        _ramp_unrecorded(loop)
+        raise
+
+
+def _brake_rad_s(loop: ControlLoop) -> float:
+    return loop.limits.acceleration_rad_s2 * loop.interval_s
+
+
+def _ramp_unrecorded(loop: ControlLoop) -> None:
+    """Only write: what else a tick does has failed."""
+    # The ramp takes its time, however late the failure made it.
+    loop.tick += max(ticks_late(loop), 0)
+    while (velocity := loop.guard.velocity_rad_s) != 0.0:
+        velocity = math.copysign(max(abs(velocity) - _brake_rad_s(loop), 0.0), velocity)
+        loop.guard = loop.guard._replace(velocity_rad_s=velocity)
+        loop.clock.wait_until(loop.time_s)
+        loop.rig.write(velocity)
+        loop.tick += 1

@@ -16,7 +16,7 @@ from rigidimeter.rig.acquisition.clock import Clock
 from rigidimeter.rig.acquisition.control_modes import change_parameter
 from rigidimeter.rig.acquisition.run_states import Command, Order, Run, State, after
 from rigidimeter.rig.acquisition.stop_remedies import REMEDIES
-from rigidimeter.rig.acquisition.stop_report import StopAccount
+from rigidimeter.rig.acquisition.stop_report import StopReport
 from rigidimeter.rig.acquisition.supervision import NoSupervision, Sink, Supervision
 from rigidimeter.rig.acquisition.tick import ControlLoop
 from rigidimeter.rig.devices.base import Rig
@@ -114,7 +114,7 @@ class ControllerRun:
         ends_rest = order.command is Command.STOP and self.open_epoch is None
         return self.run.at_once or ends_rest
 
-    def _latched(self, stop: StopAccount, time_s: float) -> None:
+    def _latched(self, stop: StopReport, time_s: float) -> None:
         """Record why the guard stopped or holds the rig, and since when."""
         self._sink.event("guard_latched", time_s=time_s, epoch=self.open_epoch, **stop.facts())
 

@@ -11,30 +11,29 @@ from typing import Any
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import Ending, PlannedEpoch, Protocol
 from rigidimeter.core.settings import Settings
-from rigidimeter.core.units import deg_from_rad
 from rigidimeter.planning import prbs_nm, sinusoid
 from rigidimeter.rig.acquisition.clock import Clock
-from rigidimeter.rig.acquisition.control_modes import follow, hold, perturb, rest
+from rigidimeter.rig.acquisition.control_modes import (
+    follow,
+    hold,
+    perturb,
+    release,
+    rest,
+    skip_passed_ticks,
+)
 from rigidimeter.rig.acquisition.controller_run import ControllerRun
-from rigidimeter.rig.acquisition.ramp import ramp_to_rest
 from rigidimeter.rig.acquisition.run_states import Command, Run, State, after, epoch_over
+from rigidimeter.rig.acquisition.session_end import end_session
 from rigidimeter.rig.acquisition.supervision import Sink, Supervision
-from rigidimeter.rig.acquisition.tick import ControlLoop, release, skip_passed_ticks
-from rigidimeter.rig.acquisition.zeroing import bias_and_noise, moved
+from rigidimeter.rig.acquisition.tick import ControlLoop
+from rigidimeter.rig.acquisition.zeroing import bias_and_noise, motion_objection
 from rigidimeter.rig.devices.base import Reading, Rig
 from rigidimeter.rig.guard import Cause, Reaction, why_ended
 
 BeforeEpoch = Callable[[PlannedEpoch], Mapping[str, Any]]
 
-LOOK_S = 0.1
+POLL_S = 0.1
 """A paused run looks so often whether it may go on."""
-
-BRAKE_S = 0.1
-"""For so long a drive that left its state brakes by its own ramp before its power goes."""
-
-
-WATCHED_S = 1.0
-"""For so long the joint is watched once its power is off."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +145,7 @@ def run_session(
         run.outcome, run.reason = "fail", reason
         raise
     finally:
-        _close(session)
+        end_session(run, rig, sink)
     return SessionResult(
         run.outcome, run.reason, session.epochs_run, session.epochs_good, run.cause
     )
@@ -178,10 +177,10 @@ def _ready_for_epoch(session: _Session) -> bool:
             if not run.may_go_on():
                 return False
         while run.is_in(State.PAUSED):
-            if not _look(run):
+            if not _stand_by(run):
                 return False
         while run.is_in(State.RUNNING) and not loop.at_rest:
-            if not _look(run):
+            if not _stand_by(run):
                 return False
         if run.is_in(State.RUNNING):
             release(loop)
@@ -193,13 +192,13 @@ def _ready_for_epoch(session: _Session) -> bool:
     return run.is_in(State.RUNNING)
 
 
-def _look(run: ControllerRun) -> bool:
+def _stand_by(run: ControllerRun) -> bool:
     """Stand still for a moment; return whether the run goes on.
 
     A hold that comes meanwhile pauses it again: what was ordered before it does not end it.
     """
     before = run.loop.reaction
-    hold(run.loop, LOOK_S)
+    hold(run.loop, POLL_S)
     return run.loop.reaction is before or run.may_go_on()
 
 
@@ -276,7 +275,7 @@ def _zero_sensor(session: _Session) -> bool:
         if not _ready_for_epoch(session):
             return False
     bias_nm, noise_sd_nm, why = bias_and_noise(readings, limits)
-    why = why or moved(readings, session.settings)
+    why = why or motion_objection(readings, session.settings)
     session.sink.event(
         "sensor_zeroed",
         time_s=run.loop.time_s,
@@ -289,66 +288,3 @@ def _zero_sensor(session: _Session) -> bool:
         return False
     session.rig.zero(bias_nm)
     return True
-
-
-def _close(session: _Session) -> None:
-    """Stop, disable, close: every step is tried even when one before it fails."""
-    run, sink = session.run, session.sink
-    try:
-        ramp_to_rest(run.loop)
-    finally:
-        if not run.is_in(State.FAULTED):
-            run.change_state(Run(State.STOPPING))
-        try:
-            _brake_and_disable(session)
-            if why := _after_power(session):
-                run.reason = f"{run.reason}; {why}" if run.reason else why
-                run.outcome = "fail" if run.outcome == "success" else run.outcome
-        finally:
-            time_s = run.loop.time_s
-            if run.open_epoch is not None:
-                ending = {"outcome": run.outcome, "reason": run.reason}
-                sink.event("epoch_ended", epoch=run.open_epoch, time_s=time_s, **ending)
-            sink.close(time_s, run.outcome, run.reason)
-
-
-def _brake_and_disable(session: _Session) -> None:
-    """Take the power away; a drive that no longer obeys brakes by its own ramp first."""
-    loop, rig = session.run.loop, session.rig
-    try:
-        if loop.cause in (Cause.DRIVE_LOST, Cause.DRIVE_STATE):
-            rig.stop()
-        if loop.cause is Cause.DRIVE_STATE:  # it answers: let it come to rest
-            hold(loop, BRAKE_S)
-    finally:
-        rig.disable()
-
-
-def _after_power(session: _Session) -> str:
-    """Watch the joint once its power is off; return in a clause what keeps hands off it.
-
-    Its weight, or whoever takes the arm out, may move it: they do work on the drive. Where the
-    drive moves the joint, W = ∫ M dθ is above zero.
-    """
-    loop, rig = session.run.loop, session.rig
-    settle_s, most_rad = loop.agreement.settle_s, loop.agreement.hold_rad
-    work_j = moved_rad = 0.0
-    began_rad = before_rad = math.nan
-    for k in range(1, round(WATCHED_S * loop.rate_hz) + 1):
-        loop.clock.wait_until((loop.tick + k) / loop.rate_hz)
-        reading = rig.read()
-        rig.write(0.0)  # a drive may speak only when it is spoken to
-        angle_rad = reading.angle_rad
-        if k < settle_s * loop.rate_hz or not math.isfinite(angle_rad + reading.torque_nm):
-            continue
-        if math.isnan(began_rad):
-            began_rad = before_rad = angle_rad
-        work_j += reading.torque_nm * (angle_rad - before_rad)
-        moved_rad, before_rad = max(moved_rad, abs(angle_rad - began_rad)), angle_rad
-    if rig.powered:
-        why = f"{WATCHED_S:g} s after it was told to switch its power off the drive has not said so"
-    elif moved_rad > most_rad and work_j > 0.0:
-        why = f"the drive moved the joint by {deg_from_rad(moved_rad):.1f} deg with its power off"
-    else:
-        return ""
-    return f"{why}: keep hands off the joint, press the emergency stop, and look at its wiring"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from rigidimeter.core.session import Sample
 from rigidimeter.core.settings import Settings
@@ -32,9 +32,6 @@ from rigidimeter.rig.guard import (
     outside,
 )
 
-if TYPE_CHECKING:
-    from rigidimeter.rig.acquisition.tick import ControlLoop
-
 
 class Latched(NamedTuple):
     """The tick at which the guard latched.
@@ -52,21 +49,6 @@ class Latched(NamedTuple):
     elapsed_ticks: int
     late_in_a_row: int
     measured: float
-
-    @classmethod
-    def of(cls, loop: ControlLoop, sample: Sample) -> Latched:
-        """Return what the loop knows of its last tick."""
-        return cls(
-            loop.settings,
-            sample,
-            loop.limits,
-            loop.guard,
-            loop.agreement,
-            loop.consistency,
-            loop.elapsed_ticks,
-            loop.late_in_a_row,
-            loop.supervision.measured,
-        )
 
 
 class Found(NamedTuple):
@@ -86,7 +68,7 @@ class Found(NamedTuple):
     device: str = ""
 
 
-class StopAccount(NamedTuple):
+class StopReport(NamedTuple):
     """What a stop or a hold says of itself."""
 
     cause: Cause
@@ -101,10 +83,10 @@ class StopAccount(NamedTuple):
         known = math.isfinite(found.value)
         if known:
             parts.append(f"{found.value:.3g} {found.unit}".strip())
-        if (
-            known and math.isfinite(found.duration_s) and found.unit not in ("ms", "s")
-        ):  # they say it
-            parts.append(_time(found.duration_s))
+        lasted_s = found.duration_s
+        if known and math.isfinite(lasted_s) and found.unit not in ("ms", "s"):  # they say it
+            ms = f"{1e3 * lasted_s:.3g} ms"
+            parts.append(f"for {lasted_s:.3g} s" if lasted_s >= 1.0 else f"for {ms}")
         if known and math.isfinite(found.limit):
             limit = "at least" if found.at_least else "limit"
             where = f" ({found.setting})" if found.setting else ""
@@ -128,18 +110,14 @@ class StopAccount(NamedTuple):
         }
 
 
-def stop_account(latched: Latched) -> StopAccount:
+def report_stop(latched: Latched) -> StopReport:
     """Return what a stop says, from the tick at which the guard latched."""
     cause = Cause(latched.guard.cause)
     find = _FOUND.get(cause)
     remedy = REMEDIES[cause]
     if cause is Cause.STALLED and latched.measured > latched.settings.loop.stall_s:
         remedy = SUSPENDED
-    return StopAccount(cause, find(latched) if find else Found(), remedy)
-
-
-def _time(seconds: float) -> str:
-    return f"for {seconds:.3g} s" if seconds >= 1.0 else f"for {1e3 * seconds:.3g} ms"
+    return StopReport(cause, find(latched) if find else Found(), remedy)
 
 
 def _passed_s(latched: Latched) -> float:
@@ -245,17 +223,17 @@ def _velocity(latched: Latched) -> Found:
     both_rad2 = means.moved_rad2 + means.reported_rad2
     limit_rad = max(latched.agreement.unseen_rad, math.sqrt(WRONG_SHARE * both_rad2))
     gain = larger_gain(means)
-    if means.apart_rad2 <= limit_rad * limit_rad and gain > WRONG_GAIN:
+    if means.disagreement_rad2 <= limit_rad * limit_rad and gain > WRONG_GAIN:
         larger = means.reported_rad2 > means.moved_rad2
         of = "times the change of the angle" if larger else "times the velocity"
         return Found(gain, WRONG_GAIN, of, SQUARED_S)
-    value_rad = math.sqrt(means.apart_rad2)
+    value_rad = math.sqrt(means.disagreement_rad2)
     return Found(deg_from_rad(value_rad), deg_from_rad(limit_rad), "deg", SUMMED_S)
 
 
 def _silent(latched: Latched) -> Found:
     answer, limits = latched.consistency.means.answer, latched.agreement.answer
-    needed_nm = limits.least_part * limits.inertia_kg_m2 * math.sqrt(answer.moved2)
+    needed_nm = limits.min_part * limits.inertia_kg_m2 * math.sqrt(answer.moved2)
     setting, shown_nm = "guard.min_inertia_kg_m2", math.sqrt(answer.shown_nm2)
     return Found(shown_nm, needed_nm, "N·m", SHOWN_MEMORY_S, setting, at_least=True)
 

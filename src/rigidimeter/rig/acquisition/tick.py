@@ -28,7 +28,7 @@ from rigidimeter.model import (
 )
 from rigidimeter.rig.acquisition.clock import Clock
 from rigidimeter.rig.acquisition.run_states import Command, Order
-from rigidimeter.rig.acquisition.stop_report import Latched, StopAccount, stop_account
+from rigidimeter.rig.acquisition.stop_report import Latched, StopReport, report_stop
 from rigidimeter.rig.acquisition.supervision import NoSupervision, Supervision
 from rigidimeter.rig.devices.base import Reading, Rig
 from rigidimeter.rig.guard import (
@@ -42,7 +42,6 @@ from rigidimeter.rig.guard import (
     guard_limits,
     guard_state,
     guard_step,
-    released,
 )
 
 REST = -1
@@ -106,7 +105,7 @@ class ControlLoop:
         progress: Callable[[float], None] = lambda _: None,
         supervision: Supervision | None = None,
         take_order: Callable[[Order], bool] = lambda _: False,
-        latched: Callable[[StopAccount, float], None] = lambda _, __: None,
+        latched: Callable[[StopReport, float], None] = lambda _, __: None,
     ) -> None:
         controller = settings.controller
         self.rig, self.clock, self.record = rig, clock, record
@@ -135,7 +134,7 @@ class ControlLoop:
         self.limit_time_s = math.nan
         self.angle_rad = 0.0
         self.sample: Sample | None = None
-        self.stop: StopAccount | None = None
+        self.stop: StopReport | None = None
 
     @property
     def time_s(self) -> float:
@@ -173,13 +172,6 @@ def set_admittance(loop: ControlLoop, inertia_kg_m2: float, damping_nm_s_rad: fl
     ]
 
 
-def skip_passed_ticks(loop: ControlLoop) -> None:
-    """Leave out the ticks that went by while the rig was enabled, which takes its time."""
-    while (late := ticks_late(loop)) > 0:
-        loop.rig.read(late)
-        loop.tick += late
-
-
 def ticks_late(loop: ControlLoop) -> int:
     """Wait for the tick that is due, and return how many whole ticks late that is."""
     return math.floor(loop.clock.wait_until(loop.time_s) * loop.rate_hz) - loop.tick
@@ -209,7 +201,9 @@ def run_ticks(
     while k < n:
         k = run_tick(loop, epoch, k, command, n - 1) + 1
         if loop.guard.reaction > known:
-            _account(loop)
+            if loop.stop is None and loop.sample is not None:  # of several causes the first
+                loop.stop = report_stop(latched_tick(loop, loop.sample))
+                loop.latched(loop.stop, loop.sample.time_s)
             break
         order = loop.supervision.order()
         if order.command is not Command.NONE and loop.take_order(order):
@@ -221,16 +215,19 @@ def run_ticks(
     return TickResult(loop.limit_time_s, loop.cause, *counts, interrupted)
 
 
-def release(loop: ControlLoop) -> None:
-    """Let the loop go on after a hold; see `guard.released`."""
-    loop.guard, loop.stop = released(loop.guard), None
-
-
-def _account(loop: ControlLoop) -> None:
-    """Say why the guard latched; the first cause is kept."""
-    if loop.stop is None and loop.sample is not None:
-        loop.stop = stop_account(Latched.of(loop, loop.sample))
-        loop.latched(loop.stop, loop.sample.time_s)
+def latched_tick(loop: ControlLoop, sample: Sample) -> Latched:
+    """Return what the loop knows of its last tick."""
+    return Latched(
+        loop.settings,
+        sample,
+        loop.limits,
+        loop.guard,
+        loop.agreement,
+        loop.consistency,
+        loop.elapsed_ticks,
+        loop.late_in_a_row,
+        loop.supervision.measured,
+    )
 
 
 def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: int = 0) -> int:
@@ -263,7 +260,7 @@ def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: i
         loop.guard = loop.guard._replace(velocity_rad_s=0.0)
     was_cut = loop.guard.reaction
     motion_age_s, torque_age_s = due_s - motion_s, due_s - torque_s
-    loop.consistency, apart = consistency_step(
+    loop.consistency, disagreement = consistency_step(
         loop.agreement,
         loop.consistency,
         loop.guard.velocity_rad_s,
@@ -287,7 +284,7 @@ def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: i
         # A loop that stood still comes first: the drive's own watchdog follows from it.
         _stronger(_stronger(late, reading.cause), from_outside),
         loop.elapsed_ticks,
-        apart,
+        disagreement,
     )
     # The guard has counted this tick. Where one of the calls below fails, what follows is due at
     # the next tick: the velocity may change by one tick's worth only once a tick.

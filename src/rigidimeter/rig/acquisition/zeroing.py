@@ -10,7 +10,7 @@ from rigidimeter.core.settings import Settings, ZeroingSettings
 from rigidimeter.core.units import deg_from_rad
 from rigidimeter.rig.devices.base import Reading
 
-FEWEST_ZEROING_SAMPLES = 10
+MIN_ZEROING_SAMPLES = 10
 """The standard deviation of fewer samples is not the sensor's noise."""
 
 
@@ -24,10 +24,10 @@ def bias_and_noise(
             stamp_s = reading.torque_time_s
             torques_nm.append(reading.torque_nm)
     n = len(torques_nm)
-    if n < FEWEST_ZEROING_SAMPLES:
+    if n < MIN_ZEROING_SAMPLES:
         why = (
             f"only {n} torque samples came in {limits.duration_s:g} s, fewer than "
-            f"{FEWEST_ZEROING_SAMPLES}; check the sensor's connection and its rate, or raise "
+            f"{MIN_ZEROING_SAMPLES}; check the sensor's connection and its rate, or raise "
             "zeroing.duration_s"
         )
         return math.nan, math.nan, why
@@ -48,7 +48,7 @@ def bias_and_noise(
     return bias_nm, noise_sd_nm, why
 
 
-def moved(readings: Sequence[Reading], settings: Settings) -> str:
+def motion_objection(readings: Sequence[Reading], settings: Settings) -> str:
     """Return why a torque is none at rest, if so: a joint in motion needs torque by itself."""
     limit_deg = settings.zeroing.motion_limit_deg
     range_deg = angle_range_deg(readings)

@@ -8,12 +8,11 @@ from typing import Literal
 
 Outcome = Literal["passed", "failed", "not possible here", "not tried"]
 
-
 NOBODY = "only a person can tell; commission again without --yes"
 
 
 @dataclass(frozen=True)
-class Check:
+class RigCheck:
     """One check.
 
     Parameters
@@ -47,7 +46,7 @@ class Check:
     @property
     def words(self) -> str:
         """What was found, with its unit."""
-        return self.value if isinstance(self.value, str) else number(self.value, self.unit)
+        return self.value if isinstance(self.value, str) else with_unit(self.value, self.unit)
 
     @property
     def sentence(self) -> str:
@@ -55,46 +54,50 @@ class Check:
         return f"{self.name}: {self.words}, must be {self.limit}; {self.remedy}"
 
 
-def below(name: str, value: float, unit: str, limit: float, remedy: str) -> Check:
+def below(name: str, value: float, unit: str, limit: float, remedy: str) -> RigCheck:
     """Return the check that a number is at most a limit; one that is not finite is not."""
-    return _check(name, value, unit, f"at most {number(limit, unit)}", value <= limit, remedy)
+    return _check(name, value, unit, f"at most {with_unit(limit, unit)}", value <= limit, remedy)
 
 
-def above(name: str, value: float, unit: str, limit: float, remedy: str) -> Check:
+def above(name: str, value: float, unit: str, limit: float, remedy: str) -> RigCheck:
     """Return the check that a number is at least a limit."""
-    return _check(name, value, unit, f"at least {number(limit, unit)}", value >= limit, remedy)
+    return _check(name, value, unit, f"at least {with_unit(limit, unit)}", value >= limit, remedy)
 
 
-def within(name: str, value: float, unit: str, wanted: float, percent: float, remedy: str) -> Check:
+def within_tolerance(
+    name: str, value: float, unit: str, wanted: float, percent: float, remedy: str
+) -> RigCheck:
     """Return the check that a number is as wanted, but for so many percent."""
     good = abs(value - wanted) <= 0.01 * percent * abs(wanted)
-    return _check(name, value, unit, f"{number(wanted, unit)} ± {percent:g} %", good, remedy)
+    return _check(name, value, unit, f"{with_unit(wanted, unit)} ± {percent:g} %", good, remedy)
 
 
-def yes(name: str, good: bool, found: str, limit: str, remedy: str) -> Check:
+def yes(name: str, good: bool, found: str, limit: str, remedy: str) -> RigCheck:
     """Return the check of something that is so or not."""
-    return Check(name, found, "", limit, "passed" if good else "failed", "" if good else remedy)
+    return RigCheck(name, found, "", limit, "passed" if good else "failed", "" if good else remedy)
 
 
-def impossible(name: str, limit: str, why: str) -> Check:
+def impossible(name: str, limit: str, why: str) -> RigCheck:
     """Return a check that could not be made; `why` is its remedy."""
-    return Check(name, None, "", limit, "not possible here", why)
+    return RigCheck(name, None, "", limit, "not possible here", why)
 
 
-def untried(name: str, limit: str) -> Check:
+def untried(name: str, limit: str) -> RigCheck:
     """Return a check that takes a person, and nobody was there."""
-    return Check(name, None, "", limit, "not tried", NOBODY)
+    return RigCheck(name, None, "", limit, "not tried", NOBODY)
 
 
-def _check(name: str, value: float, unit: str, limit: str, good: bool, remedy: str) -> Check:
-    kept = float(value) if math.isfinite(value) else None
-    return Check(name, kept, unit, limit, "passed" if good else "failed", "" if good else remedy)
+def _check(name: str, value: float, unit: str, limit: str, good: bool, remedy: str) -> RigCheck:
+    found = float(value) if math.isfinite(value) else None
+    return RigCheck(
+        name, found, unit, limit, "passed" if good else "failed", "" if good else remedy
+    )
 
 
-def number(value: float | None, unit: str) -> str:
+def with_unit(value: float | None, unit: str) -> str:
     """Return a number with its unit; a time below a second in ms.
 
-    >>> number(0.0013, "s"), number(2.5, "s"), number(1.0, "1"), number(None, "s")
+    >>> with_unit(0.0013, "s"), with_unit(2.5, "s"), with_unit(1.0, "1"), with_unit(None, "s")
     ('1.3 ms', '2.5 s', '1', 'not measurable')
     """
     if value is None:

@@ -16,7 +16,7 @@ from typing import Any
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import RigSettings, Settings, changed_settings
 from rigidimeter.model import DriveModel
-from rigidimeter.rig.commissioning.checks import Check
+from rigidimeter.rig.commissioning.checks import RigCheck
 from rigidimeter.rig.commissioning.commissioning_record import CommissioningRecord
 from rigidimeter.rig.commissioning.sealed_record import RecordKind, read_sealed, write_sealed
 from rigidimeter.rig.commissioning.torque_checks import DELAY, PRECISION, SIGN
@@ -37,7 +37,7 @@ DAILY_MUST_PASS = ("motion when enabled", "angle per command", SIGN, PRECISION, 
 
 
 @dataclass(frozen=True)
-class Reference:
+class ReferenceInertia:
     """The inertia beyond the torque sensor, with nobody in the rig, to which later days compare.
 
     Parameters
@@ -72,7 +72,7 @@ class DailyRecord:
         Of the rig file.
     commissioning_digest : str
         Of the commissioning record that held.
-    checks : tuple of Check
+    checks : tuple of RigCheck
     numbers : mapping
         What was measured.
     reference : Reference or None
@@ -90,9 +90,9 @@ class DailyRecord:
     rig_name: str
     rig_digest: str
     commissioning_digest: str
-    checks: tuple[Check, ...]
+    checks: tuple[RigCheck, ...]
     numbers: Mapping[str, float]
-    reference: Reference | None
+    reference: ReferenceInertia | None
     known_inertia_kg_m2: float | None
     validity_h: float
     software: str
@@ -115,7 +115,7 @@ class DailyRecord:
         return datetime.fromisoformat(self.made_utc) + timedelta(hours=self.validity_h)
 
 
-def objection(checks: tuple[Check, ...]) -> str:
+def objection(checks: tuple[RigCheck, ...]) -> str:
     """Return the first reason among checks not to run a rig, in a clause."""
     failed = [check for check in checks if check.outcome == "failed"]
     if failed:
@@ -150,11 +150,11 @@ def read_daily(path: Path, kind: RecordKind = KIND) -> DailyRecord:
 
 
 def _record(values: dict[str, Any]) -> DailyRecord:
-    kept = {name: value for name, value in values.items() if name != "passed"}
-    kept["checks"] = tuple(Check(**check) for check in values["checks"])
+    fields = {name: value for name, value in values.items() if name != "passed"}
+    fields["checks"] = tuple(RigCheck(**check) for check in values["checks"])
     if values["reference"] is not None:
-        kept["reference"] = Reference(**values["reference"])
-    return DailyRecord(**kept)
+        fields["reference"] = ReferenceInertia(**values["reference"])
+    return DailyRecord(**fields)
 
 
 def require_daily_check(
@@ -223,17 +223,19 @@ def as_measured(
     UserError
         If the settings do not go together with the drive as it was measured.
     """
-    kept, guard, told_hz = today.reference, settings.guard, settings.rig.drive_bandwidth_hz
-    drive_hz = commissioned.numbers.get("bandwidth_hz", told_hz)
+    reference, guard, stated_hz = today.reference, settings.guard, settings.rig.drive_bandwidth_hz
+    drive_hz = commissioned.numbers.get("bandwidth_hz", stated_hz)
     source = f"{commissioned.rig_name}, as measured"
     measured = changed_settings(settings, {"rig": {"drive_bandwidth_hz": drive_hz}}, source)
     shows_inertia = answer_limits(measured).shows_inertia
-    if not shows_inertia and told_hz > drive_hz:  # no more than that can be measured
+    if not shows_inertia and stated_hz > drive_hz:  # no more than that can be measured
         measured = settings
     given = "min_inertia_kg_m2" in guard.model_fields_set
-    if kept is None or given or not shows_inertia:
+    if reference is None or given or not shows_inertia:
         return measured
-    floor = max(guard.min_inertia_kg_m2, FLOOR_SHARE * _shown(measured.rig) * kept.inertia_kg_m2)
+    floor = max(
+        guard.min_inertia_kg_m2, FLOOR_SHARE * _shown(measured.rig) * reference.inertia_kg_m2
+    )
     return changed_settings(measured, {"guard": {"min_inertia_kg_m2": floor}})
 
 

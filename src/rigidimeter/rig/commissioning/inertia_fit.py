@@ -27,8 +27,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from rigidimeter.core.units import rad_from_deg
-from rigidimeter.rig.commissioning.response import least, least_squares
-from rigidimeter.rig.commissioning.trial import Array, Readings, new_samples
+from rigidimeter.rig.commissioning.response import least_squares, minimum_at
+from rigidimeter.rig.commissioning.trials import Array, Readings, new_samples
 
 FREQUENCIES_HZ = (1.0, 2.0, 3.5, 5.0)
 WEIGHTS = (0.10, 0.15, 0.30, 0.45)
@@ -113,11 +113,13 @@ def torque_answer(readings: Readings, rate_hz: float) -> TorqueAnswer:
 
     def table(delay_s: float) -> Array:
         """Return the motion this much earlier, between the points of the grid."""
-        whole, part = divmod(delay_s * GRID_HZ, 1.0)
-        at = places - int(whole)
+        ticks, part = divmod(delay_s * GRID_HZ, 1.0)
+        at = places - int(ticks)
         return np.asarray((1.0 - part) * columns[at] + part * columns[at - 1])
 
-    delay_s = least(lambda d: least_squares(table(d), torque)[1], EARLIEST_S, LATEST_S, COARSE_S)
+    delay_s = minimum_at(
+        lambda d: least_squares(table(d), torque)[1], EARLIEST_S, LATEST_S, COARSE_S
+    )
     chosen = table(delay_s)
     found, left = least_squares(chosen, torque)
     total = float(np.sum((torque - torque.mean()) ** 2))

@@ -11,12 +11,18 @@ import math
 
 import numpy as np
 
-from rigidimeter.rig.commissioning.checks import Check, impossible, untried, within, yes
-from rigidimeter.rig.commissioning.trial import (
+from rigidimeter.rig.commissioning.checks import (
+    RigCheck,
+    impossible,
+    untried,
+    within_tolerance,
+    yes,
+)
+from rigidimeter.rig.commissioning.trials import (
     Operator,
     Setup,
     drop_old_samples,
-    hold,
+    hold_stretch,
     listen,
     require_no_power,
     trial,
@@ -27,7 +33,7 @@ KNOWN_ANGLE_S = 1.0
 ANGLE, TORQUE = "known angle", "known torque"
 
 
-def ask_operator(operator: Operator, name: str, question: str, remedy: str) -> Check:
+def ask_operator(operator: Operator, name: str, question: str, remedy: str) -> RigCheck:
     """Return the check of something that the operator says is so or not."""
     if not operator.present:
         return untried(name, "yes")
@@ -35,7 +41,7 @@ def ask_operator(operator: Operator, name: str, question: str, remedy: str) -> C
     return yes(name, good, "yes" if good else "no", "yes", remedy)
 
 
-def known_angle(setup: Setup) -> Check:
+def known_angle(setup: Setup) -> RigCheck:
     """Compare an angle by which hands turn the joint, without power."""
     operator, percent = setup.operator, setup.limits.scale_tolerance_percent
     wanted_deg = operator.known_angle_deg
@@ -49,10 +55,10 @@ def known_angle(setup: Setup) -> Check:
         return impossible(ANGLE, limit, "the operator did not do it")
     turned_deg = math.degrees(_angle_rad(setup) - before_rad)
     operator.ask("Turn it back to where it was. Done?")
-    return within(ANGLE, turned_deg, "deg", wanted_deg, percent, _WRONG_SCALE)
+    return within_tolerance(ANGLE, turned_deg, "deg", wanted_deg, percent, _WRONG_SCALE)
 
 
-def known_torque(setup: Setup) -> Check:
+def known_torque(setup: Setup) -> RigCheck:
     """Compare a torque put on by hand; the drive holds against it, so it reads the opposite."""
     operator, limits = setup.operator, setup.limits
     known_nm, percent = operator.known_torque_nm, limits.known_tolerance_percent
@@ -61,7 +67,7 @@ def known_torque(setup: Setup) -> Check:
         return impossible(TORQUE, limit, "give --known-torque-nm to compare with")
     if not operator.present:
         return untried(TORQUE, limit)
-    before = trial(setup, hold(SETTLE_S)).readings.torque_nm
+    before = trial(setup, hold_stretch(SETTLE_S)).readings.torque_nm
     require_no_power(setup)
     held_s = limits.known_torque_s
     if not operator.ask(
@@ -69,12 +75,12 @@ def known_torque(setup: Setup) -> Check:
         f"{held_s + SETTLE_S:g} s after you agree; the drive will hold against it. Ready?"
     ):
         return impossible(TORQUE, limit, "the operator did not agree to it")
-    readings = trial(setup, hold(SETTLE_S + held_s)).readings
+    readings = trial(setup, hold_stretch(SETTLE_S + held_s)).readings
     require_no_power(setup)
     late = readings.torque_nm[readings.time_s > SETTLE_S]
     value = -float(np.nanmedian(late) - np.nanmedian(before)) if len(late) else math.nan
     operator.ask("Take the torque off again. Done?")
-    return within(TORQUE, value, "N·m", known_nm, percent, _WRONG_SCALE)
+    return within_tolerance(TORQUE, value, "N·m", known_nm, percent, _WRONG_SCALE)
 
 
 _WRONG_SCALE = (

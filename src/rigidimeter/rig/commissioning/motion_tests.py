@@ -16,15 +16,22 @@ import numpy as np
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.units import rad_from_deg
 from rigidimeter.model import minimum_jerk
-from rigidimeter.rig.commissioning.checks import Check, above, below, impossible, within, yes
+from rigidimeter.rig.commissioning.checks import (
+    RigCheck,
+    above,
+    below,
+    impossible,
+    within_tolerance,
+    yes,
+)
 from rigidimeter.rig.commissioning.response import (
     ArmFit,
     Following,
     fit_arm,
     following,
-    velocity_scale,
+    velocity_per_angle,
 )
-from rigidimeter.rig.commissioning.trial import Array, Readings, TrialResult, stopped_for
+from rigidimeter.rig.commissioning.trials import Array, Readings, TrialResult, stopped_for
 from rigidimeter.rig.guard import SETTLED, Cause
 
 ANGLE_PER_COMMAND, COMPLETED = "angle per command", "motions were completed"
@@ -64,10 +71,12 @@ def steps(settings: Settings) -> Array:
     return rad_from_deg(limits.step_deg_s) * np.tile(pair, times)
 
 
-def small_move_check(result: TrialResult, settings: Settings) -> Check:
+def small_move_check(result: TrialResult, settings: Settings) -> RigCheck:
     """Check direction and rough scale of the first motion, and its velocity if that ended it."""
     found = following(result.readings, settings.rig.drive_damping_ratio)
-    check = within(ANGLE_PER_COMMAND, found.scale, "1", 1.0, SMALL_MOVE_PERCENT, _SCALE_REMEDY)
+    check = within_tolerance(
+        ANGLE_PER_COMMAND, found.scale, "1", 1.0, SMALL_MOVE_PERCENT, _SCALE_REMEDY
+    )
     if result.cause is Cause.VELOCITY_WRONG and check.passed:
         apart = _velocity_check(result.readings, settings)
         if not apart.passed:
@@ -85,7 +94,7 @@ def small_move_check(result: TrialResult, settings: Settings) -> Check:
     return check
 
 
-def swing_checks(result: TrialResult, settings: Settings) -> tuple[list[Check], Following]:
+def swing_checks(result: TrialResult, settings: Settings) -> tuple[list[RigCheck], Following]:
     """Check directions and scales over the slow motion."""
     readings, percent = result.readings, settings.commissioning.scale_tolerance_percent
     found = following(readings, settings.rig.drive_damping_ratio)
@@ -97,7 +106,7 @@ def swing_checks(result: TrialResult, settings: Settings) -> tuple[list[Check], 
             "yes",
             _REASON_REMEDY,
         ),
-        within(ANGLE_PER_COMMAND, found.scale, "1", 1.0, percent, _SCALE_REMEDY),
+        within_tolerance(ANGLE_PER_COMMAND, found.scale, "1", 1.0, percent, _SCALE_REMEDY),
         _velocity_check(readings, settings),
         below(
             "following error",
@@ -110,15 +119,15 @@ def swing_checks(result: TrialResult, settings: Settings) -> tuple[list[Check], 
     return checks, found
 
 
-def _velocity_check(readings: Readings, settings: Settings) -> Check:
+def _velocity_check(readings: Readings, settings: Settings) -> RigCheck:
     percent = settings.commissioning.scale_tolerance_percent
-    found = velocity_scale(readings)
-    return within(VELOCITY_PER_ANGLE, found, "1", 1.0, percent, _VELOCITY_REMEDY)
+    found = velocity_per_angle(readings)
+    return within_tolerance(VELOCITY_PER_ANGLE, found, "1", 1.0, percent, _VELOCITY_REMEDY)
 
 
 def torque_sign(
     readings: Readings, damping_ratio: float, drive_scale: float
-) -> tuple[Check, float]:
+) -> tuple[RigCheck, float]:
     """Check that the torque is that of a joint that resists; return the work done on it in J."""
     name, limit = "torque against motion", "that of a joint that resists"
     seen = fit_arm(readings, math.inf, damping_ratio, drive_scale)
@@ -134,10 +143,16 @@ def torque_sign(
         f"the {seen.strongest} looks negative, so torque and angle have opposite signs: turn the "
         "sign of the one that is wrong in the rig file; with it the loop would run away"
     )
-    return yes(name, seen.strongest_is_positive, _arm_words(seen, work_j), limit, remedy), work_j
+    words = (
+        f"J {seen.inertia_kg_m2:.3g} kg·m², B {seen.damping_nm_s_rad:.3g} N·m·s/rad, "
+        f"K {seen.stiffness_nm_rad:.3g} N·m/rad, work {1000 * work_j:.3g} mJ"
+    )
+    return yes(name, seen.strongest_is_positive, words, limit, remedy), work_j
 
 
-def step_checks(result: TrialResult, settings: Settings) -> tuple[list[Check], Following, ArmFit]:
+def step_checks(
+    result: TrialResult, settings: Settings
+) -> tuple[list[RigCheck], Following, ArmFit]:
     """Check delays and bandwidth by the quick steps."""
     readings, guard = result.readings, settings.guard
     ratio = settings.rig.drive_damping_ratio
@@ -154,8 +169,8 @@ def step_checks(result: TrialResult, settings: Settings) -> tuple[list[Check], F
         1.0,
         "tune the drive; the arm follows the loop no faster than this",
     )
-    told_hz = min(settings.rig.drive_bandwidth_hz, highest_hz)
-    if bandwidth.passed and abs(found.bandwidth_hz - told_hz) > ANOTHER * told_hz:
+    stated_hz = min(settings.rig.drive_bandwidth_hz, highest_hz)
+    if bandwidth.passed and abs(found.bandwidth_hz - stated_hz) > ANOTHER * stated_hz:
         why = f"rig.drive_bandwidth_hz = {settings.rig.drive_bandwidth_hz:g} Hz is not this drive's"
         bandwidth = replace(bandwidth, remedy=f"{why}; `run` uses what was measured")
     checks = [
@@ -175,11 +190,11 @@ def step_checks(result: TrialResult, settings: Settings) -> tuple[list[Check], F
         why = "no arm shows in the torque; fasten a spring or a relaxed arm's weight to the joint"
         checks.append(impossible(name, limit, why))
     else:
-        checks.append(Check(name, seen.delay_s, "s", limit, "passed"))
+        checks.append(RigCheck(name, seen.delay_s, "s", limit, "passed"))
     return checks, found, seen
 
 
-def drift_check(readings: Readings, limit_deg: float) -> Check:
+def drift_check(readings: Readings, limit_deg: float) -> RigCheck:
     """Check that the joint stood still when power came."""
     angle = readings.angle_rad[np.isfinite(readings.angle_rad)]
     moved = math.degrees(float(np.max(np.abs(angle)))) if len(angle) else math.inf
@@ -200,13 +215,6 @@ _SCALE_REMEDY = (
     "sign, counts per turn, gear ratio or velocity units in the rig file are wrong; "
     "-1 is a wrong sign, 57.3 and 0.0175 are degrees for radians"
 )
-
-
-def _arm_words(seen: ArmFit, work_j: float) -> str:
-    return (
-        f"J {seen.inertia_kg_m2:.3g} kg·m², B {seen.damping_nm_s_rad:.3g} N·m·s/rad, "
-        f"K {seen.stiffness_nm_rad:.3g} N·m/rad, work {1000 * work_j:.3g} mJ"
-    )
 
 
 def smooth_motion(distance_rad: float, speed_rad_s: float, tick_s: float) -> Array:

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.optimize import minimize, nnls
 
 from rigidimeter.model import DriveModel
-from rigidimeter.rig.commissioning.trial import Array, Readings, new_samples
+from rigidimeter.rig.commissioning.trials import Array, Readings, new_samples
 
 GRID_HZ = 4000.0
 LONGEST_S = 0.4
@@ -90,7 +90,7 @@ def following(
         return _line(model(bandwidth_hz)(at_s - delay_s), angle)
 
     if highest_hz is None:
-        delay_s = least(lambda d: fitted(math.inf, d)[1], 0.0, LONGEST_S)
+        delay_s = minimum_at(lambda d: fitted(math.inf, d)[1], 0.0, LONGEST_S)
         scale, _, worst = fitted(math.inf, delay_s)
         return Following(scale, delay_s, math.inf, worst)
 
@@ -99,7 +99,7 @@ def following(
     log_highest = math.log(highest_hz)
 
     def best_delay_s(bandwidth_hz: float) -> float:
-        return least(lambda d: fitted(bandwidth_hz, d)[1], 0.0, LONGEST_DRIVE_S, 0.01, 1)
+        return minimum_at(lambda d: fitted(bandwidth_hz, d)[1], 0.0, LONGEST_DRIVE_S, 0.01, 1)
 
     pairs = [(float(f), best_delay_s(float(f))) for f in np.geomspace(1.0, highest_hz, 12)]
     start = min(pairs, key=lambda pair: fitted(*pair)[1])
@@ -129,7 +129,7 @@ def following(
     return Following(scale, delay_s, bandwidth_hz, worst)
 
 
-def velocity_scale(readings: Readings) -> float:
+def velocity_per_angle(readings: Readings) -> float:
     """Return the velocity channel over the derivative of the angle, by the integral of the one."""
     fresh = new_samples(readings.motion_time_s)
     at_s, angle = readings.motion_time_s[fresh], readings.angle_rad[fresh]
@@ -180,13 +180,13 @@ def fit_arm(
     def left(delay_s: float) -> float:
         return solve(columns(delay_s), torque)[1]
 
-    delay_s = least(left, 0.0, LONGEST_S)
+    delay_s = minimum_at(left, 0.0, LONGEST_S)
     table = columns(delay_s)
     (J, B, K), unexplained = solve(table, torque)[0][:3], left(delay_s)
-    whole = float(np.sum((torque - torque.mean()) ** 2))
+    total = float(np.sum((torque - torque.mean()) ** 2))
     shares = np.abs([J, B, K]) * np.std(table[:, :3], axis=0)
     strongest = ("inertia", "damping", "stiffness")[int(np.argmax(shares))]
-    explained = 1.0 - unexplained / whole if whole > 0 else 0.0
+    explained = 1.0 - unexplained / total if total > 0 else 0.0
     return ArmFit(float(J), float(B), float(K), delay_s, explained, strongest)
 
 
@@ -229,7 +229,7 @@ def _solve_positive(table: Array, y: Array) -> tuple[Array, float]:
     return found / size, float(left) ** 2
 
 
-def least(
+def minimum_at(
     measure: Callable[[float], float],
     low: float,
     high: float,

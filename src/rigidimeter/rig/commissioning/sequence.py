@@ -14,22 +14,27 @@ question waits for its answer.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
-from rigidimeter.rig.commissioning.checks import yes
-from rigidimeter.rig.commissioning.commissioning_record import CommissioningRecord
-from rigidimeter.rig.commissioning.coverage import covered, kept_facts
+from rigidimeter.core.settings import Settings
+from rigidimeter.model import Margins, loop_stability, near_instability
+from rigidimeter.rig.commissioning.checks import RigCheck, impossible, with_unit, yes
+from rigidimeter.rig.commissioning.commissioning_record import (
+    CommissioningRecord,
+    covered,
+    stable_facts,
+)
 from rigidimeter.rig.commissioning.first_steps import (
     SETTLE_S,
-    Findings,
+    CheckResults,
     at_rest,
     move,
     power_allowed,
     small_move,
 )
 from rigidimeter.rig.commissioning.manual_checks import ask_operator, known_angle, known_torque
-from rigidimeter.rig.commissioning.margins import margin_checks
 from rigidimeter.rig.commissioning.motion_tests import (
     ANGLE_PER_COMMAND,
     COMPLETED,
@@ -41,13 +46,13 @@ from rigidimeter.rig.commissioning.motion_tests import (
 )
 from rigidimeter.rig.commissioning.static_tests import facts_checks
 from rigidimeter.rig.commissioning.stopping import emergency_stop_checks, watchdog_checks
-from rigidimeter.rig.commissioning.trial import Setup, require_no_power
+from rigidimeter.rig.commissioning.trials import Setup, require_no_power
 from rigidimeter.rig.devices import RigFile
 from rigidimeter.rig.devices.base import DeviceError
 from rigidimeter.rig.guard import Cause
 
 
-def commission(
+def commission_rig(
     setup: Setup,
     rigfile: RigFile,
     *,
@@ -68,7 +73,7 @@ def commission(
     made_utc, software, signed_by : str
         For the record.
     """
-    rig, found = setup.rig, Findings()
+    rig, found = setup.rig, CheckResults()
     facts: Mapping[str, Any] = {}
     name, limit = "devices read back", "what the rig file says"
     try:
@@ -84,7 +89,7 @@ def commission(
         rig_name=rigfile.name,
         rig_digest=rigfile.digest,
         emulated=rigfile.emulated,
-        facts=kept_facts(facts),
+        facts=stable_facts(facts),
         covered=covered(setup.settings),
         checks=tuple(found.checks),
         numbers=found.finite_numbers,
@@ -94,11 +99,22 @@ def commission(
     )
 
 
-def _try_all(setup: Setup, found: Findings, facts: Mapping[str, Any]) -> None:
+def _try_all(setup: Setup, found: CheckResults, facts: Mapping[str, Any]) -> None:
     operator, limits = setup.operator, setup.limits
     found.checks += facts_checks(facts, setup.settings)
     at_rest(setup, found, limits.idle_s)
-    _by_hand(setup, found)
+    # By hand, without power: the mechanical stops and a known angle.
+    require_no_power(setup)
+    found.checks.append(
+        ask_operator(
+            operator,
+            "mechanical stops",
+            "Without power: lead the joint to both ends by hand, and back. Do mechanical stops end "
+            "its way on both sides, where a person's arm still bears it?",
+            "fit them; the position limit of the software believes the encoder and is none",
+        )
+    )
+    found.checks.append(known_angle(setup))
     if not power_allowed(
         setup,
         found,
@@ -116,22 +132,7 @@ def _try_all(setup: Setup, found: Findings, facts: Mapping[str, Any]) -> None:
     found.checks += emergency_stop_checks(setup)
 
 
-def _by_hand(setup: Setup, found: Findings) -> None:
-    """Ask for the mechanical stops and a known angle, without power."""
-    require_no_power(setup)
-    found.checks.append(
-        ask_operator(
-            setup.operator,
-            "mechanical stops",
-            "Without power: lead the joint to both ends by hand, and back. Do mechanical stops end "
-            "its way on both sides, where a person's arm still bears it?",
-            "fit them; the position limit of the software believes the encoder and is none",
-        )
-    )
-    found.checks.append(known_angle(setup))
-
-
-def _swing(setup: Setup, found: Findings) -> bool:
+def _swing(setup: Setup, found: CheckResults) -> bool:
     settings, operator, limits = setup.settings, setup.operator, setup.limits
     operator.say(f"Slowly by {limits.swing_deg:g} deg to both sides.")
     velocity = swing(settings, limits.swing_deg, limits.swing_speed_deg_s, limits.swings)
@@ -156,7 +157,7 @@ def _swing(setup: Setup, found: Findings) -> bool:
     return seen.outcome != "failed"
 
 
-def _steps(setup: Setup, found: Findings) -> bool:
+def _steps(setup: Setup, found: CheckResults) -> bool:
     settings = setup.settings
     setup.operator.say("Small quick steps.")
     stepped = move(setup, steps(settings))
@@ -173,3 +174,59 @@ def _steps(setup: Setup, found: Findings) -> bool:
         arm_explains=arm.explained,
     )
     return stepped.cause is Cause.NONE
+
+
+def on_measured_rig(settings: Settings, bandwidth_hz: float, delay_s: float) -> Settings:
+    """Return the settings with the rig as it was measured.
+
+    The delay around the loop is put on the torque, which is then new at every tick: its age
+    is in the delay already.
+    """
+    rig = settings.rig
+    torque = rig.torque.model_copy(
+        update={
+            "rate_hz": rig.tick_rate_hz,
+            "latency_s": delay_s,
+            "stamp_latency_s": delay_s,
+            "jitter_s": 0.0,
+        }
+    )
+    measured = rig.model_copy(update={"drive_bandwidth_hz": bandwidth_hz, "torque": torque})
+    return settings.model_copy(update={"rig": measured})
+
+
+def margin_checks(
+    settings: Settings, bandwidth_hz: float, delay_s: float | None
+) -> tuple[list[RigCheck], dict[str, float]]:
+    """Check the margins with every condition's arm, and stability with those around it."""
+    remedy = "raise the controller's inertia or damping, or shorten the delays"
+    if delay_s is None or not (math.isfinite(delay_s) and math.isfinite(bandwidth_hz)):
+        limit = f"at least {settings.margins.gain_margin_db:g} dB"
+        return [impossible("stability", limit, "the delay of the loop could not be measured")], {}
+    measured = on_measured_rig(settings, bandwidth_hz, delay_s)
+    stability = loop_stability(measured)
+    wanted = settings.margins
+    limit = f"at least {wanted.gain_margin_db:g} dB and {wanted.phase_margin_deg:g} deg"
+    checks, numbers = [], {}
+    for name, margins in stability.conditions.items():
+        why = near_instability(f"the loop with subject {name}", margins, measured)
+        words = _words(margins)
+        checks.append(yes(f"stability with {name}", not why, words, limit, remedy))
+        numbers[f"gain_margin_db_{name}"] = margins.gain_margin_db
+        numbers[f"phase_margin_deg_{name}"] = margins.phase_margin_deg
+        numbers[f"delay_margin_s_{name}"] = margins.delay_margin_s
+    for name, margins in stability.worst.items():
+        words = _words(margins)
+        low, high = settings.margins.joint_factor_low, settings.margins.joint_factor_high
+        check = f"stability with arms {low:g} to {high:g} times {name}'s"
+        checks.append(yes(check, margins.stable, words, "stable", remedy))
+    return checks, numbers
+
+
+def _words(margins: Margins) -> str:
+    if not margins.stable:
+        return "unstable"
+    return (
+        f"{margins.gain_margin_db:.3g} dB, {margins.phase_margin_deg:.3g} deg, "
+        f"bears {with_unit(float(f'{margins.delay_margin_s:.3g}'), 's')} more delay"
+    )

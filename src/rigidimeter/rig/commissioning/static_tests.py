@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from rigidimeter.core.settings import Settings
-from rigidimeter.rig.commissioning.checks import Check, above, below, impossible, number, yes
-from rigidimeter.rig.commissioning.trial import Array, Readings, new_samples
+from rigidimeter.rig.commissioning.checks import RigCheck, above, below, impossible, with_unit, yes
+from rigidimeter.rig.commissioning.trials import Array, Readings, new_samples
 from rigidimeter.rig.guard import Cause
 
 BAD_COUNTS = ("lost", "damaged", "short", "reordered", "repeated", "refused", "unsent")
-FEWEST_VALUES = 3
+MIN_VALUES = 3
 AHEAD_S = 1e-3
 """A reading may come so much after the time that its tick notes."""
 
@@ -23,7 +23,7 @@ BRAKING = "braking_rad_s2"
 """What a drive's facts call the slowest of its own ways to brake."""
 
 
-def facts_checks(facts: Mapping[str, Any], settings: Settings) -> list[Check]:
+def facts_checks(facts: Mapping[str, Any], settings: Settings) -> list[RigCheck]:
     """Check what the devices said of themselves, and hold it against guard and loop."""
     sensor, drive = facts["torque_sensor"], facts["drive"]
     who = [f"{found['model'] or 'unknown'} {found['serial']}".strip() for found in (sensor, drive)]
@@ -32,43 +32,35 @@ def facts_checks(facts: Mapping[str, Any], settings: Settings) -> list[Check]:
     name, what = "watchdog configured", "the drive must stop by itself when nobody commands it"
     longest_s = settings.commissioning.max_watchdog_s
     if watchdog_s is None:
-        limit = f"at most {number(longest_s, 's')}"
+        limit = f"at most {with_unit(longest_s, 's')}"
         checks.append(yes(name, False, "none", limit, f"{what}; set it"))
     else:
         remedy = f"{what}; shorten its watchdog in the rig file"
         checks.append(below(name, watchdog_s, "s", longest_s, remedy))
-        checks.append(_stalls_first(watchdog_s, settings))
-    return [*checks, _braking(drive["values"].get(BRAKING), settings)]
-
-
-def _stalls_first(watchdog_s: float, settings: Settings) -> Check:
-    """Check that a loop that stands still says so before the drive stops by itself."""
-    stall_s = settings.loop.stall_s
-    return yes(
-        "loop stalls before the watchdog",
-        stall_s < watchdog_s,
-        number(stall_s, "s"),
-        f"below the drive's {number(watchdog_s, 's')}",
-        f"set loop.stall_s in the settings below {watchdog_s:g} s: after a longer standstill the "
-        "drive has stopped by itself, and the loop would go on as if it had not",
-    )
-
-
-def _braking(braking_rad_s2: float | None, settings: Settings) -> Check:
-    """Check that the drive brakes no slower than the guard counts on."""
+        stall_s = settings.loop.stall_s
+        checks.append(
+            yes(
+                "loop stalls before the watchdog",
+                stall_s < watchdog_s,
+                with_unit(stall_s, "s"),
+                f"below the drive's {with_unit(watchdog_s, 's')}",
+                f"set loop.stall_s in the settings below {watchdog_s:g} s: after a longer "
+                "standstill the drive has stopped by itself, and the loop would go on as if it had "
+                "not",
+            )
+        )
+    # The guard counts on a drive that brakes no slower than this.
     name, wanted = "braking of the drive", settings.guard.acceleration_limit_deg_s2
+    braking_rad_s2 = drive["values"].get(BRAKING)
     if braking_rad_s2 is None:
         why = f"the driver does not say how hard its drive brakes; let its facts have {BRAKING}"
-        return impossible(name, f"at least {wanted:.4g} deg/s²", why)
-    return above(
-        name,
-        math.degrees(braking_rad_s2),
-        "deg/s²",
-        wanted,
+        return [*checks, impossible(name, f"at least {wanted:.4g} deg/s²", why)]
+    remedy = (
         "the guard brakes for the position limit with guard.acceleration_limit_deg_s2, and this "
         "drive would cross it: raise the drive's decelerations in the rig file, or lower the "
-        "guard's limit in the settings",
+        "guard's limit in the settings"
     )
+    return [*checks, above(name, math.degrees(braking_rad_s2), "deg/s²", wanted, remedy)]
 
 
 def rate_checks(
@@ -77,7 +69,7 @@ def rate_checks(
     stamps_s: Array,
     expected_hz: float,
     settings: Settings,
-) -> list[Check]:
+) -> list[RigCheck]:
     """Check that new samples come often enough, never stay away, and are stamped when taken.
 
     Parameters
@@ -103,8 +95,8 @@ def rate_checks(
         yes(
             f"age of {role} samples",
             bool(usual_s >= -AHEAD_S and oldest_s <= stale_s),
-            f"{number(usual_s, 's')}, at most {number(oldest_s, 's')}",
-            f"above 0, at most {number(stale_s, 's')}",
+            f"{with_unit(usual_s, 's')}, at most {with_unit(oldest_s, 's')}",
+            f"above 0, at most {with_unit(stale_s, 's')}",
             "a stamp must be the time of the loop's clock at which the sample was taken: look at "
             "the clock that the driver takes it from, and at the rate that the device states",
         ),
@@ -126,7 +118,9 @@ def rate_checks(
     ]
 
 
-def lost_check(before: Mapping[str, int], after: Mapping[str, int], limit_percent: float) -> Check:
+def lost_check(
+    before: Mapping[str, int], after: Mapping[str, int], limit_percent: float
+) -> RigCheck:
     """Check that what the wires counted as lost or damaged is next to nothing."""
     gone = {name: count - before.get(name, 0) for name, count in after.items()}
     received = sum(count for name, count in gone.items() if name.endswith("_received"))
@@ -137,7 +131,7 @@ def lost_check(before: Mapping[str, int], after: Mapping[str, int], limit_percen
     return below("lost or damaged messages", percent, "%", limit_percent, remedy)
 
 
-def noise_checks(readings: Readings, settings: Settings) -> list[Check]:
+def noise_checks(readings: Readings, settings: Settings) -> list[RigCheck]:
     """Check torque at rest: it varies, but little, and is near zero."""
     zeroing = settings.zeroing
     fresh = new_samples(readings.torque_time_s) & np.isfinite(readings.torque_nm)
@@ -158,7 +152,7 @@ def noise_checks(readings: Readings, settings: Settings) -> list[Check]:
             "different torque values",
             float(len(values)),
             "1",
-            FEWEST_VALUES,
+            MIN_VALUES,
             "a torque that never changes is no measurement: look at sensor, amplifier and cable",
         ),
         below(
@@ -186,13 +180,13 @@ def noise_checks(readings: Readings, settings: Settings) -> list[Check]:
     ]
 
 
-def measured_noise_nm(checks: Sequence[Check]) -> float | None:
+def measured_noise_nm(checks: Sequence[RigCheck]) -> float | None:
     """Return the standard deviation of the torque at rest; None if it was not measured."""
     values = [check.value for check in checks if check.name == NOISE]
     return values[0] if values and isinstance(values[0], float) else None
 
 
-def lateness(readings: Readings, settings: Settings) -> Check:
+def lateness(readings: Readings, settings: Settings) -> RigCheck:
     """Check that 999 of 1000 ticks begin before the next is due."""
     return below(
         "lateness of the loop (p99.9)",

@@ -13,15 +13,15 @@ import numpy as np
 
 from rigidimeter.core.units import rad_from_deg
 from rigidimeter.rig.acquisition import ControlLoop, control_modes
-from rigidimeter.rig.commissioning.checks import Check, below, impossible, untried, yes
+from rigidimeter.rig.commissioning.checks import RigCheck, below, impossible, untried, yes
 from rigidimeter.rig.commissioning.manual_checks import ask_operator
 from rigidimeter.rig.commissioning.motion_tests import smooth_motion
-from rigidimeter.rig.commissioning.trial import (
+from rigidimeter.rig.commissioning.trials import (
     Readings,
     Setup,
     drop_old_samples,
-    follow,
-    hold,
+    follow_stretch,
+    hold_stretch,
     listen,
     stopped_for,
     trial,
@@ -31,7 +31,7 @@ from rigidimeter.rig.guard import Cause
 
 SETTLE_S = 0.3
 STOPPED_S = 0.4
-MOST_DEG = 0.2
+MAX_DEG = 0.2
 """A stopped joint that moves more than this has started again."""
 
 STOPPED_DEG_S = 2.0
@@ -43,13 +43,13 @@ STOP, POWER = "emergency stop", "hardware enable drops the power"
 RELEASE = "stays stopped after the release"
 
 
-def watchdog_checks(setup: Setup, watchdog_s: float | None) -> list[Check]:
+def watchdog_checks(setup: Setup, watchdog_s: float | None) -> list[RigCheck]:
     """Fall silent, at rest and in a slow motion; the drive must stop by itself and stay so."""
     if watchdog_s is None:
         why = "the drive has no watchdog that could be tried"
         return [impossible(name, "", why) for name in (REPORT, RESTART, AGAIN, WATCHDOG)]
     rig, time = setup.rig, setup.time
-    most_s = watchdog_s + setup.limits.watchdog_margin_s
+    limit_s = watchdog_s + setup.limits.watchdog_margin_s
     reported_s = math.inf
     after_stop: Readings | None = None
 
@@ -60,7 +60,7 @@ def watchdog_checks(setup: Setup, watchdog_s: float | None) -> list[Check]:
         # A driver may give the drive up by its own clock. Only what comes from the drive counts.
         readings = listen(
             setup,
-            most_s,
+            limit_s,
             write_rad_s=None,
             until=lambda r: r.cause in REPORTS and r.motion_status != before,
         )
@@ -68,7 +68,7 @@ def watchdog_checks(setup: Setup, watchdog_s: float | None) -> list[Check]:
             reported_s = float(readings.time_s[-1]) - began_s
             after_stop = _command_stopped_rig(setup)
 
-    result = trial(setup, hold(SETTLE_S), silence)
+    result = trial(setup, hold_stretch(SETTLE_S), silence)
     if result.cause is not Cause.NONE:
         why = "remove the reason and commission again"
         return [yes(WATCHDOG, False, stopped_for(result.cause), "tried", why)]
@@ -77,7 +77,7 @@ def watchdog_checks(setup: Setup, watchdog_s: float | None) -> list[Check]:
         checks = [impossible(name, "", silent) for name in (REPORT, RESTART, AGAIN)]
     else:
         late = "the drive says too late that it stopped: shorten its watchdog"
-        checks = [below(REPORT, reported_s, "s", most_s, late), _stayed(RESTART, after_stop)]
+        checks = [below(REPORT, reported_s, "s", limit_s, late), _stayed(RESTART, after_stop)]
         checks.append(_again(setup))
         if not checks[-1].passed:
             why = "the drive has no power again after the watchdog"
@@ -85,14 +85,14 @@ def watchdog_checks(setup: Setup, watchdog_s: float | None) -> list[Check]:
     return [*checks, _overrun(setup, watchdog_s)]
 
 
-def emergency_stop_checks(setup: Setup) -> list[Check]:
+def emergency_stop_checks(setup: Setup) -> list[RigCheck]:
     """Let the operator press the emergency stop, tell whether the power went, and release it."""
     rig, operator, wait_s = setup.rig, setup.operator, setup.limits.emergency_stop_wait_s
-    limits_of = {STOP: "seen at once", POWER: "yes", RELEASE: f"at most {MOST_DEG:g} deg"}
+    limits_of = {STOP: "seen at once", POWER: "yes", RELEASE: f"at most {MAX_DEG:g} deg"}
     if not operator.present:
         return [untried(name, limit) for name, limit in limits_of.items()]
 
-    def none_of(names: tuple[str, ...], why: str) -> list[Check]:
+    def none_of(names: tuple[str, ...], why: str) -> list[RigCheck]:
         return [impossible(name, limits_of[name], why) for name in names]
 
     if not operator.ask(
@@ -111,8 +111,8 @@ def emergency_stop_checks(setup: Setup) -> list[Check]:
 
     result = trial(setup, wait)
     # A driver may give the drive up by its own clock; one that was switched off says nothing.
-    said = after != before or result.cause is Cause.DRIVE_LOST
-    seen = result.cause in REPORTS and said
+    reported = after != before or result.cause is Cause.DRIVE_LOST
+    seen = result.cause in REPORTS and reported
     words = result.cause.sentence if result.cause is not Cause.NONE else f"nothing in {wait_s:g} s"
     remedy = "the emergency stop must take the drive's power away: look at its wiring"
     checks = [yes(STOP, seen, words, limits_of[STOP], remedy)]
@@ -138,25 +138,25 @@ def emergency_stop_checks(setup: Setup) -> list[Check]:
 
 def _command_stopped_rig(setup: Setup) -> Readings:
     """Command a slow motion to a rig that must not move; it ends as soon as it does."""
-    start_rad, most_rad = setup.rig.read().angle_rad, rad_from_deg(MOST_DEG)
+    start_rad, limit_rad = setup.rig.read().angle_rad, rad_from_deg(MAX_DEG)
     readings = listen(
         setup,
         STOPPED_S,
         write_rad_s=rad_from_deg(STOPPED_DEG_S),
-        until=lambda reading: abs(reading.angle_rad - start_rad) > most_rad,
+        until=lambda reading: abs(reading.angle_rad - start_rad) > limit_rad,
     )
     setup.rig.write(0.0)
     return readings
 
 
-def _stayed(name: str, readings: Readings) -> Check:
+def _stayed(name: str, readings: Readings) -> RigCheck:
     angle = readings.angle_rad[np.isfinite(readings.angle_rad)]
     moved = math.degrees(float(np.ptp(angle))) if len(angle) else 0.0
     remedy = "a stopped drive must wait for an operator: look at its automatic restart"
-    return below(name, moved, "deg", MOST_DEG, remedy)
+    return below(name, moved, "deg", MAX_DEG, remedy)
 
 
-def _again(setup: Setup) -> Check:
+def _again(setup: Setup) -> RigCheck:
     """Enable the rig again, once the operator agrees."""
     limit = "enabled, at rest"
     question = "The watchdog has stopped the drive. May it be reset and get power again?"
@@ -164,7 +164,7 @@ def _again(setup: Setup) -> Check:
         return impossible(AGAIN, limit, "the operator did not agree to it")
     try:
         _reset(setup.rig)
-        result = trial(setup, hold(SETTLE_S))
+        result = trial(setup, hold_stretch(SETTLE_S))
     except DeviceError as error:
         return yes(AGAIN, False, "refused", limit, str(error))
     good = result.cause is Cause.NONE
@@ -178,11 +178,11 @@ def _reset(rig: Rig) -> None:
         reset()
 
 
-def _overrun(setup: Setup, watchdog_s: float) -> Check:
+def _overrun(setup: Setup, watchdog_s: float) -> RigCheck:
     """Fall silent while the joint moves slowly; see how long it went on, and bring it back."""
     rig, rate_hz, limits = setup.rig, setup.rate_hz, setup.limits
     speed_rad_s = rad_from_deg(limits.swing_speed_deg_s)
-    most_s = watchdog_s + limits.watchdog_margin_s
+    limit_s = watchdog_s + limits.watchdog_margin_s
     before = after = math.nan
     n = round(SETTLE_S * rate_hz)
     velocity = np.minimum(np.arange(1, n + 1) / (0.5 * n), 1.0) * speed_rad_s
@@ -190,17 +190,17 @@ def _overrun(setup: Setup, watchdog_s: float) -> Check:
     def silence(_: ControlLoop) -> None:
         nonlocal before, after
         before = rig.read().angle_rad
-        listen(setup, 2.0 * most_s + SETTLE_S, write_rad_s=None)
+        listen(setup, 2.0 * limit_s + SETTLE_S, write_rad_s=None)
         after = float(listen(setup, SETTLE_S).angle_rad[-1])
 
-    result = trial(setup, hold(SETTLE_S), follow(velocity, rate_hz), silence)
+    result = trial(setup, hold_stretch(SETTLE_S), follow_stretch(velocity, rate_hz), silence)
     if math.isnan(after):
         why = "remove the reason and commission again"
         return yes(WATCHDOG, False, stopped_for(result.cause), "tried", why)
     went_on_s = abs(after - before) / speed_rad_s
     _reset(rig)
     back = smooth_motion(-after, 0.5 * speed_rad_s, 1.0 / rate_hz)
-    trial(setup, hold(SETTLE_S), follow(back, rate_hz))
+    trial(setup, hold_stretch(SETTLE_S), follow_stretch(back, rate_hz))
     remedy = "the drive keeps moving when the computer stops: set its watchdog and try again"
-    most_s += setup.settings.guard.reaction_time_s
-    return below(WATCHDOG, went_on_s, "s", most_s, remedy)
+    limit_s += setup.settings.guard.reaction_time_s
+    return below(WATCHDOG, went_on_s, "s", limit_s, remedy)

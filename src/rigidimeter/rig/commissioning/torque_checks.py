@@ -12,9 +12,9 @@ import math
 from typing import NamedTuple
 
 from rigidimeter.core.settings import Settings
-from rigidimeter.rig.commissioning.checks import Check, below, impossible, number, yes
+from rigidimeter.rig.commissioning.checks import RigCheck, below, impossible, with_unit, yes
 from rigidimeter.rig.commissioning.inertia_fit import TorqueAnswer
-from rigidimeter.rig.commissioning.trial import stopped_for
+from rigidimeter.rig.commissioning.trials import stopped_for
 from rigidimeter.rig.guard import Cause
 
 SIGN, PRECISION, GAIN = "sign of the torque", "error of the inertia", "inertia"
@@ -37,7 +37,7 @@ class KnownInertia(NamedTuple):
     source: str
 
 
-def sign_check(answer: TorqueAnswer, cause: Cause) -> Check:
+def sign_check(answer: TorqueAnswer, cause: Cause) -> RigCheck:
     """Check that torque and angle have the same sign: an inertia is above zero.
 
     The guard may have ended the motion because the torque did not answer it.
@@ -60,7 +60,7 @@ def sign_check(answer: TorqueAnswer, cause: Cause) -> Check:
     return yes(SIGN, good, words, "that of a positive inertia", remedy)
 
 
-def precision_check(answer: TorqueAnswer) -> Check:
+def precision_check(answer: TorqueAnswer) -> RigCheck:
     """Check that the inertia is known well enough to compare it."""
     return below(
         PRECISION,
@@ -71,13 +71,13 @@ def precision_check(answer: TorqueAnswer) -> Check:
     )
 
 
-def gain_check(answer: TorqueAnswer, known: KnownInertia, settings: Settings) -> Check:
+def gain_check(answer: TorqueAnswer, known: KnownInertia, settings: Settings) -> RigCheck:
     """Compare the inertia with a known one."""
     J0, percent = known.inertia_kg_m2, settings.commissioning.inertia_tolerance_percent
     error = math.hypot(answer.inertia_se_kg_m2, known.inertia_se_kg_m2)
     allowed = max(0.01 * percent * J0, CERTAIN * error)
     good = abs(answer.inertia_kg_m2 - J0) <= allowed
-    return Check(
+    return RigCheck(
         GAIN,
         answer.inertia_kg_m2,
         _UNIT,
@@ -90,19 +90,19 @@ def gain_check(answer: TorqueAnswer, known: KnownInertia, settings: Settings) ->
     )
 
 
-def delay_check(answer: TorqueAnswer, expected_s: float | None, settings: Settings) -> Check:
+def delay_check(answer: TorqueAnswer, expected_s: float | None, settings: Settings) -> RigCheck:
     """Compare how late the torque is with the day the rig was commissioned."""
     allowed_s = max(settings.commissioning.delay_tolerance_s, 1.0 / settings.rig.tick_rate_hz)
     if expected_s is None:
         why = "the commissioning record has no torque_after_motion_s; commission again"
         return impossible(DELAY, "as commissioned", why)
     good = abs(answer.delay_s - expected_s) <= allowed_s
-    limit = f"{number(expected_s, 's')} ± {number(allowed_s, 's')}, as commissioned"
+    limit = f"{with_unit(expected_s, 's')} ± {with_unit(allowed_s, 's')}, as commissioned"
     remedy = (
         "the torque arrives later or earlier than the margins were computed for: look at the "
         "sensor's filter and at the network, or commission again"
     )
-    return Check(
+    return RigCheck(
         DELAY,
         answer.delay_s,
         "s",

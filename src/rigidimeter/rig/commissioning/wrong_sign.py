@@ -44,12 +44,12 @@ from rigidimeter.model import (
     subject_density,
 )
 from rigidimeter.planning import prbs_nm
-from rigidimeter.rig.commissioning.checks import Check
+from rigidimeter.rig.commissioning.checks import RigCheck
 from rigidimeter.rig.commissioning.static_tests import measured_noise_nm
 from rigidimeter.rig.guard import DIFFERENCES, INSTRUMENTS, torque_answer
 
 MARGIN = 16.0
-LEAST_NM = 1e-4
+MIN_NM = 1e-4
 _LINES = 512
 
 
@@ -86,14 +86,14 @@ def hiding_torque_nm(settings: Settings, condition: str) -> float:
         white = np.abs(1.0 - once[:, None] ** np.arange(1, order + 1) @ phi) ** 2
         return math.log(float(white @ answer) / float(white @ noise) / needed)
 
-    least, most, hiding_nm = math.log(LEAST_NM), math.log(settings.guard.torque_limit_nm), 0.0
+    log_min, log_max, hiding_nm = math.log(MIN_NM), math.log(settings.guard.torque_limit_nm), 0.0
     free_s = _at_limit_s(settings, (J, B, K))
     for n, left in zip(torque_answer.ROWS, limits.left, strict=True):
         free = n - INSTRUMENTS - 2 * left.order
         of = left.order, MARGIN * free / n * (1.0 / left.at_once - 1.0)
-        if (n + torque_answer.ROWS_A_LOOK) * row_s < free_s and spare(least, *of) > 0.0:
-            hides = spare(most, *of) < 0.0
-            log_nm = scipy.optimize.brentq(spare, least, most, of) if hides else most
+        if (n + torque_answer.ROWS_A_TEST) * row_s < free_s and spare(log_min, *of) > 0.0:
+            hides = spare(log_max, *of) < 0.0
+            log_nm = scipy.optimize.brentq(spare, log_min, log_max, of) if hides else log_max
             hiding_nm = max(hiding_nm, math.exp(log_nm))
     return hiding_nm
 
@@ -110,14 +110,14 @@ def _at_limit_s(settings: Settings, joint: tuple[float, float, float]) -> float:
     return float(np.argmax(beyond)) / rate_hz if beyond.any() else math.inf
 
 
-def sign_words(settings: Settings, checks: Sequence[Check]) -> str:
+def sign_words(settings: Settings, checks: Sequence[RigCheck]) -> str:
     """Return what protects from a wrong sign in sessions with these settings.
 
     Parameters
     ----------
     settings : Settings
         Of the protocol.
-    checks : sequence of Check
+    checks : sequence of RigCheck
         Of the rig; the noise of the torque is taken from them.
     """
     daily = "repeat `rigidimeter check`, with nobody in the rig, before every session."

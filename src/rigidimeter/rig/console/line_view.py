@@ -14,12 +14,18 @@ from collections.abc import Callable
 from typing import IO
 
 from rigidimeter.rig.acquisition import Command, Order
-from rigidimeter.rig.acquisition.processes import Condition, Flag, Role, SessionMemory, SharedStatus
-from rigidimeter.rig.console.facts import Facts
-from rigidimeter.rig.console.lamps import Level
+from rigidimeter.rig.acquisition.processes import (
+    Flag,
+    ProcessCondition,
+    Role,
+    SessionMemory,
+    SharedStatus,
+)
+from rigidimeter.rig.console.indicators import Level
 from rigidimeter.rig.console.observer import Observer
 from rigidimeter.rig.console.orders import order_of, save_to
-from rigidimeter.rig.console.session_plan import SessionPlan
+from rigidimeter.rig.console.session_facts import Facts
+from rigidimeter.rig.console.session_progress import SessionPlan
 
 HELP = (
     "p pause after this epoch, n pause now, r resume, s stop after this epoch, a abort, "
@@ -30,8 +36,8 @@ HELP = (
 
 def status_line(facts: Facts) -> str:
     """Return what the operator reads, in one line, what matters most first."""
-    limits = next(lamp for lamp in facts.lamps if lamp.name == "limits")
-    watch = [lamp for lamp in facts.lamps if lamp.level >= Level.WATCH]
+    limits = next(indicator for indicator in facts.indicators if indicator.name == "limits")
+    watch = [indicator for indicator in facts.indicators if indicator.level >= Level.WATCH]
     parts = [
         f"{facts.time_s:8.1f} s",
         facts.epoch.text if facts.epoch is not None else facts.state_words,
@@ -39,7 +45,7 @@ def status_line(facts: Facts) -> str:
     if facts.stop_words:
         parts.append(facts.stop_words)
     if watch:
-        parts.append(" ".join(f"{lamp.level.sign} {lamp.name}" for lamp in watch))
+        parts.append(" ".join(f"{indicator.level.sign} {indicator.name}" for indicator in watch))
     if limits.level > Level.UNKNOWN:
         parts.append(limits.words)
     if facts.countdown_words:
@@ -48,7 +54,9 @@ def status_line(facts: Facts) -> str:
     known = [value.text for value in facts.live if value.settled]
     if known:
         parts.append(f"{facts.live_words}, live: {', '.join(known)}")
-    parts += [f"{lamp.name}: {lamp.words}" for lamp in watch if lamp is not limits]
+    parts += [
+        f"{indicator.name}: {indicator.words}" for indicator in watch if indicator is not limits
+    ]
     return " | ".join(parts)
 
 
@@ -80,7 +88,7 @@ class LineView:
         self._observer: Observer | None = None
         self._shown_s = -math.inf
         self._typed = b""
-        self._told: tuple[str, ...] = ()
+        self._announced: tuple[str, ...] = ()
         if keyboard is not None:
             self._say(HELP)
 
@@ -90,17 +98,17 @@ class LineView:
         self._listen(status)
         if self._observer is None:
             self._observer = Observer(self._plan, shared)
-        facts = self._observer.look()
+        facts = self._observer.facts_now()
         notes = [
             status.note(role)
             for role in (Role.RECORDER, Role.ESTIMATOR)
-            if status.condition(role) is Condition.TROUBLE
+            if status.condition(role) is ProcessCondition.TROUBLE
         ]
-        told = tuple(filter(None, (facts.stop_words, *self._observer.cautions, *notes)))
-        for text in told:
-            if text not in self._told:
+        texts = tuple(filter(None, (facts.stop_words, *self._observer.cautions, *notes)))
+        for text in texts:
+            if text not in self._announced:
                 self._say(text)
-        self._told = told
+        self._announced = texts
         if self._now() - self._shown_s >= self.every_s and self._show(facts):
             self._shown_s = self._now()
 

@@ -15,22 +15,25 @@ from rigidimeter.rig.acquisition.processes import (
     SampleReader,
     SessionMemory,
 )
-from rigidimeter.rig.console.facts import Facts, facts
-from rigidimeter.rig.console.lamps import RecorderState
-from rigidimeter.rig.console.live_values import caution, settling_s
-from rigidimeter.rig.console.recent_samples import RECENT_S, recent_samples
-from rigidimeter.rig.console.session_plan import SessionPlan
-from rigidimeter.rig.console.session_progress import Progress, progress_after, progress_at_start
+from rigidimeter.rig.console.indicators import RECENT_S, RecorderState, recent_samples
+from rigidimeter.rig.console.live_parameters import caution, settling_s
+from rigidimeter.rig.console.session_facts import Facts, facts
+from rigidimeter.rig.console.session_progress import (
+    Progress,
+    SessionPlan,
+    progress_after,
+    progress_at_start,
+)
 
 TICKS_SHOW = 5.0
 """Ticks at least so many times as fast as the drive show an inertia as it is, to a tenth."""
 
-MOST_ESTIMATES = 4000
+MAX_ESTIMATES = 4000
 """Live estimates that are remembered, which come ten times a second: more than five minutes."""
 
 
 class Observer:
-    """Follows one session from its beginning; `look` may be called as often as one likes.
+    """Follows one session from its beginning; `facts_now` may be called as often as one likes.
 
     Parameters
     ----------
@@ -44,17 +47,17 @@ class Observer:
         self._samples = SampleReader(shared.samples, max(0, shared.samples.written - 1))
         self._events = 0
         self._rows: NDArray[np.void] = np.empty(0, ROW)
-        self._history: deque[LiveEstimate] = deque(maxlen=MOST_ESTIMATES)
+        self._history: deque[LiveEstimate] = deque(maxlen=MAX_ESTIMATES)
         self._loop = LoopStatus()
         self._perturbed: dict[int, LiveEstimate] = {}
         self._cautions: dict[int, str] = {}
         self.progress: Progress = progress_at_start(plan.epochs)
 
-    def look(self) -> Facts:
+    def facts_now(self) -> Facts:
         """Return the facts now."""
         self._read_events()
         rate_hz = self._plan.settings.rig.tick_rate_hz
-        rows, _ = self._samples.read(most=round(RECENT_S * rate_hz))
+        rows, _ = self._samples.read(max_rows=round(RECENT_S * rate_hz))
         rows = np.concatenate((self._rows, rows))
         if rows.size:
             rows = rows[rows["time_s"] > rows["time_s"][-1] - RECENT_S]

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from rigidimeter.rig.acquisition import Command, Order
-from rigidimeter.rig.acquisition.processes import Condition, Role, SharedStatus
+from rigidimeter.rig.acquisition.processes import ProcessCondition, Role, SharedStatus
 
 KEYS = {
     "p": Command.PAUSE,
@@ -32,11 +32,11 @@ def order_of(text: str) -> Order | None:
             return Order(Command.CHANGE, words[1], float(words[2]))
         except ValueError:
             return None
-    said = " ".join(words).lower()
-    if said == "stop":  # in a hurry one types the word: it ends what moves, now
+    typed = " ".join(words).lower()
+    if typed == "stop":  # in a hurry one types the word: it ends what moves, now
         return Order(Command.ABORT)
     by_name = {command.name.lower().replace("_", " "): command for command in KEYS.values()}
-    command = (KEYS | by_name).get(said)
+    command = (KEYS | by_name).get(typed)
     return Order(command) if command is not None else None
 
 
@@ -48,7 +48,11 @@ def post_typed(text: str, status: SharedStatus) -> str:
     words = text.split(maxsplit=1)
     name, rest = (words[0].lower(), words[1:]) if words else ("", [])
     if name == "note" and rest:
-        return _note(rest[0], status)
+        try:
+            number = status.post_note(json.dumps({"what": "note", "text": rest[0], "by": ""}))
+        except ValueError as error:
+            return str(error)
+        return "noted" if number is not None else "the note before is not taken yet; try again"
     if text.lower().startswith("save to "):
         return save_to(text[len("save to ") :].strip(), status)
     order = order_of(text) if name == "set" else None
@@ -61,17 +65,9 @@ def post_typed(text: str, status: SharedStatus) -> str:
     return f"ordered: {text}"
 
 
-def _note(text: str, status: SharedStatus) -> str:
-    try:
-        number = status.post_note(json.dumps({"what": "note", "text": text, "by": ""}))
-    except ValueError as error:
-        return str(error)
-    return "noted" if number is not None else "the note before is not taken yet; try again"
-
-
 def save_to(name: str, status: SharedStatus) -> str:
     """Ask the recorder for another folder, if it can write nothing to the one it has."""
-    if status.condition(Role.RECORDER) is not Condition.TROUBLE:
+    if status.condition(Role.RECORDER) is not ProcessCondition.TROUBLE:
         return "the recorder can write: another folder is for when it cannot"
     folder = Path(name).expanduser()
     try:

@@ -1,7 +1,14 @@
 """Torque sensors, drives and rigs, behind the protocols of `base`."""
 
 from rigidimeter.rig.devices.ascii.drive import AsciiDrive
-from rigidimeter.rig.devices.ascii.language import Feedback, get, move_target, parse, seconds, set_
+from rigidimeter.rig.devices.ascii.language import (
+    Feedback,
+    line_time_s,
+    move_target,
+    parse,
+    read_request,
+    set_request,
+)
 from rigidimeter.rig.devices.ascii.line import AsciiLine, Exchange
 from rigidimeter.rig.devices.ascii.setup import PATIENCE
 from rigidimeter.rig.devices.ati.analogue import AtiAnalogue, ReaderError
@@ -20,17 +27,16 @@ from rigidimeter.rig.devices.ati.rdt_packets import (
     request,
     status_words,
 )
-from rigidimeter.rig.devices.ati.rdt_setup import changes, parse_page
+from rigidimeter.rig.devices.ati.rdt_setup import page_changes, parse_page
 from rigidimeter.rig.devices.ati.sample_clock import LONGEST_DELAY_S, SampleClock
 from rigidimeter.rig.devices.cia402.drive import Cia402Drive
-from rigidimeter.rig.devices.cia402.eds import fits
+from rigidimeter.rig.devices.cia402.eds import compare_eds
+from rigidimeter.rig.devices.cia402.sdo_transfers import read_back, write_object
 from rigidimeter.rig.devices.cia402.setup import (
     Cia402Settings,
     Object,
     displayed_mode,
     objects,
-    put,
-    read_back,
     scale,
 )
 from rigidimeter.rig.devices.cia402.state_words import (
@@ -38,8 +44,8 @@ from rigidimeter.rig.devices.cia402.state_words import (
     OPERATIONAL,
     PRE_OPERATIONAL,
     STOPPED,
+    Cia402State,
     Control,
-    State,
     command_bytes,
     emergency,
     fastest_tick_rate_hz,

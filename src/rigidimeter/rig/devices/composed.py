@@ -28,8 +28,7 @@ from rigidimeter.rig.guard import REACTIONS, Cause
 ATTEMPTS, ATTEMPT_S = 50, 0.002
 """How often, and at what interval, the first samples after enabling are polled."""
 
-
-SAMPLES_KEPT_S = 1.0
+BUFFERED_S = 1.0
 """A sensor's samples of a longer time than this may not fit into the buffer of its connection."""
 
 
@@ -111,16 +110,13 @@ class ComposedRig:
         facts = {"torque_sensor": self._sensor.configure(), "drive": self._drive.configure()}
         self._identified(facts)
         for role, found in facts.items():
-            self._check_rate(role, found)
+            if found.fastest_tick_rate_hz < self._tick_rate_hz:
+                raise DeviceError(
+                    f"{role} ({found.model or 'unknown model'}): keeps up with "
+                    f"{found.fastest_tick_rate_hz:.4g} ticks/s at most, but rig.tick_rate_hz = "
+                    f"{self._tick_rate_hz:g} Hz; lower rig.tick_rate_hz"
+                )
         return {role: asdict(found) for role, found in facts.items()}
-
-    def _check_rate(self, role: str, facts: DeviceFacts) -> None:
-        if facts.fastest_tick_rate_hz < self._tick_rate_hz:
-            raise DeviceError(
-                f"{role} ({facts.model or 'unknown model'}): keeps up with "
-                f"{facts.fastest_tick_rate_hz:.4g} ticks/s at most, but rig.tick_rate_hz = "
-                f"{self._tick_rate_hz:g} Hz; lower rig.tick_rate_hz"
-            )
 
     def enable(self) -> None:
         """Close the contact, energise the drive at zero velocity, store where the joint is.
@@ -163,11 +159,11 @@ class ComposedRig:
                     f"drive: {Cause(motion.cause).sentence} as soon as it was enabled; put that "
                     "right first"
                 )
-            if torque.cause and took_s > SAMPLES_KEPT_S:
+            if torque.cause and took_s > BUFFERED_S:
                 raise DeviceError(
                     f"drive: it took {took_s:.1f} s to be enabled, so late are its answers, and "
                     "the torque sensor's samples of that time were lost; it must take less than "
-                    f"{SAMPLES_KEPT_S:g} s, so find what keeps the drive or its bus busy"
+                    f"{BUFFERED_S:g} s, so find what keeps the drive or its bus busy"
                 )
             if fresh and math.isfinite(motion.angle_rad):
                 return motion.angle_rad

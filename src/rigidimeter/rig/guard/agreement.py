@@ -70,7 +70,7 @@ SMOOTHED_S = 0.02
 FEW_SAMPLES = 3.0
 """A reading older than so many sample intervals has missed some."""
 
-LEAST_OLD_S = 0.012
+MIN_OLD_S = 0.012
 """Whatever the rate: a network and an operating system delay single samples by so much."""
 
 OLD_SHARE = 0.2
@@ -114,9 +114,9 @@ class MeansState(NamedTuple):
 
     `angle_rad` and `velocity_rad_s` are the last means (NaN before the first), `since_s` the time
     from their stamps to the end of their ticks. `moved_rad` and `reported_rad` are p and q,
-    `apart_rad2`, `moved_rad2` and `reported_rad2` the means of d², p² and q². `pace_rad_s` is the
-    velocity from the angle, `energy_j` what goes to and fro at it. `torque_old` and `motion_old`
-    are shares of time, `unanswered_s` is the time since `torque_answer` was asked.
+    `disagreement_rad2`, `moved_rad2` and `reported_rad2` the means of d², p² and q². `pace_rad_s`
+    is the velocity from the angle, `energy_j` what goes to and fro at it. `torque_old` and
+    `motion_old` are shares of time, `unanswered_s` is the time since `torque_answer` was asked.
     """
 
     answer: AnswerState
@@ -125,7 +125,7 @@ class MeansState(NamedTuple):
     since_s: float = 0.0
     moved_rad: float = 0.0
     reported_rad: float = 0.0
-    apart_rad2: float = 0.0
+    disagreement_rad2: float = 0.0
     moved_rad2: float = 0.0
     reported_rad2: float = 0.0
     pace_rad_s: float = 0.0
@@ -144,8 +144,8 @@ def consistency_limits(settings: Settings) -> ConsistencyLimits:
     unseen_deg += summed_s * rig.motion.velocity_resolution_deg_s
 
     def old_s(sensor: TorqueSensorSettings | MotionSensorSettings) -> float:
-        apart_s = 1.0 / sensor.rate_hz + sensor.jitter_s  # no sensor is faster than the loop
-        return sensor.latency_s + max(FEW_SAMPLES * apart_s, LEAST_OLD_S)
+        sample_s = 1.0 / sensor.rate_hz + sensor.jitter_s  # no sensor is faster than the loop
+        return sensor.latency_s + max(FEW_SAMPLES * sample_s, MIN_OLD_S)
 
     return ConsistencyLimits(
         interval_s=interval_s,
@@ -194,7 +194,7 @@ def means_step(
         How long before the torque the motion was taken. The joint has gone on since.
     """
     answer, before, speed_before, since_s, moved, reported = state[:6]
-    apart, moved2, reported2, pace, energy, torque_old, motion_old, unanswered_s = state[6:]
+    disagreement, moved2, reported2, pace, energy, torque_old, motion_old, unanswered_s = state[6:]
     forgotten = min(elapsed_s / limits.old_memory_s, 1.0)
     torque_old += (torque_old_share - torque_old) * forgotten
     motion_old += (motion_old_share - motion_old) * forgotten
@@ -203,17 +203,17 @@ def means_step(
     if isnan(before):
         before, speed_before, since_s = angle_rad, velocity_rad_s, elapsed_s - stamp_s
     elif passed_s > _SAME_STAMP_S:
-        kept = max(1.0 - passed_s / limits.summed_s, 0.0)
+        remembered = max(1.0 - passed_s / limits.summed_s, 0.0)
         change = angle_rad - before
-        moved = moved * kept + change
-        said = 0.5 * (speed_before + velocity_rad_s) * passed_s
+        moved = moved * remembered + change
+        by_velocity = 0.5 * (speed_before + velocity_rad_s) * passed_s
         if elapsed_s > LATE * limits.mean_of_ticks * limits.interval_s or unanswered_s > 0.0:
             one, other = speed_before * passed_s, velocity_rad_s * passed_s
-            said = min(max(change, min(one, other)), max(one, other))
-        reported = reported * kept + said
+            by_velocity = min(max(change, min(one, other)), max(one, other))
+        reported = reported * remembered + by_velocity
         weight = min(passed_s / SQUARED_S, 1.0)
         difference = moved - reported
-        apart += (difference * difference - apart) * weight
+        disagreement += (difference * difference - disagreement) * weight
         moved2 += (moved * moved - moved2) * weight
         reported2 += (reported * reported - reported2) * weight
         pace += (change - pace * passed_s) / max(passed_s, SMOOTHED_S)
@@ -235,10 +235,10 @@ def means_step(
         cause = int(Cause.SELDOM_FRESH)
     if energy > limits.energy_j:
         cause = int(Cause.ENERGY_HIGH)
-    if apart > limits.unseen_rad * limits.unseen_rad:
+    if disagreement > limits.unseen_rad * limits.unseen_rad:
         both = moved2 + reported2
-        in_common = 0.5 * (both - apart)  # the mean of p q
-        if apart > WRONG_SHARE * both or in_common > WRONG_GAIN * min(moved2, reported2):
+        in_common = 0.5 * (both - disagreement)  # the mean of p q
+        if disagreement > WRONG_SHARE * both or in_common > WRONG_GAIN * min(moved2, reported2):
             cause = int(Cause.VELOCITY_WRONG)
     after = MeansState(
         answer,
@@ -247,7 +247,7 @@ def means_step(
         since_s,
         moved,
         reported,
-        apart,
+        disagreement,
         moved2,
         reported2,
         pace,
@@ -264,6 +264,6 @@ def larger_gain(means: MeansState) -> float:
 
     Infinite where one of them is 0.
     """
-    in_common = 0.5 * (means.moved_rad2 + means.reported_rad2 - means.apart_rad2)
-    least = min(means.moved_rad2, means.reported_rad2)
-    return in_common / least if least > 0.0 else math.inf
+    in_common = 0.5 * (means.moved_rad2 + means.reported_rad2 - means.disagreement_rad2)
+    smaller = min(means.moved_rad2, means.reported_rad2)
+    return in_common / smaller if smaller > 0.0 else math.inf

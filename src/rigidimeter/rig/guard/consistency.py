@@ -183,6 +183,6 @@ def ended(limits: ConsistencyLimits, state: ConsistencyState) -> tuple[Consisten
         ticks * limits.interval_s,
         state.before_s * share,
     )
-    kept = means, still_s, held, read_rad, read_rad_s, same_s
+    same = means, still_s, held, read_rad, read_rad_s, same_s
     # Every field: the compiler of `benchmarks.false_alarms` knows no defaults.
-    return ConsistencyState(*kept, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), cause
+    return ConsistencyState(*same, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), cause

@@ -20,7 +20,7 @@ later than `gap_s` by T lets the joint pass by at most v T, as the last command 
 The position limit wins over the acceleration limit; it only ever makes the speed toward the limit
 smaller. What `watch` finds wrong, or a device or the loop reports, latches: the velocity is ramped
 to zero, or cut, and stays there; a hold alone can be `released`. The first cause is kept, of two in
-one step the graver; the reaction can become stronger, never weaker.
+one step the more serious; the reaction can become stronger, never weaker.
 
 Like the control steps, a step only adds, multiplies, compares and takes square roots.
 """
@@ -41,7 +41,7 @@ from rigidimeter.rig.guard.watch import energy_after, found_wrong, outside
 
 
 class Limited(IntEnum):
-    """Which limit changed the command of a tick; the gravest one is named."""
+    """Which limit changed the command of a tick; the most serious one is named."""
 
     NOT = 0
     ACCELERATION = 1
@@ -134,16 +134,16 @@ def guard_step(
     # faster than a drive whose zero is not quite zero lets it: what is faster adds up.
     old_s = max(age, 0.0)
     ago = int(min((old_s + 0.5 * reaction_time_s) * ticks_per_s, oldest))
-    told = float(ring[newest - ago])
+    commanded = float(ring[newest - ago])
     if isnan(origin):
-        origin = angle - told
-    astray = angle - origin - told
-    if abs(astray) > 0.5 * limits.following_rad:
+        origin = angle - commanded
+    position_error = angle - origin - commanded
+    if abs(position_error) > 0.5 * limits.following_rad:
         first = int(min(max(age - reaction_time_s, 0.0) * ticks_per_s, oldest))
         last = math.ceil(min((old_s + reaction_time_s) * ticks_per_s, oldest))
-        astray = outside(ring, newest, first, last, angle - origin)
+        position_error = outside(ring, newest, first, last, angle - origin)
         drift = limits.drift_rad_s * elapsed_s
-        origin += min(max(astray, -drift), drift)
+        origin += min(max(position_error, -drift), drift)
 
     found = found_wrong(
         limits,
@@ -154,11 +154,11 @@ def guard_step(
         speed_now,
         age,
         torque_age_s,
-        astray,
+        position_error,
         energy,
         limited_s,
     )
-    found = _gravest(found, disagreement, reported)
+    found = _most_serious(found, disagreement, reported)
     if found != _NO_CAUSE:
         if cause == _NO_CAUSE:
             cause = found
@@ -191,7 +191,7 @@ LONGEST_BRAKING = 5
 """A late step brakes for at most so many ticks at once: a loop that is later has stalled."""
 
 
-def _gravest(found: int, disagreement: int, reported: int) -> int:
+def _most_serious(found: int, disagreement: int, reported: int) -> int:
     """Return which of the causes is named: a device knows better why than what was found here."""
     if REACTIONS[disagreement] > REACTIONS[found]:
         found = disagreement

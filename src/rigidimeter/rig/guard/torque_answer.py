@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 from rigidimeter.core.settings import LONGEST_STEP, Settings
 from rigidimeter.core.units import rad_from_deg
 from rigidimeter.rig.guard.causes import Cause
-from rigidimeter.rig.guard.torque_sign import BEFORE, COLUMNS, Left, most_left, sign_is_wrong
+from rigidimeter.rig.guard.torque_sign import BEFORE, COLUMNS, Left, max_left, sign_is_wrong
 
 FILTER_RAD_S = 2.0 * math.pi * 5.0
 """w: above voluntary motion, below the bandwidth of drive and sensors."""
@@ -54,7 +54,7 @@ ROW_S = 0.016
 LONGEST_S = 0.06
 """However late a step comes, the filters go on by no more than this: they do not overshoot."""
 
-MOST_FILLED = 64
+MAX_FILLED = 64
 """Half a second and more, of which the filters know nothing afterwards."""
 
 ROWS = (24, 48, 96)
@@ -63,7 +63,7 @@ ROWS = (24, 48, 96)
 NOISE_ORDERS = (1, 2, 4)
 """Of each window: as many as leave enough of its rows."""
 
-ROWS_A_LOOK = 6
+ROWS_A_TEST = 6
 
 SETTLED = 0.75 * math.pi
 """A step of the command has an acceleration of its own sense until ζ ω t = π, with ω/2π the
@@ -84,7 +84,7 @@ class AnswerLimits(NamedTuple):
 
     `rate_per_s` is B_c/J_c of the controller. `steps_a_row` steps make a row. `left` is what a
     joint may leave of each of the windows, `shows_inertia` whether torques read at the ticks do.
-    `inertia_kg_m2` is J₀; at 0 the size is not looked at. `least_part` is the part of J₀ a that the
+    `inertia_kg_m2` is J₀; at 0 the size is not looked at. `min_part` is the part of J₀ a that the
     torque must show, `unshown_nm` the J₀ a below which the size is not looked at. `step_s` is the
     time of a step, `controlled_s` the longest that the controller makes up for after a late tick.
     """
@@ -94,7 +94,7 @@ class AnswerLimits(NamedTuple):
     left: tuple[Left, Left, Left] = (Left(), Left(), Left())
     shows_inertia: bool = True
     inertia_kg_m2: float = 0.0
-    least_part: float = 1.0
+    min_part: float = 1.0
     unshown_nm: float = math.inf
     step_s: float = math.inf
     controlled_s: float = math.inf
@@ -141,14 +141,14 @@ def answer_limits(settings: Settings) -> AnswerLimits:
     shows_inertia = decay_per_s <= SETTLED * rig.tick_rate_hz
     inertia = settings.guard.min_inertia_kg_m2
     steps_rad_s2 = 2.0 * rad_from_deg(rig.motion.angle_resolution_deg) * FILTER_RAD_S**2
-    short, middle, long = map(most_left, ROWS, NOISE_ORDERS)
+    short, middle, long = map(max_left, ROWS, NOISE_ORDERS)
     return AnswerLimits(
         rate_per_s=controller.damping_nm_s_rad / controller.inertia_kg_m2,
         steps_a_row=max(round(ROW_S / step_s), 1),
         left=(short, middle, long),
         shows_inertia=shows_inertia,
         inertia_kg_m2=inertia,
-        least_part=1.0 if shows_inertia else HARDLY_SHOWN,
+        min_part=1.0 if shows_inertia else HARDLY_SHOWN,
         unshown_nm=UNSHOWN_NM + rig.torque.resolution_nm + inertia * steps_rad_s2,
         step_s=step_s,
         controlled_s=LONGEST_STEP / rig.tick_rate_hz,
@@ -181,7 +181,7 @@ def answer_step(
     elapsed_s : float
         The time that the means are of.
     """
-    steps = int(min(elapsed_s / limits.step_s + 0.5, MOST_FILLED))
+    steps = int(min(elapsed_s / limits.step_s + 0.5, MAX_FILLED))
     if steps < 2 or isnan(state.angle[0]):
         return one_step(limits, state, perturbation_nm, torque_nm, angle_rad, elapsed_s, 1.0)
     before_nm, before_rad = state.torque[0], state.angle[0]
@@ -229,7 +229,7 @@ def one_step(
     moved += (a * a - moved) * weight
     cause = _NO_CAUSE
     needed = limits.inertia_kg_m2 * limits.inertia_kg_m2 * moved
-    part = limits.least_part * limits.least_part
+    part = limits.min_part * limits.min_part
     if needed > limits.unshown_nm * limits.unshown_nm and shown < part * needed:
         cause = int(Cause.TORQUE_SILENT)
 
@@ -248,9 +248,9 @@ def one_step(
         steps += 1
         if steps % limits.steps_a_row == 0:
             rows = steps // limits.steps_a_row
-            keep_row(window, rows, torque, angle, alone)
-            looked = rows % ROWS_A_LOOK == 0 and cause == _NO_CAUSE
-            if looked and a_window_shows_the_wrong_sign(limits, window, rows):
+            store_row(window, rows, torque, angle, alone)
+            due = rows % ROWS_A_TEST == 0 and cause == _NO_CAUSE
+            if due and a_window_shows_the_wrong_sign(limits, window, rows):
                 cause = int(Cause.TORQUE_SIGN)
     after = AnswerState(window, torque, angle, alone, alone_per_s, pushed_nm, shown, moved, steps)
     return after, cause
@@ -261,14 +261,14 @@ def lowpassed(blend: float, before: Filtered, value: float) -> Filtered:
     value_before, once_before, twice_before, thrice_before, last_before = before
     if isnan(value_before):
         return value, value, value, value, value
-    kept = 1.0 - 2.0 * blend
-    once = kept * once_before + blend * (value + value_before)
-    twice = kept * twice_before + blend * (once + once_before)
-    thrice = kept * thrice_before + blend * (twice + twice_before)
-    return value, once, twice, thrice, kept * last_before + blend * (thrice + thrice_before)
+    decay = 1.0 - 2.0 * blend
+    once = decay * once_before + blend * (value + value_before)
+    twice = decay * twice_before + blend * (once + once_before)
+    thrice = decay * thrice_before + blend * (twice + twice_before)
+    return value, once, twice, thrice, decay * last_before + blend * (thrice + thrice_before)
 
 
-def keep_row(
+def store_row(
     window: NDArray[np.float64], rows: int, torque: Filtered, angle: Filtered, alone: Filtered
 ) -> None:
     """Write row number `rows` into the window, at its place in each half."""

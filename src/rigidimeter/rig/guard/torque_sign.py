@@ -68,7 +68,7 @@ LAGS = INSTRUMENTS - 2
 JERK, ACCELERATION = 0, 1
 """Where j and a stand in (j, a, v, q, M)."""
 MOVED = INSTRUMENTS + 2
-"""Where v stands in the table, after a."""
+"""Where v stands in the columns, after a."""
 
 DIFFERENCES = 3
 BEFORE = LAGS + DIFFERENCES
@@ -96,7 +96,7 @@ class Left(NamedTuple):
     if_early: float = 0.0
 
 
-def most_left(rows: int, order: int) -> Left:
+def max_left(rows: int, order: int) -> Left:
     """Return x for a window of so many rows."""
     free = rows - INSTRUMENTS - 2 * order
     quantiles = scipy.special.betaincinv(
@@ -114,15 +114,15 @@ def sign_is_wrong(window: Array, shows_inertia: bool, left: Left) -> bool:
     shows_inertia : bool
         Whether torques read at the ticks do; else J may have any sign.
     left : Left
-        As `most_left` gives it for the rows and the order of the noise.
+        As `max_left` gives it for the rows and the order of the noise.
     """
-    columns = table(window)
+    columns = difference_columns(window)
     m = columns[:, -1]
     if (m * columns[:, MOVED]).sum() > 0.0 and (m * columns[:, MOVED - 1]).sum() > 0.0:
         return False  # it accelerates and brakes the joint as the right sign does
     weights = np.zeros(INSTRUMENTS)
     for _ in range(PASSES):
-        noise, answer, weights = explained(whitened(columns, weights, left.order))
+        noise, answer, weights = explained_answer(whitened(columns, weights, left.order))
         if not shows_inertia:
             answer = without(answer, ACCELERATION)
         if not fits_better(noise, answer, left.at_once):
@@ -132,13 +132,13 @@ def sign_is_wrong(window: Array, shows_inertia: bool, left: Left) -> bool:
     return True
 
 
-def fits_better(noise: float, answer: Array, most: float) -> bool:
+def fits_better(noise: float, answer: Array, limit: float) -> bool:
     """Return whether the wrong sign leaves less than this part of what the right one leaves."""
-    plus, minus = least_of_each_sign(answer)
-    return bool(noise + minus < most * (noise + plus))
+    plus, minus = left_by_each_sign(answer)
+    return bool(noise + minus < limit * (noise + plus))
 
 
-def table(window: Array) -> Array:
+def difference_columns(window: Array) -> Array:
     """Return third differences of (q_p, v_p, v_p of the two rows before, j, a, v, q, M).
 
     The square of each column is 1, but that of a column of nothing, which stays 0.
@@ -156,7 +156,7 @@ def table(window: Array) -> Array:
     return columns / np.sqrt(np.where(squares > 0.0, squares, 1.0))
 
 
-def explained(columns: Array) -> tuple[float, Array, Array]:
+def explained_answer(columns: Array) -> tuple[float, Array, Array]:
     """Return R, P of (j, a, v, q, M), and the weights with which z is nearest to M."""
     n = INSTRUMENTS
     s = columns.T @ columns
@@ -199,7 +199,7 @@ def without(s: Array, column: int) -> Array:
     return left
 
 
-def least_of_each_sign(g: Array) -> tuple[float, float]:
+def left_by_each_sign(g: Array) -> tuple[float, float]:
     """Return the least that coefficients of a, v and q ≥ 0, and ≤ 0, leave of the square of M.
 
     Each subset of them is solved for, the others being 0.

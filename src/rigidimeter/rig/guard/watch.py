@@ -1,8 +1,8 @@
 """What is wrong with this tick's readings: nothing, or the first thing found.
 
-    power     P = M_meas · v             W, into the joint where positive
-    energy    E' = |P| − E/1 s           J, what went to and fro within about a second
-    astray    how far the angle is outside of where the commands can have brought it
+    power             P = M_meas · v       W, into the joint where positive
+    energy            E' = |P| − E/1 s     J, what went to and fro within about a second
+    position error    how far the angle is outside of where the commands can have brought it
 
 The energy counts both ways: an unstable contact with a spring sends back what it takes, and so does
 a tremor. No law needs the controller.
@@ -39,11 +39,11 @@ def outside(
     sent_rad: NDArray[np.float64], newest: int, first: int, last: int, moved_rad: float
 ) -> float:
     """Return how far `moved_rad` is above or below all sums from `first` to `last` ticks ago."""
-    least = most = sent_rad[newest - first]
+    lowest = highest = sent_rad[newest - first]
     for k in range(first, last + 1):  # a place below zero counts from the ring's end
-        least = min(least, sent_rad[newest - k])
-        most = max(most, sent_rad[newest - k])
-    return float(max(moved_rad - most, 0.0) + min(moved_rad - least, 0.0))
+        lowest = min(lowest, sent_rad[newest - k])
+        highest = max(highest, sent_rad[newest - k])
+    return float(max(moved_rad - highest, 0.0) + min(moved_rad - lowest, 0.0))
 
 
 def found_wrong(
@@ -55,7 +55,7 @@ def found_wrong(
     velocity_rad_s: float,
     age_s: float,
     torque_age_s: float,
-    astray_rad: float,
+    position_error_rad: float,
     energy_j: float,
     limited_s: float,
 ) -> int:
@@ -81,7 +81,7 @@ def found_wrong(
         return int(Cause.STAMP_AHEAD)
     if not abs(velocity_rad_s) <= limits.overspeed_rad_s:
         return int(Cause.OVERSPEED)
-    if not abs(astray_rad) <= limits.following_rad:
+    if not abs(position_error_rad) <= limits.following_rad:
         return int(Cause.NOT_FOLLOWING)
     if not abs(torque_nm) <= limits.torque_stop_nm:
         return int(Cause.TORQUE_TOO_HIGH)

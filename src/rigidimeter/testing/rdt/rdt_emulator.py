@@ -32,7 +32,7 @@ from rigidimeter.testing.rdt.rdt_records import (
 )
 from rigidimeter.testing.rdt.rdt_web_page import (
     PageFacts,
-    PageServer,
+    SensorPageServer,
     page_text,
     page_with_faults,
 )
@@ -108,8 +108,11 @@ class RdtEmulator:
         self._wire.bind((self.address, self.port))
         self.port = self._wire.getsockname()[1]
         self._foreign = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._http = PageServer(
-            (self.address, self.http_port), self._page_now, self.fault, self._ending
+        self._http = SensorPageServer(
+            (self.address, self.http_port),
+            lambda: page_text(page_with_faults(self._page, self._faults)),
+            self.fault,
+            self._ending,
         )
         self.http_port = self._http.server_address[1]
         self._threads = [
@@ -171,9 +174,6 @@ class RdtEmulator:
     def fault(self, name: str, default: float) -> float | None:
         """Return the value of an active misbehaviour, None if it is not active."""
         return fault_value(self._faults, name, default)
-
-    def _page_now(self) -> bytes:
-        return page_text(page_with_faults(self._page, self._faults))
 
     def _listen(self) -> None:
         while not self._ending.is_set():

@@ -91,7 +91,7 @@ def page_with_faults(page: PageFacts, faults: Faults) -> PageFacts:
     return page
 
 
-class PageServer(socketserver.ThreadingTCPServer):
+class SensorPageServer(socketserver.ThreadingTCPServer):
     """Answers every request with the page, or as the misbehaviours say.
 
     Parameters
@@ -120,7 +120,7 @@ class PageServer(socketserver.ThreadingTCPServer):
 
 
 class _Handler(BaseHTTPRequestHandler):
-    server: PageServer
+    server: SensorPageServer
     timeout = 2.0
 
     def do_GET(self) -> None:

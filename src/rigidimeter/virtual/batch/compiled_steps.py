@@ -80,7 +80,7 @@ def compiled() -> Compiled:
                     energy_after=inlined(watch.energy_after),
                     found_wrong=inlined(watch.found_wrong, Cause=enum_numbers(Cause)),
                     outside=inlined(watch.outside),
-                    _gravest=inlined(step._gravest),
+                    _most_serious=inlined(step._most_serious),
                     _fastest_toward=inlined(
                         step._fastest_toward,
                         _farthest_in_flight=inlined(step._farthest_in_flight),

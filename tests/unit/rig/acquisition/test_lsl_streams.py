@@ -14,7 +14,12 @@ import pytest
 
 from rigidimeter.core.session import Sample, SessionWriter, marker_of, read_manifest, sample_markers
 from rigidimeter.core.settings import parse_settings
-from rigidimeter.rig.acquisition.processes import Condition, Role, SessionMemory, streamer_main
+from rigidimeter.rig.acquisition.processes import (
+    ProcessCondition,
+    Role,
+    SessionMemory,
+    streamer_main,
+)
 from rigidimeter.rig.guard import Cause
 
 RATE_HZ = 250.0
@@ -116,7 +121,7 @@ def test_an_inlet_receives_what_is_recorded(shared: SessionMemory, tmp_path: Pat
         texts, at_s = pulled(markers, lambda n: n >= 4)
         info = samples.info()
     finally:
-        shared.status.set_condition(Role.RECORDER, Condition.DONE)
+        shared.status.set_condition(Role.RECORDER, ProcessCondition.DONE)
         process.join(GIVE_UP_S)
     assert process.exitcode == 0
     np.testing.assert_array_equal(np.array(values + more), np.array(rows, dtype=float))
@@ -157,7 +162,7 @@ def test_conditions_stay_out_where_they_must(shared: SessionMemory, tmp_path: Pa
         texts, _ = pulled(markers, lambda n: n >= 1)
         text = markers.info().as_xml()
     finally:
-        shared.status.set_condition(Role.RECORDER, Condition.DONE)
+        shared.status.set_condition(Role.RECORDER, ProcessCondition.DONE)
         process.join(GIVE_UP_S)
     assert texts == [["epoch_start/1/prbs/"]]
     assert "DBS" not in text

@@ -11,8 +11,8 @@ from rigidimeter.core.session import Sample, SessionWriter, read_events, read_sa
 from rigidimeter.core.settings import Settings
 from rigidimeter.rig.acquisition.processes import (
     PREFIX,
-    Condition,
     Memory,
+    ProcessCondition,
     RingSink,
     Role,
     SessionMemory,
@@ -77,7 +77,7 @@ def test_what_is_in_no_file_stays(made):
 
 
 def test_what_came_after_the_end_of_the_record_does_not_stay(made):
-    made.status.set_condition(Role.RECORDER, Condition.DONE)
+    made.status.set_condition(Role.RECORDER, ProcessCondition.DONE)
     made.leave()
     assert there(made) == [False] * 3
 

@@ -141,7 +141,7 @@ def test_other_programs_in_real_time_are_named(rival):
 GROWTH = """
 import numpy as np
 from rigidimeter.rig.acquisition.processes.realtime_scheduling import prepare_loop_process
-from rigidimeter.rig.guard.torque_sign import explained
+from rigidimeter.rig.guard.torque_sign import explained_answer
 
 def mapped_kib():
     with open("/proc/self/status") as file:
@@ -150,7 +150,7 @@ def mapped_kib():
 window = np.random.default_rng(1).normal(size=(60, 9))
 prepare_loop_process(priority=0, lock_memory=False)
 before = mapped_kib()
-explained(window)
+explained_answer(window)
 print(mapped_kib() - before)
 """
 

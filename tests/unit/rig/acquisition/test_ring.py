@@ -47,14 +47,14 @@ def test_rows_come_back_as_they_were_also_around_the_end(ring):
         ring.recorded = max(0, k - 5)
     rows = ring.rows(13, 20)
     assert [tuple(row) for row in rows.tolist()] == [tuple(sample(k)) for k in range(13, 20)]
-    assert ring.kept()["tick"].tolist() == list(range(12, 20))
+    assert ring.held_rows()["tick"].tolist() == list(range(12, 20))
 
 
 def test_the_writer_neither_waits_nor_writes_over_what_is_not_recorded(ring):
     taken = [ring.push(sample(k)) for k in range(11)]
     assert taken == [True] * 8 + [False] * 3
     assert (ring.lag(), ring.refused) == (8, 3)
-    assert ring.kept()["tick"].tolist() == list(range(8))
+    assert ring.held_rows()["tick"].tolist() == list(range(8))
     ring.recorded = 2
     assert ring.push(sample(8))
     assert ring.rows(2, 9)["tick"].tolist() == list(range(2, 9))
@@ -80,7 +80,7 @@ def test_a_reader_may_skip_to_the_newest(ring):
     reader = SampleReader(ring)
     for k in range(6):
         ring.push(sample(k))
-    rows, missed = reader.read(most=2)
+    rows, missed = reader.read(max_rows=2)
     assert (rows["tick"].tolist(), missed) == ([4, 5], 4)
 
 

@@ -12,18 +12,18 @@ from rigidimeter.core.session import Sample, read_events, read_samples
 from rigidimeter.core.session import folder as folder_module
 from rigidimeter.core.settings import Settings
 from rigidimeter.rig.acquisition.processes import (
-    Condition,
     EventRing,
     Flag,
     Patience,
+    ProcessCondition,
     Recorder,
-    Recording,
+    RecordingPlan,
     RingSink,
     Role,
     SampleRing,
     SessionMemory,
     SharedStatus,
-    full_disk,
+    recorder,
     recover_from_rings,
 )
 
@@ -41,7 +41,7 @@ class Rig:
         self.shared_status = SharedStatus.create()
         self.shared = SessionMemory(self.samples, self.events, self.shared_status)
         self.sink = RingSink(self.shared, RATE_HZ)
-        self.writer = Recording(folder, Settings(), virtual=True).writer()
+        self.writer = RecordingPlan(folder, Settings(), virtual=True).writer()
         self.recorder = Recorder(self.writer, self.shared, RATE_HZ)
         self.tick = 0
 
@@ -218,9 +218,9 @@ def disk(rig, monkeypatch):
     """Give what the recorder knows of its disk, and a clock that stands still."""
     clock = SimpleNamespace(now_s=1000.0)
     clock.monotonic = lambda: clock.now_s
-    monkeypatch.setattr(full_disk, "time", clock)
-    recording = Recording(rig.folder, Settings(), virtual=True)
-    disk = full_disk.FullDisk(recording, rig.shared, Patience(), os.getppid())
+    monkeypatch.setattr(recorder, "time", clock)
+    recording = RecordingPlan(rig.folder, Settings(), virtual=True)
+    disk = recorder.FullDisk(recording, rig.shared, Patience(), os.getppid())
     return disk, clock
 
 
@@ -240,7 +240,7 @@ def test_a_disk_is_given_up_once_the_session_is_over_and_somebody_said_so(rig, d
     assert not given_up_after(0.0, over=False)
     assert not given_up_after(2 * allowed_s, over=False)  # the loop runs
     if not closing:
-        status.set_condition(Role.LOOP, Condition.DONE)
+        status.set_condition(Role.LOOP, ProcessCondition.DONE)
     assert not given_up_after(0.0)
     assert not given_up_after(allowed_s)
     assert given_up_after(1e-3)

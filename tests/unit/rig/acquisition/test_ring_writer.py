@@ -8,7 +8,7 @@ import pytest
 from rigidimeter.core.session import Sample
 from rigidimeter.rig.acquisition import NOTHING, Run, State
 from rigidimeter.rig.acquisition.processes import (
-    Condition,
+    ProcessCondition,
     RingSink,
     Role,
     SessionMemory,
@@ -76,7 +76,7 @@ def test_a_computer_may_be_suspended_for_so_long(shared, limits, allowed_ms):
     assert causes(shared, suspended_ns=7000 * MS, **limits)[1] == pytest.approx(7.0)
 
 
-@pytest.mark.parametrize(("limits", "allowed"), [({}, CAPACITY // 2), ({"most_lag": 3}, 3)])
+@pytest.mark.parametrize(("limits", "allowed"), [({}, CAPACITY // 2), ({"max_lag": 3}, 3)])
 def test_so_many_samples_may_wait_for_the_recorder(shared, limits, allowed):
     supervision = SharedSupervision(
         shared, now_ns=lambda: START_NS, boot_ns=lambda: START_NS, **limits
@@ -92,7 +92,7 @@ def test_so_many_samples_may_wait_for_the_recorder(shared, limits, allowed):
 def test_the_silence_of_a_console_that_was_killed_is_not_known(shared, monkeypatch):
     monkeypatch.setattr("rigidimeter.rig.acquisition.processes.ring_writer.getppid", lambda: 41)
     supervision = SharedSupervision(
-        shared, most_lag=0, console_pid=41, now_ns=lambda: START_NS, boot_ns=lambda: START_NS
+        shared, max_lag=0, console_pid=41, now_ns=lambda: START_NS, boot_ns=lambda: START_NS
     )
     shared.samples.push(sample(0.0))
     assert supervision.cause(0.0) == Cause.RECORD_OVERFLOW
@@ -114,13 +114,13 @@ def test_an_operator_is_there_unless_it_is_said(shared):
 def test_the_loop_is_shown_every_20_ms_and_at_once_when_its_state_changes(shared):
     sink = RingSink(shared, tick_rate_hz=10_000.0)
     assert sink.last_time_s == 0.0
-    assert shared.status.condition(Role.LOOP) is not Condition.RUNNING
+    assert shared.status.condition(Role.LOOP) is not ProcessCondition.RUNNING
     shown = []
     for time_s in (1.0, 1.0199, 1.02, 1.0399, 1.04):
         sink.sample(sample(time_s))
         shown.append(shared.status.loop().time_s)
     assert shown == [1.0, 1.0, 1.02, 1.02, 1.04]
-    assert shared.status.condition(Role.LOOP) is Condition.RUNNING
+    assert shared.status.condition(Role.LOOP) is ProcessCondition.RUNNING
     sink.state_changed(Run(State.PAUSED))
     assert shared.status.loop().state == State.IDLE  # with the next sample
     sink.sample(sample(1.0401))
@@ -154,14 +154,14 @@ def test_a_loop_that_stops_says_so_since_its_ticks_may_then_take_longer(shared, 
     sink.sample(sample(0.0))
     for other in (State.RUNNING, State.PAUSED, State.IDLE):
         sink.state_changed(Run(other))
-        assert shared.status.condition(Role.LOOP) is Condition.RUNNING
+        assert shared.status.condition(Role.LOOP) is ProcessCondition.RUNNING
     stopped_ns = time.monotonic_ns()
     sink.state_changed(Run(state))
-    assert shared.status.condition(Role.LOOP) is Condition.STOPPING
+    assert shared.status.condition(Role.LOOP) is ProcessCondition.STOPPING
     assert shared.status.memory.words[shared.status.places()[-1]] >= stopped_ns
     sink.sample(sample(0.1))  # of the ramp to rest
     assert shared.status.loop().state == state
-    assert shared.status.condition(Role.LOOP) is Condition.STOPPING
+    assert shared.status.condition(Role.LOOP) is ProcessCondition.STOPPING
 
 
 def test_a_session_is_closed_once(shared):
@@ -178,7 +178,7 @@ def test_a_session_is_closed_once(shared):
         "outcome": "abort",
         "reason": "as the operator said",
     }
-    assert shared.status.condition(Role.LOOP) is Condition.STOPPING
+    assert shared.status.condition(Role.LOOP) is ProcessCondition.STOPPING
     assert shared.status.memory.words[shared.status.places()[-1]] >= closed_ns
 
 

@@ -12,11 +12,11 @@ from rigidimeter.rig.acquisition.processes import (
     NOTE_BYTES,
     PAUSE_NEXT,
     STOP_NEXT,
-    Condition,
     EventRing,
     Flag,
     LiveEstimate,
     LoopStatus,
+    ProcessCondition,
     RingSink,
     Role,
     SampleRing,
@@ -70,9 +70,9 @@ def test_what_one_process_shows_another_sees(shared_status):
     live = LiveEstimate(12, 1, 7, 3, 0.5, 1.5, 0.08, 0.001, 0.4, 0.1, 1.7, 0.2, 4.0, 0.01)
     shared_status.show_loop(status)
     shared_status.show_live(live)
-    shared_status.set_condition(Role.RECORDER, Condition.TROUBLE, "the disk is full: µ")
+    shared_status.set_condition(Role.RECORDER, ProcessCondition.TROUBLE, "the disk is full: µ")
     assert (other.loop(), other.live()) == (status, live)
-    assert other.condition(Role.RECORDER) is Condition.TROUBLE
+    assert other.condition(Role.RECORDER) is ProcessCondition.TROUBLE
     assert other.note(Role.RECORDER) == "the disk is full: µ"
     assert other.pid(Role.LOOP) == 0
     other.close()
@@ -140,7 +140,7 @@ def test_causes_to_stop(shared_status, rings, now):
         SessionMemory(*rings, shared_status),
         console_lost_s=0.5,
         recorder_lost_s=2.0,
-        most_lag=6,
+        max_lag=6,
         now_ns=now,
         boot_ns=now,
     )
@@ -277,7 +277,7 @@ def test_the_sink_keeps_events_in_their_place(shared_status, rings):
     sink.event("epoch_started", epoch=1, time_s=0.0, planned_s=0.4)
     for k in range(4):
         sink.sample(sample(k))
-    assert shared_status.condition(Role.LOOP) is Condition.RUNNING
+    assert shared_status.condition(Role.LOOP) is ProcessCondition.RUNNING
     sink.event("epoch_ended", epoch=1, time_s=0.4, outcome="success", reason="")
     sink.sample(sample(4))
     sink.close(0.5, "success", "")
@@ -294,7 +294,7 @@ def test_the_sink_keeps_events_in_their_place(shared_status, rings):
     status = shared_status.loop()
     assert (status.state, status.tick) == (State.RUNNING, 4)
     assert (status.late_ticks, status.missed_ticks) == (1, 2)
-    assert shared_status.condition(Role.LOOP) is Condition.STOPPING
+    assert shared_status.condition(Role.LOOP) is ProcessCondition.STOPPING
 
 
 class Loop:

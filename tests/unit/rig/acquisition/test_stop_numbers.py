@@ -16,8 +16,9 @@ from rigidimeter.rig.acquisition import (
     SUSPENDED,
     Found,
     Latched,
-    StopAccount,
-    stop_account,
+    StopReport,
+    latched_tick,
+    report_stop,
 )
 from rigidimeter.rig.guard import (
     OLD_SHARE,
@@ -61,7 +62,7 @@ def latched(cause, **changed):
     answer = means.answer._replace(shown_nm2=0.0004, moved2=25.0)
     means = means._replace(
         answer=answer,
-        apart_rad2=0.0009,
+        disagreement_rad2=0.0009,
         moved_rad2=0.005,
         reported_rad2=0.005,
         energy_j=0.7,
@@ -87,7 +88,7 @@ def latched(cause, **changed):
 
 
 def told(cause, **changed):
-    return stop_account(latched(cause, **changed)).found
+    return report_stop(latched(cause, **changed)).found
 
 
 def same(found, expected):
@@ -171,7 +172,7 @@ STALE = (1e3 * GUARD.stale_s, "ms")
             Cause.TORQUE_SILENT,
             Found(
                 0.02,
-                5.0 * AGREEMENT.answer.least_part * GUARD.min_inertia_kg_m2,
+                5.0 * AGREEMENT.answer.min_part * GUARD.min_inertia_kg_m2,
                 "N·m",
                 SHOWN_MEMORY_S,
                 "guard.min_inertia_kg_m2",
@@ -236,7 +237,7 @@ def test_other_means_are_told_where_they_are_the_larger_ones():
 def test_a_velocity_of_another_size_is_told_by_how_much(moved_rad2, reported_rad2, unit):
     consistency = latched(Cause.VELOCITY_WRONG).consistency
     means = consistency.means._replace(
-        moved_rad2=moved_rad2, reported_rad2=reported_rad2, apart_rad2=0.005
+        moved_rad2=moved_rad2, reported_rad2=reported_rad2, disagreement_rad2=0.005
     )
     found = told(Cause.VELOCITY_WRONG, consistency={"means": means})
     assert (found.value, found.limit) == (pytest.approx(2.0), WRONG_GAIN)
@@ -267,8 +268,8 @@ def test_what_was_found_outside_of_the_loop(cause, expected):
     ],
 )
 def test_a_suspension_has_a_remedy_of_its_own(measured, remedy):
-    assert stop_account(latched(Cause.STALLED, measured=measured)).remedy == remedy
-    silent = stop_account(latched(Cause.CONSOLE_LOST, measured=measured))
+    assert report_stop(latched(Cause.STALLED, measured=measured)).remedy == remedy
+    silent = report_stop(latched(Cause.CONSOLE_LOST, measured=measured))
     assert silent.remedy == REMEDIES[Cause.CONSOLE_LOST]
 
 
@@ -324,7 +325,7 @@ def test_how_far_the_angle_is_from_what_was_sent(age_ticks):
     ],
 )
 def test_a_sentence_tells_what_is_known(found, said):
-    account = StopAccount(Cause.ENERGY_HIGH, found, "do this")
+    account = StopReport(Cause.ENERGY_HIGH, found, "do this")
     assert account.sentence == f"{Cause.ENERGY_HIGH.sentence}{said}; do this"
     facts = account.facts()
     assert facts["sentence"] == account.sentence
@@ -348,7 +349,7 @@ def test_what_the_loop_knows_of_its_last_tick_is_taken():
     loop.elapsed_ticks, loop.late_in_a_row = 3, 2
     loop.supervision.measured = 0.7
     sample = latched(Cause.SIGNAL).sample
-    found = Latched.of(loop, sample)
+    found = latched_tick(loop, sample)
     assert found.sample is sample
     assert (found.settings, found.limits, found.guard) == (SETTINGS, loop.limits, loop.guard)
     assert (found.agreement, found.consistency) == (loop.agreement, loop.consistency)

@@ -8,7 +8,7 @@ import pytest
 from tests.unit.rig.acquisition.exact_rig import SETTINGS, Desk, constant, made
 
 from rigidimeter.core.settings import parse_settings
-from rigidimeter.rig.acquisition import REMEDIES, Found, StopAccount, release, run_ticks
+from rigidimeter.rig.acquisition import REMEDIES, Found, StopReport, release, run_ticks
 from rigidimeter.rig.guard import Cause, Reaction
 
 RELEASED = 5
@@ -38,7 +38,7 @@ def outside(cause, measured=math.nan):
 
 @pytest.mark.parametrize("cause", list(Cause))
 def test_every_cause_has_a_remedy_and_a_sentence(cause):
-    account = StopAccount(cause, Found(), REMEDIES[cause])
+    account = StopReport(cause, Found(), REMEDIES[cause])
     assert account.sentence == f"{cause.sentence}; {REMEDIES[cause]}"
     assert REMEDIES[cause][0].islower()
     assert not REMEDIES[cause].endswith(".")

@@ -26,11 +26,11 @@ from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.planning import plan
 from rigidimeter.rig.acquisition import Command, Order, State
 from rigidimeter.rig.acquisition.processes import (
-    Condition,
     Flag,
     Patience,
     Prepared,
-    Recording,
+    ProcessCondition,
+    RecordingPlan,
     Role,
     SessionMemory,
     SharedStatus,
@@ -94,17 +94,17 @@ def waits_once(then: Callable[[], object]) -> Callable[[float], None]:
 @pytest.mark.parametrize(
     ("condition", "flag", "parent", "comes"),
     [
-        (Condition.READY, None, True, True),
-        (Condition.RUNNING, None, True, True),
-        (Condition.FAILED, None, True, False),
-        (Condition.STARTING, Flag.END_ASKED, True, False),
-        (Condition.STARTING, None, False, False),
+        (ProcessCondition.READY, None, True, True),
+        (ProcessCondition.RUNNING, None, True, True),
+        (ProcessCondition.FAILED, None, True, False),
+        (ProcessCondition.STARTING, Flag.END_ASKED, True, False),
+        (ProcessCondition.STARTING, None, False, False),
     ],
 )
 def test_the_loop_waits_for_a_recorder_that_may_come(
     shared: SessionMemory,
     monkeypatch: pytest.MonkeyPatch,
-    condition: Condition,
+    condition: ProcessCondition,
     flag: Flag | None,
     parent: bool,
     comes: bool,
@@ -136,7 +136,7 @@ def loop_main(
     status = shared.status
     for role in (Role.CONSOLE, Role.RECORDER):
         status.beat(role, time.monotonic_ns() + 1000 * NS)  # silence is not what is tested
-    status.set_condition(Role.RECORDER, Condition.READY)
+    status.set_condition(Role.RECORDER, ProcessCondition.READY)
 
     def run(
         target: Callable[[loop_process.LoopSide], object],
@@ -152,12 +152,12 @@ def loop_main(
             try:
                 target(side)
             finally:
-                status.set_condition(Role.RECORDER, Condition.DONE)
+                status.set_condition(Role.RECORDER, ProcessCondition.DONE)
 
         with pytest.raises(SystemExit) as ended:
             loop_process.loop_main(
                 whole,
-                Recording(tmp_path / "session", settings),
+                RecordingPlan(tmp_path / "session", settings),
                 shared.names,
                 loop_process.Realtime(attended=attended),
                 PATIENCE,
@@ -173,7 +173,7 @@ def loop_main(
 def test_the_loop_of_a_console_that_was_killed_ends_before_it_has_a_rig(
     loop_main: Callable[..., int], shared: SessionMemory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    shared.status.set_condition(Role.RECORDER, Condition.STARTING)
+    shared.status.set_condition(Role.RECORDER, ProcessCondition.STARTING)
     monkeypatch.setattr(loop_process.time, "sleep", waits_once(lambda: None))
     ran: list[object] = []
     assert loop_main(ran.append, os.getppid() + 1) == 1
@@ -207,8 +207,8 @@ def test_the_loop_is_as_patient_as_the_settings_say(
     limits = {"console_lost_s": 0.7, "recorder_lost_s": 3.0, "stall_s": 0.05}
     settings = parse_settings({**VALUES, "loop": limits})
     loop_main(lambda _: None, settings=settings, attended=False)
-    lag = round((3.0 + 2 * PATIENCE.look_s) * RATE_HZ)
-    rest = {"most_lag": lag, "attended": False, "console_pid": os.getppid()}
+    lag = round((3.0 + 2 * PATIENCE.poll_s) * RATE_HZ)
+    rest = {"max_lag": lag, "attended": False, "console_pid": os.getppid()}
     assert told == {**limits, **rest}
 
 
@@ -236,7 +236,7 @@ def test_a_target_that_ends_without_closing_the_session_has_it_closed(
         **{"event": "session_ended", "time_s": 0.0},
         **{"outcome": "fail", "reason": reason},
     }
-    ended = Condition.FAILED if code else Condition.DONE
+    ended = ProcessCondition.FAILED if code else ProcessCondition.DONE
     assert shared.status.condition(Role.LOOP) is ended
 
 
@@ -352,10 +352,13 @@ def test_a_loop_that_is_paused_holds_the_arm_and_shows_that_it_is(
 
 @pytest.mark.parametrize(
     ("condition", "allowed_s"),
-    [(Condition.RUNNING, PATIENCE.loop_lost_s), (Condition.STOPPING, PATIENCE.stopping_s)],
+    [
+        (ProcessCondition.RUNNING, PATIENCE.loop_lost_s),
+        (ProcessCondition.STOPPING, PATIENCE.stopping_s),
+    ],
 )
 def test_the_recorder_ends_a_loop_that_hangs(
-    shared: SessionMemory, condition: Condition, allowed_s: float
+    shared: SessionMemory, condition: ProcessCondition, allowed_s: float
 ) -> None:
     """It would move the arm when it goes on, and nothing would be recorded of it."""
     now_ns, loop = BEGAN, Watched()
@@ -377,7 +380,7 @@ def test_the_recorder_ends_a_loop_that_hangs(
 def test_a_loop_that_starts_may_wait_for_its_devices(shared: SessionMemory) -> None:
     loop = Watched()
     shared.status.beat(Role.LOOP, 1)
-    shared.status.set_condition(Role.LOOP, Condition.STARTING)
+    shared.status.set_condition(Role.LOOP, ProcessCondition.STARTING)
     assert recorder_process._loop_lost(shared.status, loop, PATIENCE, os.getppid()) == ""  # type: ignore[arg-type]
     assert not loop.killed
 
@@ -407,9 +410,9 @@ def test_a_session_whose_loop_was_killed_is_closed_with_all_that_it_made(
     made.event("epoch_started", epoch=1, **named, time_s=0.0)
     for k in range(30):
         made.sample(Sample(k, k / RATE_HZ, 0.0, 1, *[0.5] * 9, 0))
-    recording = Recording(tmp_path / "session", Settings())
+    recording = RecordingPlan(tmp_path / "session", Settings())
     recorder_process.recorder_main(recording, shared.names, PATIENCE, os.getppid())
-    assert shared.status.condition(Role.RECORDER) is Condition.DONE
+    assert shared.status.condition(Role.RECORDER) is ProcessCondition.DONE
     assert read_samples(recording.folder / "samples.arrows")["tick"].size == 30
     events, torn = read_events(recording.folder / "events.jsonl")
     assert not torn
@@ -448,7 +451,7 @@ def test_a_recorder_that_hangs_is_ended_before_its_work_is_done_by_another(
     monkeypatch.setattr(ring_recovery, "recover_from_rings", recover)
     remarks = ring_recovery.complete(
         memory,
-        Recording(tmp_path / "session", Settings()),
+        RecordingPlan(tmp_path / "session", Settings()),
         recorder,  # type: ignore[arg-type]
         PATIENCE,
         lambda: looks.append(clock.now_s),
@@ -469,9 +472,9 @@ def test_a_recorder_that_is_slow_is_left_to_its_work(
     def look() -> None:
         status.beat(Role.RECORDER)
         if clock.now_s > 1060.0:
-            status.set_condition(Role.RECORDER, Condition.DONE)
+            status.set_condition(Role.RECORDER, ProcessCondition.DONE)
 
-    recording = Recording(tmp_path / "session", Settings())
+    recording = RecordingPlan(tmp_path / "session", Settings())
     assert ring_recovery.complete(memory, recording, recorder, PATIENCE, look) == []  # type: ignore[arg-type]
     assert not recorder.killed
 
@@ -484,7 +487,7 @@ def test_the_console_beats_with_the_time_at_which_the_operator_was_seen(
 ) -> None:
     """A page that is gone was seen long ago, however lively the program is that served it."""
     status = SharedStatus(shared.status.memory, lambda: BEGAN + 7 * NS)
-    look = supervisor._Look(shared, lambda _: None, lambda: BEGAN)
+    look = supervisor._Follower(shared, lambda _: None, lambda: BEGAN)
     look()
     assert status.age_s(Role.CONSOLE) == 7.0
 
@@ -498,7 +501,7 @@ def test_a_console_that_fails_ends_the_session_and_its_heart_beats_until_then(
         calls.append(seen_ns[-1])
         raise ZeroDivisionError("no such value")
 
-    look = supervisor._Look(shared, console, lambda: seen_ns[-1])
+    look = supervisor._Follower(shared, console, lambda: seen_ns[-1])
     look()
     assert shared.status.flag(Flag.END_ASKED)
     assert look.remarks == ["the console failed (ZeroDivisionError: no such value)"]
@@ -510,10 +513,13 @@ def test_a_console_that_fails_ends_the_session_and_its_heart_beats_until_then(
 
 @pytest.mark.parametrize(
     ("condition", "allowed_s"),
-    [(Condition.RUNNING, 2 * PATIENCE.loop_lost_s), (Condition.STOPPING, PATIENCE.hung_s)],
+    [
+        (ProcessCondition.RUNNING, 2 * PATIENCE.loop_lost_s),
+        (ProcessCondition.STOPPING, PATIENCE.hung_s),
+    ],
 )
 def test_the_console_ends_a_loop_that_hangs_where_the_recorder_did_not(
-    shared: SessionMemory, condition: Condition, allowed_s: float
+    shared: SessionMemory, condition: ProcessCondition, allowed_s: float
 ) -> None:
     now_ns, loop, recorder = BEGAN, Watched(), Watched()
     status = SharedStatus(shared.status.memory, lambda: now_ns)
@@ -575,7 +581,7 @@ def supervised(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, **options: Any) 
     with pytest.raises(type(error), match=str(error)):
         supervisor.supervise(
             lambda _: None,
-            Recording(tmp_path / "session", Settings()),
+            RecordingPlan(tmp_path / "session", Settings()),
             realtime=loop_process.Realtime(live_estimate=False),
             **options,
         )
@@ -586,7 +592,9 @@ def test_a_recorder_that_fails_ends_the_loop_in_order(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     def refused(memory: SessionMemory) -> None:
-        memory.status.set_condition(Role.RECORDER, Condition.FAILED, "the folder is not empty")
+        memory.status.set_condition(
+            Role.RECORDER, ProcessCondition.FAILED, "the folder is not empty"
+        )
 
     started = supervised(
         monkeypatch, tmp_path, prepare=refused, error=UserError("the folder is not empty")
@@ -604,7 +612,7 @@ def test_a_console_that_cannot_say_who_is_there_ends_the_loop_in_order(
         raise error
 
     def ready(memory: SessionMemory) -> None:
-        memory.status.set_condition(Role.RECORDER, Condition.READY)
+        memory.status.set_condition(Role.RECORDER, ProcessCondition.READY)
 
     started = supervised(monkeypatch, tmp_path, prepare=ready, error=error, operator_seen_ns=nobody)
     assert [(one.told, one.killed) for one in started] == [(True, False)] * 2
@@ -616,7 +624,7 @@ def test_the_page_is_asked_for_its_operator_while_the_session_runs(
     error = SystemExit("enough")
 
     def ready(memory: SessionMemory) -> None:
-        memory.status.set_condition(Role.RECORDER, Condition.READY)
+        memory.status.set_condition(Role.RECORDER, ProcessCondition.READY)
 
     def console(_: SessionMemory) -> None:
         raise error

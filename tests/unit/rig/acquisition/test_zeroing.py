@@ -7,7 +7,7 @@ from tests.unit.rig.acquisition.exact_rig import Desk
 from tests.unit.rig.acquisition.whole_session import RATE_HZ, SENSOR, VALUES, session
 
 from rigidimeter.core.settings import parse_settings
-from rigidimeter.rig.acquisition import FEWEST_ZEROING_SAMPLES, Command, moved
+from rigidimeter.rig.acquisition import MIN_ZEROING_SAMPLES, Command, motion_objection
 from rigidimeter.rig.devices.base import Reading
 from rigidimeter.rig.guard import Cause
 
@@ -119,7 +119,7 @@ def test_an_angle_that_changes_by_one_step_of_its_sensor_is_no_motion(moved_deg,
 
 def test_ten_samples_are_enough():
     """Each is read twice."""
-    assert round(VALUES["zeroing"]["duration_s"] * RATE_HZ) == 2 * FEWEST_ZEROING_SAMPLES
+    assert round(VALUES["zeroing"]["duration_s"] * RATE_HZ) == 2 * MIN_ZEROING_SAMPLES
 
     def change(k, reading):
         return reading._replace(torque_time_s=(k - k % 2) / RATE_HZ)
@@ -170,10 +170,10 @@ def test_a_hold_that_nobody_ends_leaves_no_zero_and_no_epoch(causes, orders):
 @pytest.mark.parametrize("angle_rad", [-0.2, 0.2])
 def test_a_joint_at_rest_away_from_the_middle_did_not_move(angle_rad):
     readings = [Reading(0.0, 0.0, angle_rad, 0.0, 0.0)] * 20
-    assert moved(readings, SETTINGS) == ""
+    assert motion_objection(readings, SETTINGS) == ""
     limit_rad = math.radians(
         SETTINGS.zeroing.motion_limit_deg + SETTINGS.rig.motion.angle_resolution_deg
     )
     for share, refused in ((0.99, False), (1.01, True)):
         last = readings[0]._replace(angle_rad=angle_rad + share * limit_rad)
-        assert bool(moved([*readings, last], SETTINGS)) == refused
+        assert bool(motion_objection([*readings, last], SETTINGS)) == refused

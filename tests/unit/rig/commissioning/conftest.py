@@ -15,7 +15,13 @@ import pytest
 
 from rigidimeter.core.settings import CommissioningSettings, Settings, parse_settings
 from rigidimeter.model import JointDynamics
-from rigidimeter.rig.commissioning import CommissioningRecord, Operator, Setup, Timebase, commission
+from rigidimeter.rig.commissioning import (
+    CommissioningRecord,
+    Operator,
+    Setup,
+    Timebase,
+    commission_rig,
+)
 from rigidimeter.rig.devices import ComposedRig, RigFile
 from rigidimeter.rig.devices.base import DeviceError, DeviceFacts, MotionSample, TorqueSample
 from rigidimeter.rig.guard import Cause
@@ -131,7 +137,7 @@ class FakeDrive:
             status, cause = 0, Cause.NONE
         return MotionSample(
             scale * angle,
-            self._faults.get("velocity_scale", scale) * velocity,
+            self._faults.get("velocity_per_angle", scale) * velocity,
             self._now(),
             status=status,
             cause=int(cause),
@@ -259,7 +265,7 @@ def commissioned(settings: Settings, fake_rig: Callable[..., FakeRig]) -> Commis
             known_torque_nm=known_torque_nm,
             known_angle_deg=known_angle_deg,
         )
-        return commission(
+        return commission_rig(
             Setup(rig, chosen, timebase, operator),
             file,
             made_utc="2026-01-01T00:00:00+00:00",

@@ -16,7 +16,7 @@ from rigidimeter.rig.commissioning import (
     Compared,
     DailyRecord,
     Operator,
-    Reference,
+    ReferenceInertia,
     Setup,
     daily_check,
 )
@@ -75,8 +75,8 @@ def checked(record: Any, settings: Any, fake_rig: Any) -> Any:
     return run
 
 
-def reference(record: Any, inertia_kg_m2: float = CUFF[0]) -> Reference:
-    return Reference(inertia_kg_m2, 2e-5, "2026-01-01T09:00:00+00:00", record.digest, FIRST)
+def reference(record: Any, inertia_kg_m2: float = CUFF[0]) -> ReferenceInertia:
+    return ReferenceInertia(inertia_kg_m2, 2e-5, "2026-01-01T09:00:00+00:00", record.digest, FIRST)
 
 
 def failed(record: DailyRecord) -> list[str]:

@@ -17,9 +17,9 @@ from rigidimeter.core.settings import Settings, changed_settings, parse_settings
 from rigidimeter.model import DriveModel
 from rigidimeter.rig.commissioning import (
     DAILY_MUST_PASS,
-    Check,
     DailyRecord,
-    Reference,
+    ReferenceInertia,
+    RigCheck,
     as_measured,
     daily_path,
     read_daily,
@@ -44,9 +44,9 @@ def record(rigfile: RigFile) -> DailyRecord:
         rig_name="rig",
         rig_digest="abc",
         commissioning_digest=COMMISSIONED.digest,
-        checks=tuple(Check(name, 1.0, "1", "", "passed") for name in DAILY_MUST_PASS),
+        checks=tuple(RigCheck(name, 1.0, "1", "", "passed") for name in DAILY_MUST_PASS),
         numbers={"inertia_kg_m2": 0.002},
-        reference=Reference(0.002, 2e-5, made_utc, COMMISSIONED.digest, "first", 0.003),
+        reference=ReferenceInertia(0.002, 2e-5, made_utc, COMMISSIONED.digest, "first", 0.003),
         known_inertia_kg_m2=None,
         validity_h=24.0,
         software="0.1",
@@ -125,7 +125,7 @@ def test_the_shorter_time_counts(rigfile: RigFile, record: DailyRecord) -> None:
         ({"rig_digest": "abd"}, "is for another content of .*RIG.toml"),
         ({"commissioning_digest": "x"}, "was made before the rig was commissioned again"),
         (
-            {"checks": (Check("inertia", 1.0, "kg·m²", "2 kg·m²", "failed", "look"),)},
+            {"checks": (RigCheck("inertia", 1.0, "kg·m²", "2 kg·m²", "failed", "look"),)},
             "a check failed: inertia: 1 kg·m², must be 2 kg·m²; look",
         ),
     ],

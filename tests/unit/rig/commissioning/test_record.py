@@ -18,14 +18,14 @@ from rigidimeter.rig.commissioning import (
     FLOORS,
     LIMITS,
     MUST_PASS,
-    Check,
     CommissioningRecord,
+    RigCheck,
     check_record,
     covered,
     digest,
-    kept_facts,
     read_record,
     record_path,
+    stable_facts,
     untried,
     write_record,
 )
@@ -61,9 +61,9 @@ def record(rigfile: RigFile) -> CommissioningRecord:
     record = CommissioningRecord(
         rig_name="rig",
         rig_digest="abc",
-        facts=kept_facts(FACTS),
+        facts=stable_facts(FACTS),
         covered=covered(Settings()),
-        checks=tuple(Check(name, 1.0, "s", "", "passed") for name in names),
+        checks=tuple(RigCheck(name, 1.0, "s", "", "passed") for name in names),
         numbers={"torque_delay_s": 0.002},
         software="0.1",
         made_utc="2026-01-01T12:00:00+00:00",
@@ -246,7 +246,7 @@ def sealed(rigfile: RigFile, changes: dict[str, Any]) -> None:
 
 
 def test_a_failed_check_is_refused(rigfile: RigFile, record: CommissioningRecord) -> None:
-    bad = Check("known torque", 1.1, "N·m", "1 N·m ± 5 %", "failed", "calibrate")
+    bad = RigCheck("known torque", 1.1, "N·m", "1 N·m ± 5 %", "failed", "calibrate")
     write_record(record_path(rigfile.path), replace(record, checks=(*record.checks, bad)))
     with pytest.raises(UserError, match=r"known torque: 1.1 N·m, must be 1 N·m ± 5 %; calibrate"):
         check(rigfile)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.model import DriveState, arm_torque_nm, drive, drive_step
-from rigidimeter.rig.commissioning import Readings, fit_arm, following, velocity_scale
+from rigidimeter.rig.commissioning import Readings, fit_arm, following, velocity_per_angle
 
 J, B, K = 0.0045, 0.137, 1.75
 RATE_HZ, FINE = 200.0, 20
@@ -89,4 +89,4 @@ def test_noise_shows_no_arm() -> None:
 def test_the_velocity_is_held_against_the_angle(wrong: float) -> None:
     sample = readings()
     sample = sample._replace(velocity_rad_s=wrong * sample.velocity_rad_s)
-    assert velocity_scale(sample) == pytest.approx(wrong, rel=5e-3)
+    assert velocity_per_angle(sample) == pytest.approx(wrong, rel=5e-3)

@@ -15,7 +15,7 @@ from rigidimeter.core.settings import Settings, SubjectSettings, parse_settings
 from rigidimeter.model import Loop, median_joint
 from rigidimeter.planning import prbs_nm
 from rigidimeter.rig.commissioning import NOISE, below, hiding_torque_nm, sign_words, wrong_sign
-from rigidimeter.rig.guard import Cause, most_left
+from rigidimeter.rig.guard import Cause, max_left
 
 
 def chosen(amplitude_nm: float = 1.0, noise_nm: float = 0.005, **subject: float) -> Settings:
@@ -73,7 +73,7 @@ def test_an_answer_with_the_colour_of_the_noise_has_their_ratio(
     monkeypatch.setattr(wrong_sign, "subject_density", alike)
     monkeypatch.setattr(wrong_sign, "_at_limit_s", lambda *_: math.inf)
     free = 96 - 4 - 2 * 4
-    needed = free / 96 * (1.0 / most_left(96, 4).at_once - 1.0)
+    needed = free / 96 * (1.0 / max_left(96, 4).at_once - 1.0)
     assert hiding_torque_nm(settings, "OFF") == pytest.approx(0.5 / math.sqrt(16.0 * needed))
 
 

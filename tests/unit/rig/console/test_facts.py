@@ -12,9 +12,9 @@ from rigidimeter.rig.acquisition.processes import (
     PAUSE_NEXT,
     ROW,
     STOP_NEXT,
-    Condition,
     LiveEstimate,
     LoopStatus,
+    ProcessCondition,
 )
 from rigidimeter.rig.console import (
     Facts,
@@ -22,8 +22,8 @@ from rigidimeter.rig.console import (
     RecentSamples,
     RecorderState,
     SessionPlan,
+    all_indicators,
     facts,
-    lamps,
     limit_distances,
     recent_samples,
 )
@@ -35,8 +35,8 @@ RUNNING = LoopStatus(State.RUNNING, 30_000, 1, time_s=30.0, angle_rad=0.1, until
 QUIET = RecentSamples(
     1000, 0.5, math.radians(10), math.radians(50), 1.0, 0.8, 1e-4, 1e-3, 2e-3, 0, 0, False
 )
-SMALL_DISK = RecorderState(Condition.RUNNING, "", 0.1, 0, 0, 5 * 10**8)
-WELL = RecorderState(Condition.RUNNING, "", 0.05, 100, 500, 40 * 10**9)
+SMALL_DISK = RecorderState(ProcessCondition.RUNNING, "", 0.1, 0, 0, 5 * 10**8)
+WELL = RecorderState(ProcessCondition.RUNNING, "", 0.05, 100, 500, 40 * 10**9)
 
 
 def shown(progress, loop=RUNNING, plan=PLAN, **more) -> Facts:
@@ -154,14 +154,14 @@ def test_distances_are_in_the_units_of_the_limits():
 
 def lit(loop=RUNNING, recent=QUIET, recorder=WELL, energy_j=0.5, left_s=60.0):
     distances = limit_distances(SETTINGS.guard, recent, energy_j)
-    made = lamps(SETTINGS, loop, recent, distances, recorder, left_s)
-    return {lamp.name: lamp for lamp in made}
+    made = all_indicators(SETTINGS, loop, recent, distances, recorder, left_s)
+    return {indicator.name: indicator for indicator in made}
 
 
 def test_all_lamps_are_good_and_say_what_they_know():
     found = lit()
     assert list(found) == ["limits", "sensor", "drive", "lateness", "recorder", "disk"]
-    assert {lamp.level for lamp in found.values()} == {Level.GOOD}
+    assert {indicator.level for indicator in found.values()} == {Level.GOOD}
     assert found["limits"].words == "angle 10.0 of 40 deg (25 %)"
     assert found["sensor"].words == "torque 1 ms old, limit 100 ms"
     assert found["lateness"].words == (
@@ -183,14 +183,18 @@ def test_all_lamps_are_good_and_say_what_they_know():
         ("sensor", Level.UNKNOWN, {"recent": RecentSamples()}),
         ("drive", Level.WATCH, {"recent": QUIET._replace(motion_age_s=0.06)}),
         ("lateness", Level.WATCH, {"recent": QUIET._replace(largest_lateness_s=2e-3)}),
-        ("recorder", Level.WATCH, {"recorder": RecorderState(Condition.RUNNING, "", 0.1, 1500)}),
-        ("recorder", Level.WATCH, {"recorder": RecorderState(Condition.RUNNING, "", 1.5)}),
-        ("recorder", Level.BAD, {"recorder": RecorderState(Condition.TROUBLE, "full", 0.1)}),
-        ("recorder", Level.BAD, {"recorder": RecorderState(Condition.FAILED)}),
+        (
+            "recorder",
+            Level.WATCH,
+            {"recorder": RecorderState(ProcessCondition.RUNNING, "", 0.1, 1500)},
+        ),
+        ("recorder", Level.WATCH, {"recorder": RecorderState(ProcessCondition.RUNNING, "", 1.5)}),
+        ("recorder", Level.BAD, {"recorder": RecorderState(ProcessCondition.TROUBLE, "full", 0.1)}),
+        ("recorder", Level.BAD, {"recorder": RecorderState(ProcessCondition.FAILED)}),
         ("recorder", Level.UNKNOWN, {"recorder": RecorderState()}),
-        ("recorder", Level.GOOD, {"recorder": RecorderState(Condition.DONE)}),
-        ("disk", Level.BAD, {"recorder": RecorderState(Condition.TROUBLE, "full", 0.1)}),
-        ("disk", Level.UNKNOWN, {"recorder": RecorderState(Condition.RUNNING)}),
+        ("recorder", Level.GOOD, {"recorder": RecorderState(ProcessCondition.DONE)}),
+        ("disk", Level.BAD, {"recorder": RecorderState(ProcessCondition.TROUBLE, "full", 0.1)}),
+        ("disk", Level.UNKNOWN, {"recorder": RecorderState(ProcessCondition.RUNNING)}),
         # An hour at 1000 samples of 152 bytes a second is 547 MB.
         ("disk", Level.WATCH, {"recorder": SMALL_DISK, "left_s": 3600.0}),
     ],
@@ -212,7 +216,7 @@ def test_a_lamp_tells_what_is_wrong(name, level, changed):
 )
 def test_the_lamp_of_a_cause_says_it(cause, names):
     found = lit(RUNNING._replace(cause=int(cause)))
-    assert [name for name, lamp in found.items() if lamp.level is Level.BAD] == names
+    assert [name for name, indicator in found.items() if indicator.level is Level.BAD] == names
     assert all(found[name].words == cause.sentence for name in names)
 
 

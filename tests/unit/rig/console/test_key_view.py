@@ -14,7 +14,13 @@ from tests.unit.rig.console.test_session_progress import EPOCHS, ended, started
 
 from rigidimeter.core.settings import Settings
 from rigidimeter.rig.acquisition import NOTHING, Command, Order, State
-from rigidimeter.rig.acquisition.processes import Condition, Flag, LoopStatus, Role, SessionMemory
+from rigidimeter.rig.acquisition.processes import (
+    Flag,
+    LoopStatus,
+    ProcessCondition,
+    Role,
+    SessionMemory,
+)
 from rigidimeter.rig.console import (
     LEAVE,
     KeyView,
@@ -280,7 +286,7 @@ def test_the_end_does_not_wait_for_a_terminal_that_takes_nothing(person):
 
 
 def test_what_a_note_or_a_name_holds_does_not_steer_the_terminal(person):
-    person.status.set_condition(Role.RECORDER, Condition.TROUBLE, "full \x1b[2J\x07 disk")
+    person.status.set_condition(Role.RECORDER, ProcessCondition.TROUBLE, "full \x1b[2J\x07 disk")
     person.look()
     seen = person.sees()
     assert b"\x1b[2J" not in seen

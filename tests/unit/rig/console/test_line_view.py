@@ -12,10 +12,10 @@ from tests.unit.rig.console.test_session_progress import EPOCHS, started, told
 from rigidimeter.core.settings import Settings
 from rigidimeter.rig.acquisition import NOTHING, Command, Order, State
 from rigidimeter.rig.acquisition.processes import (
-    Condition,
     Flag,
     LiveEstimate,
     LoopStatus,
+    ProcessCondition,
     Role,
     SessionMemory,
 )
@@ -241,16 +241,16 @@ def test_a_screen_that_takes_nothing_does_not_hold_the_operator_up(desk):
 
 def test_the_loop_is_shown_once_a_second_and_trouble_once(desk):
     desk.shared_status.show_loop(LoopStatus(State.RUNNING, 1, 1, time_s=1.0, angle_rad=0.0))
-    desk.shared_status.set_condition(Role.RECORDER, Condition.TROUBLE, "the disk is full")
+    desk.shared_status.set_condition(Role.RECORDER, ProcessCondition.TROUBLE, "the disk is full")
     for _ in range(5):
         desk.look()
     assert [line.split(" | ")[0].strip() for line in desk.said()] == ["the disk is full", "1.0 s"]
     desk.now_s += 1.0
     desk.look()
     assert len(desk.said()) == 1
-    desk.shared_status.set_condition(Role.RECORDER, Condition.RUNNING)
+    desk.shared_status.set_condition(Role.RECORDER, ProcessCondition.RUNNING)
     desk.look()
-    desk.shared_status.set_condition(Role.RECORDER, Condition.TROUBLE, "the disk is full")
+    desk.shared_status.set_condition(Role.RECORDER, ProcessCondition.TROUBLE, "the disk is full")
     desk.look()
     assert desk.said() == ["the disk is full"]
 
@@ -260,7 +260,7 @@ def test_another_folder_is_asked_for_while_the_recorder_can_write_nothing(desk, 
     desk.type(f"save to {folder}\n")
     assert desk.said() == ["the recorder can write: another folder is for when it cannot"]
     assert desk.shared_status.asked_folder() is None
-    desk.shared_status.set_condition(Role.RECORDER, Condition.TROUBLE, "the disk is full")
+    desk.shared_status.set_condition(Role.RECORDER, ProcessCondition.TROUBLE, "the disk is full")
     desk.type(f"save to  {folder} \n")
     assert desk.said()[0] == f"ordered: save to {folder}"
     assert desk.shared_status.asked_folder() == folder

@@ -41,13 +41,13 @@ class Followed(RingSink):
 
     def sample(self, sample):
         super().sample(sample)
-        self.seen[sample.tick] = self.observer.look()
+        self.seen[sample.tick] = self.observer.facts_now()
 
 
 def followed(shared, desk=None):
     sink = Followed(shared)
     session(desk, sink=sink, watch=sink.watch, state_changed=sink.state_changed)
-    return sink.seen, sink.observer.look()
+    return sink.seen, sink.observer.facts_now()
 
 
 def test_a_session_is_followed_to_its_end(shared):
@@ -85,7 +85,7 @@ def test_what_the_guard_counts_is_shown(shared):
 
 def test_a_second_observer_sees_the_same(shared):
     _, last = followed(shared)
-    late = Observer(PLAN, shared).look()
+    late = Observer(PLAN, shared).facts_now()
     assert (late.counts, late.state_words) == (last.counts, last.state_words)
 
 
@@ -97,11 +97,11 @@ def test_live_estimates_are_remembered_for_one_epoch(shared):
                 10 * k, 0, 0, 1, 0.0, 0.1 * k, 0.0045, 1e-5, 0.137, 1e-3, 1.7, 0.02, min(0.1 * k, 5)
             )
         )
-        observer.look()
-        observer.look()
+        observer.facts_now()
+        observer.facts_now()
     assert len(observer._history) == 100
     shared.status.show_live(LiveEstimate(2000, epoch=2))
-    observer.look()
+    observer.facts_now()
     assert len(observer._history) == 1
 
 
@@ -137,7 +137,7 @@ class Gain(SimulatedRig):
     ],
 )
 def test_a_torque_that_was_wrong_through_an_epoch_is_named_at_its_end(wrong, words):
-    """From the loop to the lamp; nothing stops, and the recording is complete."""
+    """From the loop to the indicator; nothing stops, and the recording is complete."""
     rate = {"rate_hz": 250.0}
     settings = parse_settings(
         {
@@ -156,7 +156,11 @@ def test_a_torque_that_was_wrong_through_an_epoch_is_named_at_its_end(wrong, wor
 
         def look(time_s):
             memory.status.show_live(estimator.take(*reader.read()))
-            sensor = next(lamp for lamp in observer.look().lamps if lamp.name == "sensor")
+            sensor = next(
+                indicator
+                for indicator in observer.facts_now().indicators
+                if indicator.name == "sensor"
+            )
             seen.append((time_s, sensor.level, sensor.words))
 
         sink, rig = RingSink(memory, 250.0), Gain(settings, wrong)

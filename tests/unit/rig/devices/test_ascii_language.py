@@ -2,7 +2,15 @@ from __future__ import annotations
 
 import pytest
 
-from rigidimeter.rig.devices import Exchange, Feedback, get, move_target, parse, seconds, set_
+from rigidimeter.rig.devices import (
+    Exchange,
+    Feedback,
+    line_time_s,
+    move_target,
+    parse,
+    read_request,
+    set_request,
+)
 from rigidimeter.rig.guard import Cause
 
 
@@ -12,8 +20,8 @@ def test_what_is_no_reply_is_said_so(text):
 
 
 def test_requests():
-    assert (get(0x32), set_(0xCA, -5)) == ("g r0x32", "s r0xca -5")
-    assert seconds(96, 9600) == pytest.approx(0.1)
+    assert (read_request(0x32), set_request(0xCA, -5)) == ("g r0x32", "s r0xca -5")
+    assert line_time_s(96, 9600) == pytest.approx(0.1)
 
 
 def brake(velocity, deceleration=1000.0):
@@ -48,7 +56,7 @@ def test_what_no_register_can_hold_is_no_reply(value):
     assert [parse(f"v {most}").value for most in (2**32 - 1, -(2**31))] == [2**32 - 1, -(2**31)]
 
 
-CYCLE = {get(0x32): "v 5", get(0x18): "v 0", get(0xA0): "v 0"}
+CYCLE = {read_request(0x32): "v 5", read_request(0x18): "v 0", read_request(0xA0): "v 0"}
 
 
 def cycle(feedback, at_s, **damaged):

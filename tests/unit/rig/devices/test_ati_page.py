@@ -2,7 +2,7 @@
 
 import pytest
 
-from rigidimeter.rig.devices import FORCE_UNITS_N, TORQUE_UNITS_NM, changes, parse_page
+from rigidimeter.rig.devices import FORCE_UNITS_N, TORQUE_UNITS_NM, page_changes, parse_page
 from rigidimeter.rig.devices.base import DeviceError
 
 PAGE = {
@@ -97,8 +97,8 @@ def test_something_else_than_the_page_is_refused():
 
 def test_every_change_is_named_but_the_status():
     before = page()
-    assert changes(before, page(runstat="0x80010000")) == ""
-    assert changes(before, page(scfgtu="lbf-in", cfgcalsn="FT1")) == (
+    assert page_changes(before, page(runstat="0x80010000")) == ""
+    assert page_changes(before, page(scfgtu="lbf-in", cfgcalsn="FT1")) == (
         "torque_unit 'Nm' became 'lbf-in', serial 'FT27462' became 'FT1'"
     )
-    assert "bias" in changes(before, page(setbias="0;0;0;0;0;0"))
+    assert "bias" in page_changes(before, page(setbias="0;0;0;0;0;0"))

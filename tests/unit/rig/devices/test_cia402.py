@@ -10,8 +10,8 @@ from rigidimeter.rig.devices import (
     NEXT_CONTROL,
     Cia402Drive,
     Cia402Settings,
+    Cia402State,
     Control,
-    State,
     command_bytes,
     emergency,
     fastest_tick_rate_hz,
@@ -31,14 +31,14 @@ from rigidimeter.rig.guard import Cause
 
 # CiA 402-2, the statusword's state coding: x where a bit may be either.
 CODES = {
-    "xxxx xxxx x0xx 0000": State.NOT_READY,
-    "xxxx xxxx x1xx 0000": State.SWITCH_ON_DISABLED,
-    "xxxx xxxx x01x 0001": State.READY,
-    "xxxx xxxx x01x 0011": State.SWITCHED_ON,
-    "xxxx xxxx x01x 0111": State.OPERATION_ENABLED,
-    "xxxx xxxx x00x 0111": State.QUICK_STOP_ACTIVE,
-    "xxxx xxxx x0xx 1111": State.FAULT_REACTION,
-    "xxxx xxxx x0xx 1000": State.FAULT,
+    "xxxx xxxx x0xx 0000": Cia402State.NOT_READY,
+    "xxxx xxxx x1xx 0000": Cia402State.SWITCH_ON_DISABLED,
+    "xxxx xxxx x01x 0001": Cia402State.READY,
+    "xxxx xxxx x01x 0011": Cia402State.SWITCHED_ON,
+    "xxxx xxxx x01x 0111": Cia402State.OPERATION_ENABLED,
+    "xxxx xxxx x00x 0111": Cia402State.QUICK_STOP_ACTIVE,
+    "xxxx xxxx x0xx 1111": Cia402State.FAULT_REACTION,
+    "xxxx xxxx x0xx 1000": Cia402State.FAULT,
 }
 
 
@@ -53,37 +53,44 @@ def test_every_statusword_is_decoded_as_the_standard_codes_it():
     for word in range(0x10000):
         named = [state for mask, value, state in codes if word & mask == value]
         assert len(named) <= 1
-        assert state_of(word) is (named[0] if named else State.UNKNOWN), f"0x{word:04X}"
+        assert state_of(word) is (named[0] if named else Cia402State.UNKNOWN), f"0x{word:04X}"
 
 
 def test_words_agree_with_those_of_the_library():
     theirs = pytest.importorskip("canopen.profiles.p402").State402
     names = {
-        State.NOT_READY: "NOT READY TO SWITCH ON",
-        State.SWITCH_ON_DISABLED: "SWITCH ON DISABLED",
-        State.READY: "READY TO SWITCH ON",
-        State.SWITCHED_ON: "SWITCHED ON",
-        State.OPERATION_ENABLED: "OPERATION ENABLED",
-        State.QUICK_STOP_ACTIVE: "QUICK STOP ACTIVE",
-        State.FAULT_REACTION: "FAULT REACTION ACTIVE",
-        State.FAULT: "FAULT",
+        Cia402State.NOT_READY: "NOT READY TO SWITCH ON",
+        Cia402State.SWITCH_ON_DISABLED: "SWITCH ON DISABLED",
+        Cia402State.READY: "READY TO SWITCH ON",
+        Cia402State.SWITCHED_ON: "SWITCHED ON",
+        Cia402State.OPERATION_ENABLED: "OPERATION ENABLED",
+        Cia402State.QUICK_STOP_ACTIVE: "QUICK STOP ACTIVE",
+        Cia402State.FAULT_REACTION: "FAULT REACTION ACTIVE",
+        Cia402State.FAULT: "FAULT",
     }
     for word in range(0x10000):
         found = [name for name, (mask, bits) in theirs.SW_MASK.items() if word & mask == bits]
         state = state_of(word)
-        assert found == ([] if state is State.UNKNOWN else [names[state]]), f"0x{word:04X}"
+        assert found == ([] if state is Cia402State.UNKNOWN else [names[state]]), f"0x{word:04X}"
     assert theirs.CW_QUICK_STOP == Control.QUICK_STOP
     assert theirs.CW_DISABLE_VOLTAGE == Control.DISABLE_VOLTAGE
-    way = (State.SWITCH_ON_DISABLED, State.READY, State.SWITCHED_ON, State.OPERATION_ENABLED)
+    way = (
+        Cia402State.SWITCH_ON_DISABLED,
+        Cia402State.READY,
+        Cia402State.SWITCHED_ON,
+        Cia402State.OPERATION_ENABLED,
+    )
     for before, after in itertools.pairwise(way):
         assert theirs.TRANSITIONTABLE[names[before], names[after]] == NEXT_CONTROL[before]
 
 
 def test_the_way_up_has_one_step_from_each_state_and_none_from_a_fault():
-    assert NEXT_CONTROL[State.SWITCH_ON_DISABLED] == 0x06
-    assert NEXT_CONTROL[State.READY] == 0x07
-    assert NEXT_CONTROL[State.SWITCHED_ON] == 0x0F
-    assert not {State.FAULT, State.FAULT_REACTION, State.QUICK_STOP_ACTIVE} & set(NEXT_CONTROL)
+    assert NEXT_CONTROL[Cia402State.SWITCH_ON_DISABLED] == 0x06
+    assert NEXT_CONTROL[Cia402State.READY] == 0x07
+    assert NEXT_CONTROL[Cia402State.SWITCHED_ON] == 0x0F
+    assert not {Cia402State.FAULT, Cia402State.FAULT_REACTION, Cia402State.QUICK_STOP_ACTIVE} & set(
+        NEXT_CONTROL
+    )
 
 
 def test_frames_are_little_endian_and_signed():

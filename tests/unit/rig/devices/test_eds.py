@@ -9,11 +9,11 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.rig.devices import (
     Cia402Settings,
     Object,
+    compare_eds,
     displayed_mode,
-    fits,
     objects,
-    put,
     read_back,
+    write_object,
 )
 from rigidimeter.rig.devices.base import DeviceError
 
@@ -59,7 +59,7 @@ def eds(tmp_path, settings=None, without=(), **changes):
 
 
 def wrong(path, settings=None):
-    found = fits(path, settings or Cia402Settings())
+    found = compare_eds(path, settings or Cia402Settings())
     return {row.label: row.found for row in found if not row.fits}
 
 
@@ -173,7 +173,7 @@ class Drive:
 def written(drive):
     """Write and read back as the driver does; return what the drive does not have."""
     needed = objects(Cia402Settings())
-    absent = [entry.index for entry in needed if not put(drive, entry, "drive")]
+    absent = [entry.index for entry in needed if not write_object(drive, entry, "drive")]
     read_back(drive, needed, "drive")
     return absent
 

@@ -56,7 +56,7 @@ class Serial:
         drive._line = AsciiLine(self.port, self.clock)
         # As `enable` leaves it.
         drive._speaking = drive._configured = drive._powered = drive._commanding = True
-        drive._said_off = False
+        drive._reported_off = False
         drive._cycle_s, drive._commanded_s = 0.01, self.clock.time_s
         drive._feedback.begin(0, 0, 0, self.clock.time_s)
 

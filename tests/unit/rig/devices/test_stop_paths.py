@@ -57,7 +57,7 @@ class Node:
         self.drive._configured = True
         self.drive._control = Control.ENABLE_OPERATION
         wire = self.drive._wire
-        wire.heard_s = wire.told_s = self.clock.time_s
+        wire.heard_s = wire.commanded_s = self.clock.time_s
         wire.network_state = OPERATIONAL
         self.drive.write(0.0)
         self.report()

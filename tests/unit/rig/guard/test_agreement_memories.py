@@ -96,10 +96,10 @@ def allowed(law, at):
         "torque old": {"torque_old": 0.2 * at},
         "motion old": {"motion_old": 0.2 * at},
         "energy": {"energy_j": 4.0 * at},
-        "resolution": {"apart_rad2": 0.25 * at, "moved_rad2": 0.125, "reported_rad2": 0.125},
-        "share": {"apart_rad2": 0.375 * at, "moved_rad2": 0.5, "reported_rad2": 0.5},
+        "resolution": {"disagreement_rad2": 0.25 * at, "moved_rad2": 0.125, "reported_rad2": 0.125},
+        "share": {"disagreement_rad2": 0.375 * at, "moved_rad2": 0.5, "reported_rad2": 0.5},
         # With <p q> = 1.5 at: the gain on the smaller of the two.
-        "gain": {"apart_rad2": 3.25 - 3.0 * at, "moved_rad2": 1.0, "reported_rad2": 2.25},
+        "gain": {"disagreement_rad2": 3.25 - 3.0 * at, "moved_rad2": 1.0, "reported_rad2": 2.25},
     }[law]
     unseen_rad = {"resolution": 0.5, "share": 0.1, "gain": 0.1}.get(law, math.inf)
     return LIMITS._replace(energy_j=4.0, unseen_rad=unseen_rad), state(angle_rad=0.0, **values)
@@ -145,7 +145,7 @@ def test_after_a_mean_that_was_not_answered_the_velocity_may_be_that_of_before(u
 
 
 def test_a_step_longer_than_the_memory_of_the_squares_leaves_nothing_of_before():
-    before = state(angle_rad=0.0, apart_rad2=9.0, moved_rad2=9.0, reported_rad2=9.0)
+    before = state(angle_rad=0.0, disagreement_rad2=9.0, moved_rad2=9.0, reported_rad2=9.0)
     after, _ = means_step(LIMITS, before, 0, 0, 0.5, 0.0, 0.6, 0, 0, 0.6, 0)
     assert after[6:9] == pytest.approx((0.25, 0.25, 0.0))
 
@@ -162,5 +162,5 @@ def test_a_step_longer_than_the_memory_of_the_squares_leaves_nothing_of_before()
     ],
 )
 def test_the_gain_is_that_of_the_larger_on_the_smaller(moved2, reported2, apart2, gain):
-    means = state(moved_rad2=moved2, reported_rad2=reported2, apart_rad2=apart2)
+    means = state(moved_rad2=moved2, reported_rad2=reported2, disagreement_rad2=apart2)
     assert larger_gain(means) == pytest.approx(gain)

@@ -13,16 +13,16 @@ from rigidimeter.rig.guard import (
     FILTER_RAD_S,
     NOISE_ORDERS,
     ROWS,
-    ROWS_A_LOOK,
+    ROWS_A_TEST,
     AnswerLimits,
     Cause,
     answer_state,
     answer_step,
-    most_left,
+    max_left,
 )
 
 HALF = ROWS[-1] + BEFORE
-LEFT = tuple(map(most_left, ROWS, NOISE_ORDERS))
+LEFT = tuple(map(max_left, ROWS, NOISE_ORDERS))
 
 
 # --- the signals of a row
@@ -80,8 +80,8 @@ def test_windows_are_looked_at_every_few_rows_once_the_shortest_is_full(steps_a_
         if cause:
             found.append((k + 1) / steps_a_row)
             assert Cause(cause) is Cause.TORQUE_SIGN
-    assert found[0] in (ROWS[0], ROWS[0] + ROWS_A_LOOK)  # the joint did not begin at rest
-    assert found == list(range(int(found[0]), 121, ROWS_A_LOOK))
+    assert found[0] in (ROWS[0], ROWS[0] + ROWS_A_TEST)  # the joint did not begin at rest
+    assert found == list(range(int(found[0]), 121, ROWS_A_TEST))
 
 
 @pytest.mark.parametrize("which", [0, 1, 2])
@@ -93,7 +93,7 @@ def test_each_window_is_looked_at_over_its_own_rows(which):
         state, cause = answer_step(AnswerLimits(10.0, 1, left), state, *values, 0.016)
         if cause and not first:
             first = k + 1
-    assert ROWS[which] <= first <= ROWS[which] + 2 * ROWS_A_LOOK
+    assert ROWS[which] <= first <= ROWS[which] + 2 * ROWS_A_TEST
 
 
 def test_a_torque_that_is_silent_is_named_before_its_sign():

@@ -55,7 +55,7 @@ def test_the_squares_are_what_theory_says():
         state = run(NOTHING, 5000, *swing(gain))[2]
         total = state.means.moved_rad2 + state.means.reported_rad2
         assert total == pytest.approx(both * p2, rel=0.15)
-        assert state.means.apart_rad2 == pytest.approx(apart * p2, rel=0.15, abs=1e-3 * p2)
+        assert state.means.disagreement_rad2 == pytest.approx(apart * p2, rel=0.15, abs=1e-3 * p2)
 
 
 def test_what_resolution_explains_is_not_looked_at():
@@ -402,7 +402,7 @@ def test_the_figures_of_the_laws_and_what_they_begin_with():
     )
     assert (agreement.UNSEEN_DEG, agreement.SMOOTHED_S) == (0.1, 0.02)
     assert (agreement.WRONG_GAIN, agreement.LATE) == (1.5, 1.5)
-    assert (agreement.FEW_SAMPLES, agreement.LEAST_OLD_S) == (3.0, 0.012)
+    assert (agreement.FEW_SAMPLES, agreement.MIN_OLD_S) == (3.0, 0.012)
     assert (*(0.2, 0.5, 5.0),) == (
         agreement.OLD_SHARE,
         agreement.OLD_MEMORY_S,

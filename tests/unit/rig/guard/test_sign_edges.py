@@ -9,8 +9,8 @@ from rigidimeter.rig.guard import (
     INSTRUMENTS,
     JERK,
     SINGULAR,
-    explained,
-    least_of_each_sign,
+    explained_answer,
+    left_by_each_sign,
     sign_is_wrong,
     solved,
     solved_for,
@@ -59,15 +59,15 @@ def test_a_column_as_small_as_that_explains_half(column):
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_each_coefficient_has_a_sign_however_small_it_is(name, sign):
     """M·x = ± 10⁻⁵ with x² = 10⁻⁹ leaves 1 − 10⁻¹⁰/(2·10⁻⁹) of M² = 1; with x² = 1, 1 − m²."""
-    left = least_of_each_sign(squares(**{name * 2: SINGULAR, name + "m": sign * 1e-5}))
+    left = left_by_each_sign(squares(**{name * 2: SINGULAR, name + "m": sign * 1e-5}))
     assert left[:: int(sign)] == pytest.approx((0.95, 1.0))
-    left = least_of_each_sign(squares(**{name + "m": sign * 5e-4}))
+    left = left_by_each_sign(squares(**{name + "m": sign * 5e-4}))
     assert left[:: int(sign)] == pytest.approx((1.0 - 2.5e-7, 1.0), rel=1e-10)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_rounding_leaves_no_less_than_nothing(sign):
-    left = least_of_each_sign(squares(am=sign * 1.000001))
+    left = left_by_each_sign(squares(am=sign * 1.000001))
     assert left[:: int(sign)] == (0.0, 1.0)
 
 
@@ -96,8 +96,8 @@ def test_a_torque_that_accelerates_and_brakes_the_joint_has_the_right_sign(
     columns[:, -1] = (2.0, 0.0, 0.0)
     columns[0, INSTRUMENTS + 1 : INSTRUMENTS + 3] = 0.5 * accelerated, 0.5 * braked
     columns[1:, INSTRUMENTS + 1 : INSTRUMENTS + 3] = -1.0  # M is 0 there
-    monkeypatch.setattr(torque_sign, "table", lambda _: columns)
-    monkeypatch.setattr(torque_sign, "explained", lambda _: A_WRONG)
+    monkeypatch.setattr(torque_sign, "difference_columns", lambda _: columns)
+    monkeypatch.setattr(torque_sign, "explained_answer", lambda _: A_WRONG)
     assert sign_is_wrong(window(JOINT), True, LEFT) == wrong
 
 
@@ -109,5 +109,7 @@ def test_what_may_be_a_torque_that_is_early_is_no_wrong_sign():
     early[:, -1] += early[:, j]
     assert sign_is_wrong(early, True, LEFT._replace(if_early=1.1))
     assert not sign_is_wrong(early, True, LEFT)
-    noise, answer, _ = explained(whitened(torque_sign.table(early), np.zeros(INSTRUMENTS), 1))
+    noise, answer, _ = explained_answer(
+        whitened(torque_sign.difference_columns(early), np.zeros(INSTRUMENTS), 1)
+    )
     assert without(answer, JERK)[4, 4] < noise  # j leaves nothing of it

@@ -12,9 +12,9 @@ from rigidimeter.rig.guard import (
     NOISE_ORDERS,
     PASSES,
     ROWS,
-    explained,
+    explained_answer,
     fits_better,
-    most_left,
+    max_left,
     whitened,
 )
 
@@ -27,14 +27,14 @@ def found(rows, order, ratio, draws=200):
     The noise of a row is white, with a square of 1.
     """
     rng, seen = np.random.default_rng(rows), 0
-    left = most_left(rows, order)
+    left = max_left(rows, order)
     for _ in range(draws):
         columns = rng.standard_normal((rows, INSTRUMENTS + 5))
         columns[:, INSTRUMENTS + 1 : -1] = columns[:, :3]  # each moves one of a, v and q
         columns[:, -1] -= np.sqrt(ratio) * columns[:, 0]
         weights, wrong = np.zeros(INSTRUMENTS), True
         for _ in range(PASSES):
-            noise, answer, weights = explained(whitened(columns, weights, order))
+            noise, answer, weights = explained_answer(whitened(columns, weights, order))
             wrong = wrong and fits_better(noise, answer, left.at_once)
         seen += wrong
     return seen / draws
@@ -42,7 +42,7 @@ def found(rows, order, ratio, draws=200):
 
 @pytest.mark.parametrize(("rows", "order"), [*zip(ROWS, NOISE_ORDERS, strict=True)])
 def test_a_sign_is_found_where_the_ratio_of_likelihoods_is_enough(rows, order):
-    left, f = most_left(rows, order), rows - INSTRUMENTS - 2 * order
+    left, f = max_left(rows, order), rows - INSTRUMENTS - 2 * order
     needed = f / rows * (1.0 / left.at_once - 1.0)
     assert needed == pytest.approx(NEEDED[rows], rel=0.005)
     assert found(rows, order, 2.0 * needed) > 0.75

@@ -18,7 +18,7 @@ from rigidimeter.rig.guard import (
     NOTHING_YET,
     ROW_S,
     ROWS,
-    ROWS_A_LOOK,
+    ROWS_A_TEST,
     SETTLED,
     SHOWN_MEMORY_S,
     UNSHOWN_NM,
@@ -29,8 +29,8 @@ from rigidimeter.rig.guard import (
     answer_state,
     answer_step,
     lowpassed,
+    max_left,
     mean_of_ticks,
-    most_left,
 )
 
 DT = 0.001
@@ -163,7 +163,7 @@ def test_a_sign_that_turns_later_is_found_within_a_window_and_a_look(from_s, tic
     at_s, cause = perturbed(-1.0, from_s=from_s, tick_rate_hz=tick_rate_hz)
     assert cause == Cause.TORQUE_SIGN
     row_s = 0.016 if tick_rate_hz >= 500.0 else 0.02
-    assert at_s - from_s < (ROWS[0] + BEFORE + 2 * ROWS_A_LOOK) * row_s
+    assert at_s - from_s < (ROWS[0] + BEFORE + 2 * ROWS_A_TEST) * row_s
 
 
 @pytest.mark.parametrize("tick_rate_hz", [50.0, 100.0, 1000.0])
@@ -229,7 +229,7 @@ def test_each_limit_is_the_settings_in_si_units():
             }
         )
     )
-    assert limits.left == (most_left(24, 1), most_left(48, 2), most_left(96, 4))
+    assert limits.left == (max_left(24, 1), max_left(48, 2), max_left(96, 4))
     numbers = {name: value for name, value in limits._asdict().items() if name != "left"}
     assert numbers == pytest.approx(
         {
@@ -237,7 +237,7 @@ def test_each_limit_is_the_settings_in_si_units():
             "steps_a_row": 2,
             "shows_inertia": True,
             "inertia_kg_m2": 0.002,
-            "least_part": 1.0,
+            "min_part": 1.0,
             "unshown_nm": 0.0003 + 0.003 + 0.002 * math.radians(0.02) * (10 * math.pi) ** 2,
             "step_s": 0.008,
             "controlled_s": 0.01,
@@ -267,18 +267,18 @@ def test_ticks_show_the_inertia_until_the_drive_has_nearly_come_to_its_velocity(
         rig = settings.rig.model_copy(update=drive)
         limits = answer_limits(settings.model_copy(update={"rig": rig}))
         assert limits.shows_inertia is shown
-        assert limits.least_part == (1.0 if shown else HARDLY_SHOWN)
+        assert limits.min_part == (1.0 if shown else HARDLY_SHOWN)
 
 
 @pytest.mark.parametrize(("inertia", "silent"), [(0.00013, True), (0.00017, False)])
 def test_only_a_part_of_the_least_inertia_is_asked_of_ticks_that_hardly_show_it(inertia, silent):
-    found = imposed(inertia, limits=LIMITS._replace(least_part=0.3))[1]
+    found = imposed(inertia, limits=LIMITS._replace(min_part=0.3))[1]
     assert found == (Cause.TORQUE_SILENT if silent else Cause.NONE)
 
 
 def test_the_figures_of_the_laws_and_what_they_begin_with():
     assert (SHOWN_MEMORY_S, MEAN_OF_S, ROW_S, LONGEST_S) == (0.25, 0.008, 0.016, 0.06)
-    assert (ROWS, ROWS_A_LOOK, UNSHOWN_NM) == ((24, 48, 96), 6, 0.0003)
+    assert (ROWS, ROWS_A_TEST, UNSHOWN_NM) == ((24, 48, 96), 6, 0.0003)
     assert pytest.approx((0.75 * math.pi, 0.3)) == (SETTLED, HARDLY_SHOWN)
     assert AnswerLimits() == (0.0, 2, (Left(), Left(), Left()), True, 0.0, 1.0, *[math.inf] * 3)
     assert Left() == (1, 0.0, 0.0)

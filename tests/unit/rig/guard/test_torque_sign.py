@@ -15,13 +15,13 @@ from rigidimeter.rig.guard import (
     INSTRUMENTS,
     LAGS,
     PASSES,
-    explained,
-    least_of_each_sign,
-    most_left,
+    difference_columns,
+    explained_answer,
+    left_by_each_sign,
+    max_left,
     sign_is_wrong,
     solved,
     solved_for,
-    table,
     torque_sign,
     whitened,
     without,
@@ -45,20 +45,20 @@ def test_a_table_holds_third_differences_and_the_instruments_of_rows_before():
     expected = np.column_stack([fast[LAGS:, 0], *late, fast[LAGS:, 2:]])
     expected /= np.linalg.norm(expected, axis=0)
     assert expected.shape == (ROWS, INSTRUMENTS + 5)
-    np.testing.assert_allclose(table(window), expected)
+    np.testing.assert_allclose(difference_columns(window), expected)
 
 
 def test_what_is_constant_linear_or_curved_is_no_part_of_a_table():
     t = np.arange(float(ROWS + BEFORE))[:, None]
     assert np.abs(np.diff(3.0 - 2.0 * t + 0.1 * t * t, DIFFERENCES, axis=0)).max() < 1e-9
-    assert not table(np.ones((ROWS + BEFORE, COLUMNS))).any()
+    assert not difference_columns(np.ones((ROWS + BEFORE, COLUMNS))).any()
 
 
 def test_answer_and_noise_are_those_of_least_squares():
     columns = np.random.default_rng(2).standard_normal((ROWS, INSTRUMENTS + 5))
     z, x = columns[:, :INSTRUMENTS], columns[:, INSTRUMENTS:]
     apart = left_by(z, x)
-    noise, answer, weights = explained(columns)
+    noise, answer, weights = explained_answer(columns)
     assert noise == pytest.approx(float(apart[:, -1] @ apart[:, -1]), rel=1e-6)
     np.testing.assert_allclose(answer, x.T @ x - apart.T @ apart, rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(z @ weights, x[:, -1] - apart[:, -1], rtol=1e-6, atol=1e-6)
@@ -104,7 +104,7 @@ def test_the_least_of_each_sign_is_that_of_non_negative_least_squares(joint):
     columns = rng.standard_normal((ROWS, 4)) + rng.standard_normal((ROWS, 1))  # alike in part
     m = columns[:, 1:] @ joint + 0.3 * rng.standard_normal(ROWS)
     square = np.column_stack([columns, m])
-    found = least_of_each_sign(square.T @ square)
+    found = left_by_each_sign(square.T @ square)
     expected = [scipy.optimize.nnls(columns[:, 1:], sign * m)[1] ** 2 for sign in (1.0, -1.0)]
     np.testing.assert_allclose(found, expected, rtol=1e-6)
 
@@ -112,8 +112,8 @@ def test_the_least_of_each_sign_is_that_of_non_negative_least_squares(joint):
 def test_columns_that_are_alike_or_nothing_have_a_solution():
     one = np.ones((4, 4))
     np.testing.assert_allclose(one @ solved_for(one, np.ones(4)), np.ones(4), rtol=1e-6)
-    assert least_of_each_sign(np.zeros((5, 5))) == (0.0, 0.0)
-    assert least_of_each_sign(np.ones((5, 5))) == pytest.approx((0.0, 1.0), abs=1e-6)
+    assert left_by_each_sign(np.zeros((5, 5))) == (0.0, 0.0)
+    assert left_by_each_sign(np.ones((5, 5))) == pytest.approx((0.0, 1.0), abs=1e-6)
 
 
 def test_three_equations_are_solved_in_any_order():
@@ -134,7 +134,7 @@ def test_three_equations_are_solved_in_any_order():
 def test_the_quantiles_are_those_of_a_beta_distribution(rows, order):
     """With four instruments I_x(a, 2) = xᵃ (1 + a (1 − x)), a = (rows − 4 − 2 p)/2."""
     a = 0.5 * (rows - 4 - 2 * order)
-    left = most_left(rows, order)
+    left = max_left(rows, order)
     assert left.order == order
     for x, part in ((left.at_once, FALSE_ALARMS), (left.if_early, IF_EARLY)):
         assert x**a * (1.0 + a * (1.0 - x)) == pytest.approx(part)
@@ -146,7 +146,7 @@ def seems_an_answer(columns, order, part):
     x = scipy.special.betaincinv(0.5 * (len(columns) - 4 - 2 * order), 2.0, part)
     weights = np.zeros(INSTRUMENTS)
     for _ in range(PASSES):
-        noise, answer, weights = explained(whitened(columns, weights, order))
+        noise, answer, weights = explained_answer(whitened(columns, weights, order))
         if not noise < x * (noise + answer[-1, -1]):
             return False
     return True
@@ -179,7 +179,7 @@ def window(joint, noise=0.0, unmoved=0.1, seed=7, rows=ROWS):
 
 
 JOINT = np.array([0.0, 0.3, 1.0, 0.5])
-LEFT = most_left(ROWS, 1)
+LEFT = max_left(ROWS, 1)
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-6])
@@ -241,7 +241,7 @@ A_WRONG, A_RIGHT = an_answer(-1.0), an_answer(1.0)
 )
 def test_the_sign_has_to_be_wrong_with_the_noise_of_each_pass(monkeypatch, first, second, wrong):
     seen, results = [], iter((first, second))
-    monkeypatch.setattr(torque_sign, "explained", lambda _: next(results))
+    monkeypatch.setattr(torque_sign, "explained_answer", lambda _: next(results))
     monkeypatch.setattr(
         torque_sign, "whitened", lambda *given: seen.append((given[1][0], given[2])) or given[0]
     )

@@ -15,8 +15,8 @@ from rigidimeter.rig.guard import (
     AnswerLimits,
     answer_state,
     answer_step,
-    explained,
-    table,
+    difference_columns,
+    explained_answer,
     whitened,
 )
 
@@ -49,9 +49,13 @@ def parts(rows, order, found):
     free = rows - INSTRUMENTS - 2 * order
     seen = []
     for window in found:
-        columns, weights, most = table(window[-rows - BEFORE :]), np.zeros(INSTRUMENTS), 0.0
+        columns, weights, most = (
+            difference_columns(window[-rows - BEFORE :]),
+            np.zeros(INSTRUMENTS),
+            0.0,
+        )
         for _ in range(PASSES):
-            noise, answer, weights = explained(whitened(columns, weights, order))
+            noise, answer, weights = explained_answer(whitened(columns, weights, order))
             most = max(most, noise / (noise + answer[-1, -1]))
         seen.append(scipy.special.betainc(0.5 * free, 2.0, most))
     return np.array(seen)

@@ -31,7 +31,7 @@ WELL = {
     "velocity_rad_s": 0.5,
     "age_s": 0.001,
     "torque_age_s": 0.002,
-    "astray_rad": 0.0,
+    "position_error_rad": 0.0,
     "energy_j": 0.1,
     "limited_s": 0.5,
 }
@@ -41,12 +41,12 @@ AT_THE_BOUNDARY = [
     ("age_s", 0.5, Cause.MOTION_STALE),
     ("torque_age_s", 0.5, Cause.TORQUE_STALE),
     ("velocity_rad_s", 4.0, Cause.OVERSPEED),
-    ("astray_rad", 0.03125, Cause.NOT_FOLLOWING),
+    ("position_error_rad", 0.03125, Cause.NOT_FOLLOWING),
     ("energy_j", 5.0, Cause.ENERGY_HIGH),
     ("torque_nm", 10.0, Cause.TORQUE_HIGH),
     ("limited_s", 1.0, Cause.HELD_AT_LIMIT),
 ]
-SIGNED = {"angle_rad", "velocity_rad_s", "astray_rad", "torque_nm"}
+SIGNED = {"angle_rad", "velocity_rad_s", "position_error_rad", "torque_nm"}
 
 
 def found(**values):
@@ -100,7 +100,7 @@ def test_a_number_that_is_not_finite_is_named_first(bad):
         ("age_s", Cause.MOTION_STALE),
         ("torque_age_s", Cause.TORQUE_STALE),
         ("velocity_rad_s", Cause.OVERSPEED),
-        ("astray_rad", Cause.NOT_FOLLOWING),
+        ("position_error_rad", Cause.NOT_FOLLOWING),
         ("energy_j", Cause.ENERGY_HIGH),
     ],
 )
@@ -118,7 +118,7 @@ def test_the_order_is_from_worthless_numbers_to_what_asks_for_a_pause():
         "age_s": 9.0,
         "torque_age_s": 9.0,
         "velocity_rad_s": 9.0,
-        "astray_rad": 9.0,
+        "position_error_rad": 9.0,
         "energy_j": 9.0,
     }
     mended = {**WELL, "torque_nm": 99.0}

@@ -12,7 +12,7 @@ from rigidimeter.rig.acquisition.processes.loop_process import LoopSide, Realtim
 from rigidimeter.rig.acquisition.processes.lsl_streams import streamer_main
 from rigidimeter.rig.acquisition.processes.orphaned_memory import complete_left
 from rigidimeter.rig.acquisition.processes.realtime_scheduling import Prepared, prepare_loop_process
-from rigidimeter.rig.acquisition.processes.recorder import Patience, Recorder, Recording
+from rigidimeter.rig.acquisition.processes.recorder import Patience, Recorder, RecordingPlan
 from rigidimeter.rig.acquisition.processes.ring import ROW, EventRing, SampleReader, SampleRing
 from rigidimeter.rig.acquisition.processes.ring_recovery import recover_from_rings
 from rigidimeter.rig.acquisition.processes.ring_writer import RingSink, SharedSupervision
@@ -22,10 +22,10 @@ from rigidimeter.rig.acquisition.processes.shared_status import NOTE_BYTES, Shar
 from rigidimeter.rig.acquisition.processes.status_values import (
     PAUSE_NEXT,
     STOP_NEXT,
-    Condition,
     Flag,
     LiveEstimate,
     LoopStatus,
+    ProcessCondition,
     Role,
 )
 from rigidimeter.rig.acquisition.processes.supervisor import Ended, supervise

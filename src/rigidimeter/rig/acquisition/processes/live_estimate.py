@@ -22,9 +22,9 @@ from rigidimeter.rig.acquisition import REST
 from rigidimeter.rig.acquisition.processes.end_signals import leave_to_the_others
 from rigidimeter.rig.acquisition.processes.ring import ROW, SampleReader
 from rigidimeter.rig.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.rig.acquisition.processes.status_values import Condition, LiveEstimate, Role
+from rigidimeter.rig.acquisition.processes.status_values import LiveEstimate, ProcessCondition, Role
 
-LOOK_S = 0.1
+POLL_S = 0.1
 
 _TAKEN = ("torque_nm", "angle_rad", "velocity_rad_s")
 
@@ -132,13 +132,13 @@ def estimator_main(
         status.join(Role.ESTIMATOR)
         estimator = Estimator(settings, rate_hz)
         reader = SampleReader(shared.samples)
-        status.set_condition(Role.ESTIMATOR, Condition.RUNNING)
+        status.set_condition(Role.ESTIMATOR, ProcessCondition.RUNNING)
         while os.getppid() == console_pid and not status.ended(Role.LOOP, lost_s):
             status.beat(Role.ESTIMATOR)
             rows, missed = reader.read()
             if rows.size:
                 status.show_live(estimator.take(rows, missed))
-            time.sleep(LOOK_S)
-        status.set_condition(Role.ESTIMATOR, Condition.DONE)
+            time.sleep(POLL_S)
+        status.set_condition(Role.ESTIMATOR, ProcessCondition.DONE)
     finally:
         shared.leave()

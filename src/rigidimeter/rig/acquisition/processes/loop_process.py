@@ -17,12 +17,12 @@ from dataclasses import dataclass
 from rigidimeter.core.errors import UserError
 from rigidimeter.rig.acquisition.processes.end_signals import raise_flags
 from rigidimeter.rig.acquisition.processes.realtime_scheduling import Prepared, prepare_loop_process
-from rigidimeter.rig.acquisition.processes.recorder import Patience, Recording
+from rigidimeter.rig.acquisition.processes.recorder import Patience, RecordingPlan
 from rigidimeter.rig.acquisition.processes.ring_recovery import complete
 from rigidimeter.rig.acquisition.processes.ring_writer import RingSink, SharedSupervision
 from rigidimeter.rig.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.rig.acquisition.processes.shared_status import SharedStatus
-from rigidimeter.rig.acquisition.processes.status_values import Condition, Flag, Role
+from rigidimeter.rig.acquisition.processes.status_values import Flag, ProcessCondition, Role
 from rigidimeter.rig.acquisition.processes.watchdog import WatchedProcess
 
 
@@ -69,7 +69,7 @@ LoopTarget = Callable[[LoopSide], object]
 
 def loop_main(
     target: LoopTarget,
-    recording: Recording,
+    recording: RecordingPlan,
     names: tuple[str, str, str],
     realtime: Realtime,
     patience: Patience,
@@ -80,7 +80,7 @@ def loop_main(
     Parameters
     ----------
     target : callable
-    recording : Recording
+    recording : RecordingPlan
     names : tuple of str
         Of the sample ring, the event ring and the shared status.
     realtime : Realtime
@@ -103,7 +103,7 @@ def loop_main(
         console_lost_s=limits.console_lost_s,
         recorder_lost_s=limits.recorder_lost_s,
         # A recorder that is silent is named as that first.
-        most_lag=round((limits.recorder_lost_s + 2 * patience.look_s) * rate_hz),
+        max_lag=round((limits.recorder_lost_s + 2 * patience.poll_s) * rate_hz),
         stall_s=limits.stall_s,
         attended=realtime.attended,
         console_pid=console_pid,
@@ -132,7 +132,7 @@ def loop_main(
         with suppress(ValueError):
             sink.close(sink.last_time_s, "fail", f"{type(error).__name__}: {error}")
     finally:
-        status.set_condition(Role.LOOP, Condition.FAILED if code else Condition.DONE)
+        status.set_condition(Role.LOOP, ProcessCondition.FAILED if code else ProcessCondition.DONE)
         _leave_real_time()
         remarks = complete(shared, recording, recorder, patience, lambda: status.beat(Role.LOOP))
         if os.getppid() != console_pid:  # otherwise the console finds the same and says it
@@ -149,8 +149,8 @@ def _say(text: str) -> None:
 
 def _recorder_is_there(status: SharedStatus, console_pid: int) -> bool:
     """Wait for the recorder; return False if it will not come."""
-    while status.condition(Role.RECORDER) not in (Condition.READY, Condition.RUNNING):
-        failed = status.condition(Role.RECORDER) is Condition.FAILED
+    while status.condition(Role.RECORDER) not in (ProcessCondition.READY, ProcessCondition.RUNNING):
+        failed = status.condition(Role.RECORDER) is ProcessCondition.FAILED
         if failed or status.flag(Flag.END_ASKED) or os.getppid() != console_pid:
             return False
         time.sleep(0.005)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 import socket
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,7 +31,7 @@ from rigidimeter.rig.guard import Cause
 if TYPE_CHECKING:
     from pylsl import StreamInfo, StreamOutlet
 
-LOOK_S = 0.05
+POLL_S = 0.05
 LINGER_S = 0.5
 """How long the streams stay after the session, so that all is fetched."""
 NICENESS = 5
@@ -150,29 +150,19 @@ def streamer_main(
         streams = Streams(
             settings, str(manifest.get("session_id", "")), bool(manifest.get("virtual"))
         )
-        _send(streams, shared, lost_s, console_pid)
+        reader, sent_events, over = SampleReader(shared.samples), 0, False
+        while not over:
+            over = os.getppid() != console_pid or shared.status.ended(Role.RECORDER, lost_s)
+            recorded_events = shared.events.recorded
+            rows, _ = reader.read(recorded=True)
+            # Events that are still in their ring.
+            first = max(sent_events, recorded_events - shared.events.capacity // 2)
+            for number in range(first, recorded_events):
+                streams.event(shared.events.get(number).facts)
+            sent_events = recorded_events
+            streams.samples(rows)
+            if not over:
+                time.sleep(POLL_S)
         time.sleep(LINGER_S)
     finally:
         shared.leave()
-
-
-def _send(streams: Streams, shared: SessionMemory, lost_s: float, console_pid: int) -> None:
-    reader = SampleReader(shared.samples)
-    sent_events = 0
-    while True:
-        over = os.getppid() != console_pid or shared.status.ended(Role.RECORDER, lost_s)
-        recorded_events = shared.events.recorded
-        rows, _ = reader.read(recorded=True)
-        for facts in _events(shared, sent_events, recorded_events):
-            streams.event(facts)
-        sent_events = recorded_events
-        streams.samples(rows)
-        if over:
-            return
-        time.sleep(LOOK_S)
-
-
-def _events(shared: SessionMemory, first: int, stop: int) -> Sequence[Mapping[str, Any]]:
-    """Return recorded events that are still in their ring."""
-    first = max(first, stop - shared.events.capacity // 2)
-    return [shared.events.get(number).facts for number in range(first, stop)]

@@ -43,7 +43,7 @@ def complete_left(only: Path | None = None, reason: str = KILLED) -> list[str]:
         If a process still records into the folder `only`, or what is in memory cannot be written
         there: closed without it, the record would have lost it.
     """
-    told: list[str] = []
+    messages: list[str] = []
     wanted = only.resolve() if only is not None else None
     for stem in sorted({path.name.rpartition("-")[0] for path in WHERE.glob(f"{PREFIX}*-*")}):
         names = (stem + PARTS[0], stem + PARTS[1], stem + PARTS[2])
@@ -68,10 +68,10 @@ def complete_left(only: Path | None = None, reason: str = KILLED) -> list[str]:
                 line, done = _complete(shared, folder, reason)
                 if mine and not done:
                     raise UserError(line)
-                told.append(line)
+                messages.append(line)
         finally:
             shared.close()
-    return told
+    return messages
 
 
 def _left(shared: SessionMemory, wait_s: float) -> bool:

@@ -77,8 +77,8 @@ class Prepared:
             "memory locked" if self.memory_locked else "",
             f"timer slack {self.timer_slack_ns} ns" if self.timer_slack_ns else "",
         ]
-        said = ", ".join(text for text in granted if text) or "nothing of what it asked for"
-        return "\n".join([f"The loop's process has {said}.", *self.refused])
+        words = ", ".join(text for text in granted if text) or "nothing of what it asked for"
+        return "\n".join([f"The loop's process has {words}.", *self.refused])
 
 
 def prepare_loop_process(

@@ -4,7 +4,7 @@ A write only gives the samples to the system. A thread has the files put on the 
 that up for long; the recorder asks it, goes on writing, and looks later what came of it.
 
 It beats its heart between any two writes. A disk that does not take a write is tried again and
-again, and the operator told so (`full_disk`). When the loop has ended, or is not heard of, the
+again, and the operator told so (`FullDisk`). When the loop has ended, or is not heard of, the
 session is closed with that as the reason.
 """
 
@@ -21,22 +21,26 @@ from contextlib import suppress
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import SessionWriter
 from rigidimeter.rig.acquisition.processes.end_signals import raise_flags
-from rigidimeter.rig.acquisition.processes.full_disk import FullDisk
-from rigidimeter.rig.acquisition.processes.recorder import Patience, Recorder, Recording
+from rigidimeter.rig.acquisition.processes.recorder import (
+    FullDisk,
+    Patience,
+    Recorder,
+    RecordingPlan,
+)
 from rigidimeter.rig.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.rig.acquisition.processes.shared_status import SharedStatus
-from rigidimeter.rig.acquisition.processes.status_values import Condition, Flag, Role
+from rigidimeter.rig.acquisition.processes.status_values import Flag, ProcessCondition, Role
 from rigidimeter.rig.acquisition.processes.watchdog import WatchedProcess
 
 
 def recorder_main(
-    recording: Recording, names: tuple[str, str, str], patience: Patience, console_pid: int
+    recording: RecordingPlan, names: tuple[str, str, str], patience: Patience, console_pid: int
 ) -> None:
     """Record until the session is closed; the target of the recorder's process.
 
     Parameters
     ----------
-    recording : Recording
+    recording : RecordingPlan
     names : tuple of str
         Of the sample ring, the event ring and the shared status.
     patience : Patience
@@ -50,15 +54,19 @@ def recorder_main(
     try:
         writer = recording.writer()
         status.show_folder(recording.folder)
-        status.set_condition(Role.RECORDER, Condition.READY, "")
+        status.set_condition(Role.RECORDER, ProcessCondition.READY, "")
         ended_well = _record(writer, recording, shared, patience, console_pid)
-        status.set_condition(Role.RECORDER, Condition.DONE if ended_well else Condition.FAILED)
+        status.set_condition(
+            Role.RECORDER, ProcessCondition.DONE if ended_well else ProcessCondition.FAILED
+        )
     except UserError as error:
-        status.set_condition(Role.RECORDER, Condition.FAILED, str(error))
+        status.set_condition(Role.RECORDER, ProcessCondition.FAILED, str(error))
         sys.exit(1)
     except BaseException as error:
         status.set_condition(
-            Role.RECORDER, Condition.FAILED, f"the recorder failed: {type(error).__name__}: {error}"
+            Role.RECORDER,
+            ProcessCondition.FAILED,
+            f"the recorder failed: {type(error).__name__}: {error}",
         )
         with suppress(OSError):
             traceback.print_exc()
@@ -126,7 +134,7 @@ class FsyncWorker:
 
 def _record(
     writer: SessionWriter,
-    recording: Recording,
+    recording: RecordingPlan,
     shared: SessionMemory,
     patience: Patience,
     console_pid: int,
@@ -150,7 +158,7 @@ def _record(
                     recorder.close(why)
                     recorder.drain()
                 disk.takes(recorder)
-                status.set_condition(Role.RECORDER, Condition.RUNNING, fsync_worker.error)
+                status.set_condition(Role.RECORDER, ProcessCondition.RUNNING, fsync_worker.error)
             except OSError as error:
                 disk.refuses(error)
                 moved = disk.other_folder()
@@ -167,7 +175,7 @@ def _record(
             if recorder.epoch_ended or now_s - synced_s >= patience.sync_s:
                 recorder.epoch_ended, synced_s = False, now_s
                 fsync_worker.ask(samples.recorded)
-            time.sleep(patience.look_s)
+            time.sleep(patience.poll_s)
     finally:
         fsync_worker.close()
 
@@ -186,7 +194,7 @@ def _synced(fsync_worker: FsyncWorker, shared: SessionMemory, patience: Patience
         time.sleep(0.005)
     status.set_condition(
         Role.RECORDER,
-        Condition.TROUBLE,
+        ProcessCondition.TROUBLE,
         f"{status.folder()}: is written, but the disk has not confirmed it",
     )
     return True
@@ -207,8 +215,8 @@ def _loop_lost(
         )
     # While it starts it may wait for devices, and nothing moves.
     limits_s = {
-        Condition.RUNNING: patience.loop_lost_s,
-        Condition.STOPPING: patience.stopping_s,
+        ProcessCondition.RUNNING: patience.loop_lost_s,
+        ProcessCondition.STOPPING: patience.stopping_s,
     }
     limit_s = limits_s.get(status.condition(Role.LOOP), math.inf)
     if status.age_s(Role.LOOP) > limit_s:

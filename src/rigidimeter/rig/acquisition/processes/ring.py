@@ -160,7 +160,7 @@ class SampleRing(_Ring):
                 rows[into : into + n] = np.frombuffer(self._bytes, ROW, n, offset)
         return rows
 
-    def kept(self) -> NDArray[np.void]:
+    def held_rows(self) -> NDArray[np.void]:
         """Return every row that is still there, once the writer has ended; the newest is last."""
         return self.rows(max(0, self.written - self.capacity), self.written)
 
@@ -180,22 +180,22 @@ class SampleReader:
         self._next = next_row
 
     def read(
-        self, most: int | None = None, *, recorded: bool = False
+        self, max_rows: int | None = None, *, recorded: bool = False
     ) -> tuple[NDArray[np.void], int]:
         """Return the rows since the last call, and how many before them were missed.
 
         Parameters
         ----------
-        most : int or None
-            Skip to the newest `most` rows; those skipped count as missed.
+        max_rows : int or None
+            Skip to the newest `max_rows` rows; those skipped count as missed.
         recorded : bool
             Of those alone that are in the file.
         """
         ring, before = self._ring, self._next
         written = ring.recorded if recorded else ring.written
         first = min(max(before, ring.written - ring.capacity + 1), written)
-        if most is not None:
-            first = max(first, written - most)
+        if max_rows is not None:
+            first = max(first, written - max_rows)
         rows = ring.rows(first, written)
         # What the writer has reached meanwhile, or is writing now, may be torn.
         safe = ring.written - ring.capacity + 1
@@ -243,11 +243,11 @@ class EventRing(_Ring):
             If the event is too long for a slot, or not what JSON can say.
         """
         line = json_line(event)
-        most = self._slot_bytes - self._head.size
-        if len(line) > most:
+        room = self._slot_bytes - self._head.size
+        if len(line) > room:
             raise ValueError(
                 f"event {event.get('event')} takes {len(line)} bytes; a slot of the ring holds "
-                f"{most}: leave out its longest facts, or make the slots larger"
+                f"{room}: leave out its longest facts, or make the slots larger"
             )
         words = self._words
         written = words[_WRITTEN]

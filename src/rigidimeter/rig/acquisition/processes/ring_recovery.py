@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,10 +33,10 @@ from rigidimeter.core.session import (
     read_manifest,
     scan_samples,
 )
-from rigidimeter.rig.acquisition.processes.recorder import Patience, Recording
+from rigidimeter.rig.acquisition.processes.recorder import Patience, RecordingPlan
 from rigidimeter.rig.acquisition.processes.ring import ROW, EventRing, SampleRing
 from rigidimeter.rig.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.rig.acquisition.processes.status_values import Condition, Role
+from rigidimeter.rig.acquisition.processes.status_values import ProcessCondition, Role
 from rigidimeter.rig.acquisition.processes.watchdog import WatchedProcess
 
 
@@ -108,20 +108,20 @@ def recover_from_rings(
 
 def complete(
     shared: SessionMemory,
-    recording: Recording,
+    recording: RecordingPlan,
     recorder: WatchedProcess,
     patience: Patience,
-    look: Callable[[], object],
+    follow: Callable[[], object],
 ) -> list[str]:
     """See the recorder to its end, and do its work if that is not a good one; return remarks.
 
     Parameters
     ----------
     shared : SessionMemory
-    recording : Recording
+    recording : RecordingPlan
     recorder : WatchedProcess
     patience : Patience
-    look : callable
+    follow : callable
         Called some twenty times a second meanwhile: the heart of whoever waits beats there.
     """
     remarks: list[str] = []
@@ -129,8 +129,12 @@ def complete(
     since_s = time.monotonic()
     hung = False
     # One that has done its work no longer beats, and may take a while to leave.
-    while recorder.alive() and not hung and status.condition(Role.RECORDER) is not Condition.DONE:
-        look()
+    while (
+        recorder.alive()
+        and not hung
+        and status.condition(Role.RECORDER) is not ProcessCondition.DONE
+    ):
+        follow()
         # A heart that beat before the wait began may have been silent for a good reason.
         silent_s = min(status.age_s(Role.RECORDER), time.monotonic() - since_s)
         hung = silent_s > patience.hung_s
@@ -141,7 +145,7 @@ def complete(
         until_s = time.monotonic() + 2.0
         while recorder.alive() and time.monotonic() < until_s:
             time.sleep(0.01)
-    if status.condition(Role.RECORDER) is Condition.DONE:
+    if status.condition(Role.RECORDER) is ProcessCondition.DONE:
         late = shared.samples.lag()
         if late:
             remarks.append(f"{late} samples came after the session was closed")
@@ -165,7 +169,7 @@ def _samples(path: Path, ring: SampleRing, tick_rate_hz: float, session_id: str)
     """Add the rows that the file has not; return how many."""
     content = path.read_bytes() if path.is_file() else b""
     before = scan_samples(content, path)
-    rows = ring.kept()
+    rows = ring.held_rows()
     if before.columns["tick"].size:
         rows = rows[rows["tick"] > before.columns["tick"][-1]]
     if rows.size:
@@ -195,7 +199,7 @@ def _append(log: SampleLog, rows: NDArray[np.void], tick_rate_hz: float) -> None
         batch = max(1, int(BATCH_S * tick_rate_hz))
         for first in range(0, rows.size, batch):
             some = rows[first : first + batch]
-            log.append_columns({name: some[name] for name in _names()})
+            log.append_columns({name: some[name] for name in ROW.names or ()})
         os.fsync(log.fileno())
     except OSError:
         os.ftruncate(log.fileno(), 0)  # so that it can be closed
@@ -217,9 +221,3 @@ def _lines(path: Path, ring: EventRing, session_id: str) -> list[bytes]:
         ring.recorded += 1
         return waiting[1:]
     return waiting
-
-
-def _names() -> Sequence[str]:
-    names = ROW.names
-    assert names is not None
-    return names

@@ -17,8 +17,8 @@ from rigidimeter.rig.acquisition.processes.shared_status import Nanoseconds
 from rigidimeter.rig.acquisition.processes.status_values import (
     PAUSE_NEXT,
     STOP_NEXT,
-    Condition,
     LoopStatus,
+    ProcessCondition,
     Role,
 )
 from rigidimeter.rig.guard import Cause
@@ -77,7 +77,7 @@ class RingSink:
     def _show(self, sample: Sample) -> None:
         if not self._begun:
             self._begun = True
-            self._status.set_condition(Role.LOOP, Condition.RUNNING)
+            self._status.set_condition(Role.LOOP, ProcessCondition.RUNNING)
         loop = self._loop
         self._status.show_loop(
             LoopStatus(
@@ -124,7 +124,7 @@ class RingSink:
     def _stopping(self) -> None:
         """Say that no more ticks are due: what follows may take longer than a tick may."""
         self._status.beat(Role.LOOP)
-        self._status.set_condition(Role.LOOP, Condition.STOPPING)
+        self._status.set_condition(Role.LOOP, ProcessCondition.STOPPING)
 
     def close(self, time_s: float, outcome: Ending, reason: str) -> None:
         """Close the session with its outcome; only the first time counts."""
@@ -152,7 +152,7 @@ class SharedSupervision:
         An older heartbeat of the console is a cause to stop: a dead-man's switch.
     recorder_lost_s : float
         The same for the recorder. It may be long: what is not in the file stays in the ring.
-    most_lag : int
+    max_lag : int
         More samples than that waiting for the recorder are a cause to stop: it lives, but the disk
         takes nothing, or too little. Half of what the ring holds if not given.
     stall_s : float
@@ -172,7 +172,7 @@ class SharedSupervision:
         *,
         console_lost_s: float = 0.5,
         recorder_lost_s: float = 2.0,
-        most_lag: int | None = None,
+        max_lag: int | None = None,
         stall_s: float = 0.1,
         attended: bool = True,
         console_pid: int = 0,
@@ -186,7 +186,7 @@ class SharedSupervision:
         self._status, self._samples = shared.status, shared.samples
         self._console_ns = round(1e9 * console_lost_s)
         self._recorder_ns = round(1e9 * recorder_lost_s)
-        self._most_lag = shared.samples.capacity // 2 if most_lag is None else most_lag
+        self._max_lag = shared.samples.capacity // 2 if max_lag is None else max_lag
         self._now_ns, self._boot_ns = now_ns, boot_ns
         # The clock that goes on is read first: what goes by between the two readings makes the
         # difference smaller, and so never looks like a suspension.
@@ -218,7 +218,7 @@ class SharedSupervision:
         if now_ns - words[recorder] > self._recorder_ns:
             self.measured = 1e-9 * (now_ns - words[recorder])
             return _RECORDER_LOST
-        if self._samples.lag() > self._most_lag:
+        if self._samples.lag() > self._max_lag:
             self.measured = float(self._samples.lag())
             return _RECORD_OVERFLOW
         return _NONE

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from rigidimeter.rig.acquisition.processes.ring import EventRing, SampleRing
 from rigidimeter.rig.acquisition.processes.shared_memory import WHERE, Memory, new_name
 from rigidimeter.rig.acquisition.processes.shared_status import SharedStatus
-from rigidimeter.rig.acquisition.processes.status_values import Condition, Role
+from rigidimeter.rig.acquisition.processes.status_values import ProcessCondition, Role
 
 PARTS = ("-samples", "-events", "-status")
 """What the names of the three end with; they begin alike."""
@@ -68,7 +68,7 @@ class SessionMemory:
 
     def needed(self) -> bool:
         """Whether it holds what is in no file: samples or events of a record that is not closed."""
-        if self.status.condition(Role.RECORDER) is Condition.DONE:
+        if self.status.condition(Role.RECORDER) is ProcessCondition.DONE:
             return False
         return self.samples.lag() > 0 or self.events.lag() > 0
 

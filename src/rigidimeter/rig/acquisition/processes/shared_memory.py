@@ -55,8 +55,8 @@ class Memory:
         fcntl.flock(descriptor, fcntl.LOCK_SH)
         self._map = mmap.mmap(descriptor, 0)
         self.bytes = memoryview(self._map)
-        whole = len(self.bytes) // 8 * 8
-        self._part = self.bytes[:whole]
+        aligned = len(self.bytes) // 8 * 8
+        self._part = self.bytes[:aligned]
         self.words: memoryview[int] = self._part.cast("q")
         self.closed = False
 

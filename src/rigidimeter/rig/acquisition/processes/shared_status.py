@@ -23,10 +23,10 @@ from pathlib import Path
 from rigidimeter.rig.acquisition import NOTHING, Command, Order
 from rigidimeter.rig.acquisition.processes.shared_memory import Memory
 from rigidimeter.rig.acquisition.processes.status_values import (
-    Condition,
     Flag,
     LiveEstimate,
     LoopStatus,
+    ProcessCondition,
     Role,
 )
 
@@ -169,26 +169,28 @@ class SharedStatus:
         """Come in as one of the processes."""
         self._words[_PIDS + role] = os.getpid()
         self.beat(role)
-        self.set_condition(role, Condition.STARTING)
+        self.set_condition(role, ProcessCondition.STARTING)
 
     def pid(self, role: Role) -> int:
         """Return the id of a process, 0 if it never came in."""
         return self._words[_PIDS + role]
 
-    def set_condition(self, role: Role, condition: Condition, note: str | None = None) -> None:
+    def set_condition(
+        self, role: Role, condition: ProcessCondition, note: str | None = None
+    ) -> None:
         """Say how a process is, with a sentence for the operator where there is one."""
         if note is not None:
             text = note.encode()[:NOTE_BYTES]
             self._notes[role].write(len(text), text)
         self._words[_CONDITIONS + role] = condition
 
-    def condition(self, role: Role) -> Condition:
+    def condition(self, role: Role) -> ProcessCondition:
         """Return how a process last said it is."""
-        return Condition(self._words[_CONDITIONS + role])
+        return ProcessCondition(self._words[_CONDITIONS + role])
 
     def ended(self, role: Role, lost_s: float) -> bool:
         """Whether a process is done, or loop and recorder were both silent for `lost_s`."""
-        if self.condition(role) in (Condition.DONE, Condition.FAILED):
+        if self.condition(role) in (ProcessCondition.DONE, ProcessCondition.FAILED):
             return True
         return min(self.age_s(Role.LOOP), self.age_s(Role.RECORDER)) > lost_s
 

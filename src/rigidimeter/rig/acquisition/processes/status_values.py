@@ -18,7 +18,7 @@ class Role(IntEnum):
     ESTIMATOR = 3
 
 
-class Condition(IntEnum):
+class ProcessCondition(IntEnum):
     """How a process is.
 
     TROUBLE: it goes on trying, and its note says at what. FAILED: it has given up.

@@ -30,17 +30,17 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import EVENTS, read_events
 from rigidimeter.rig.acquisition.processes.end_signals import held_back, signals_are_orders
 from rigidimeter.rig.acquisition.processes.loop_process import LoopTarget, Realtime, loop_main
-from rigidimeter.rig.acquisition.processes.recorder import Patience, Recording
+from rigidimeter.rig.acquisition.processes.recorder import Patience, RecordingPlan
 from rigidimeter.rig.acquisition.processes.recorder_process import recorder_main
 from rigidimeter.rig.acquisition.processes.ring_recovery import Recovered, complete
 from rigidimeter.rig.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.rig.acquisition.processes.shared_status import SharedStatus
-from rigidimeter.rig.acquisition.processes.status_values import Condition, Flag, Role
+from rigidimeter.rig.acquisition.processes.status_values import Flag, ProcessCondition, Role
 from rigidimeter.rig.acquisition.processes.watchdog import WatchedProcess
 
 RING_S = 60.0
 """For how long the recorder may write nothing before samples are lost."""
-LOOK_S = 0.05
+POLL_S = 0.05
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Ended:
 
 def supervise(
     target: LoopTarget,
-    recording: Recording,
+    recording: RecordingPlan,
     *,
     realtime: Realtime | None = None,
     patience: Patience | None = None,
@@ -94,7 +94,7 @@ def supervise(
     ----------
     target : callable
         Runs in the loop's process.
-    recording : Recording
+    recording : RecordingPlan
     realtime : Realtime
     patience : Patience
     console : callable
@@ -142,11 +142,11 @@ def supervise(
             if recording.settings.sharing.lsl:
                 sending = (recording.settings, shared.names, patience.stopping_s, me)
                 streamer = start("lsl", _streamer_main, *sending)
-            look = _Look(shared, console, operator_seen_ns or time.monotonic_ns)
-            remarks = _see_through(loop, recorder, status, patience, look)
+            follow = _Follower(shared, console, operator_seen_ns or time.monotonic_ns)
+            remarks = _see_through(loop, recorder, status, patience, follow)
             recorder_watch = WatchedProcess(recorder.pid or 0)
             try:
-                remarks += complete(shared, recording, recorder_watch, patience, look)
+                remarks += complete(shared, recording, recorder_watch, patience, follow)
             finally:
                 recorder_watch.close()
             for process in filter(None, (estimator, streamer)):
@@ -164,7 +164,7 @@ def supervise(
                 loop.exitcode,
                 shared.samples.written,
                 recovered,
-                (*look.remarks, *remarks),
+                (*follow.remarks, *remarks),
                 signals,
             )
         finally:
@@ -175,7 +175,7 @@ def supervise(
             shared.leave()
 
 
-class _Look:
+class _Follower:
     """Keeps the console's heart beating and shows the session; an error in it ends the session."""
 
     def __init__(
@@ -204,12 +204,12 @@ class _Look:
 def _await_recorder(recorder: BaseProcess, status: SharedStatus) -> None:
     """Wait until the session folder is made."""
     until_s = time.monotonic() + 60.0
-    while status.condition(Role.RECORDER) in (Condition.ABSENT, Condition.STARTING):
+    while status.condition(Role.RECORDER) in (ProcessCondition.ABSENT, ProcessCondition.STARTING):
         status.beat(Role.CONSOLE)
         if not recorder.is_alive() or time.monotonic() > until_s:
             break
         time.sleep(0.01)
-    if status.condition(Role.RECORDER) not in (Condition.READY, Condition.RUNNING):
+    if status.condition(Role.RECORDER) not in (ProcessCondition.READY, ProcessCondition.RUNNING):
         raise UserError(status.note(Role.RECORDER) or "the recorder's process did not start")
 
 
@@ -218,24 +218,24 @@ def _see_through(
     recorder: BaseProcess,
     status: SharedStatus,
     patience: Patience,
-    look: Callable[[], object],
+    follow: Callable[[], object],
 ) -> list[str]:
     """Keep the operator's heart beating until the loop has ended; return remarks."""
     remarks: list[str] = []
-    recorder_told = False
+    recorder_warned = False
     while loop.is_alive():
-        look()
+        follow()
         if (
-            not recorder_told
+            not recorder_warned
             and not recorder.is_alive()
-            and status.condition(Role.RECORDER) is not Condition.DONE
+            and status.condition(Role.RECORDER) is not ProcessCondition.DONE
         ):
-            recorder_told = True
+            recorder_warned = True
             remarks.append(f"the recorder ended while the loop ran ({_how(recorder)})")
         # The recorder ends a loop that no longer answers; this is for where it cannot.
         limits_s = {
-            Condition.RUNNING: 2 * patience.loop_lost_s,
-            Condition.STOPPING: patience.hung_s,
+            ProcessCondition.RUNNING: 2 * patience.loop_lost_s,
+            ProcessCondition.STOPPING: patience.hung_s,
         }
         limit_s = limits_s.get(status.condition(Role.LOOP), math.inf)
         if status.age_s(Role.LOOP) > limit_s:
@@ -243,7 +243,7 @@ def _see_through(
             loop.kill()
             loop.join(1.0)
             break
-        loop.join(LOOK_S)
+        loop.join(POLL_S)
     if loop.exitcode:
         remarks.append(f"the loop's process ended badly ({_how(loop)})")
     return remarks

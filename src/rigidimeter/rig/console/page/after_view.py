@@ -1,4 +1,8 @@
-"""The part of the page after a session: the sessions of the folder, their epochs, what to do."""
+"""The part of the page after a session: the sessions of the folder, their epochs, what to do.
+
+What changes is changed in place, so that no click on a row is lost while a list is brought up to
+date.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,7 @@ import json
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,25 +18,22 @@ from nicegui import ui
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.rig.console.page.button_words import in_buttons, unfinished_words
-from rigidimeter.rig.console.page.desk import Desk, StartRequest
-from rigidimeter.rig.console.page.entered import line
-from rigidimeter.rig.console.page.kept_study import extended
-from rigidimeter.rig.console.page.recorded_traces import epoch_traces
-from rigidimeter.rig.console.page.report_files import (
+from rigidimeter.rig.console.page.form_values import parse_line
+from rigidimeter.rig.console.page.jobs import Jobs
+from rigidimeter.rig.console.page.recorded_traces import epoch_panes
+from rigidimeter.rig.console.page.server_state import ServerState, StartRequest
+from rigidimeter.rig.console.page.sessions_found import (
     OF_STUDY,
     PAGE,
+    FoundEpoch,
+    FoundSession,
+    exclude,
+    extended,
+    found_sessions,
     report_file,
     report_folder,
     report_link,
 )
-from rigidimeter.rig.console.page.session_rows import Acts, SessionRow
-from rigidimeter.rig.console.page.sessions_found import (
-    FoundEpoch,
-    FoundSession,
-    exclude,
-    found_sessions,
-)
-from rigidimeter.rig.console.page.work import Work
 
 FOLLOW_S = 0.2
 """How often it is looked whether a session has ended."""
@@ -42,8 +44,8 @@ class AfterView:
 
     Parameters
     ----------
-    desk : Desk
-    work : Work
+    state : ServerState
+    jobs : Jobs
     in_control : callable
         Whether the page may act.
     notice : label
@@ -51,11 +53,15 @@ class AfterView:
     """
 
     def __init__(
-        self, desk: Desk, work: Work, in_control: Callable[[], bool], notice: ui.label
+        self,
+        state: ServerState,
+        jobs: Jobs,
+        in_control: Callable[[], bool],
+        notice: ui.label,
     ) -> None:
-        self._desk, self._work, self._in_control = desk, work, in_control
+        self._state, self._jobs, self._in_control = state, jobs, in_control
         self._notice = notice
-        self._root = desk.place.root
+        self._root = state.place.root
         self._shown = -1
         self._ran = False
         self._computing = False
@@ -63,13 +69,13 @@ class AfterView:
         self._acts = Acts(
             recover=self._recover,
             run_rest=self._run_rest,
-            estimate=self._estimate,
+            estimate=lambda one: self._command("estimate", one.name, *one.options),
             report=self._report,
             show=self._show,
             repeat=self._repeat,
             leave_out=self._ask_reason,
         )
-        several = not desk.place.one_session
+        several = not state.place.one_session
         ui.label(f"Sessions in {self._root}").classes("text-lg")
         self._title = ui.input("Title of the report of the study", value=self._root.name)
         self._title.classes("entry").props("maxlength=120 data-field=title")
@@ -91,12 +97,12 @@ class AfterView:
 
     def _follow(self) -> None:
         """Fold the list when a session begins; when it has ended, list it and unfold it."""
-        began, self._ran = self._desk.in_session and not self._ran, self._desk.in_session
+        began, self._ran = (self._state.in_session and not self._ran, self._state.in_session)
         if began:
             for row in self._rows.values():
                 row.frame.close()
-        finished = self._desk.finished
-        if finished is not None and finished.number != self._shown and not self._desk.busy:
+        finished = self._state.finished
+        if finished is not None and finished.number != self._shown and not self._state.busy:
             self._shown = finished.number
             self._update()
             if finished.folder.name in self._rows:
@@ -112,7 +118,7 @@ class AfterView:
                 ui.label(in_buttons(problem)).classes("problem")
         self._none.set_visibility(not sessions)
         self._study.set_visibility(bool(sessions))
-        if not self._desk.place.one_session:
+        if not self._state.place.one_session:
             self._study_link.set_visibility(self._reported(OF_STUDY))
         for gone in self._rows.keys() - {session.name for session in sessions}:
             self._rows.pop(gone).frame.delete()
@@ -131,7 +137,7 @@ class AfterView:
 
     def _may_act(self) -> bool:
         self._follow()  # what is left of a session is what is left now
-        if self._in_control() and not self._desk.busy:
+        if self._in_control() and not self._state.busy:
             return True
         ui.notify("not while a session runs, and only on the page in control")
         return False
@@ -151,7 +157,7 @@ class AfterView:
 
     def _run(self, session: str, **what: Any) -> None:
         folder = f"{session.rpartition('-')[0] or session}-{time.strftime('%H%M%S')}"
-        self._desk.ask(StartRequest(folder, resume=session, **what))
+        self._state.ask(StartRequest(folder, resume=session, **what))
 
     def _ask_reason(self, session: FoundSession, epoch: FoundEpoch) -> None:
         """Leave an epoch out, after asking for a reason and a name."""
@@ -180,13 +186,9 @@ class AfterView:
         """Close the record of an interrupted session."""
         if not await self._command("recover", session.name):
             return
-        for said in extended(self._desk.place):
-            ui.notify(said)
+        for text in extended(self._state.place):
+            ui.notify(text)
         self._update()
-
-    async def _estimate(self, session: FoundSession) -> None:
-        """Estimate J, B and K of each epoch."""
-        await self._command("estimate", session.name, *session.options)
 
     async def _report(self, session: FoundSession) -> None:
         """Make the report of a session."""
@@ -197,7 +199,7 @@ class AfterView:
     async def _study_report(self) -> None:
         """Report the study; of blinded sessions only after a warning, since it names conditions."""
         try:
-            title = line(str(self._title.value or ""), "title", 120)
+            title = parse_line(str(self._title.value or ""), "title", 120)
         except UserError as error:
             ui.notify(str(error))
             return
@@ -231,7 +233,7 @@ class AfterView:
         self._computing = True
         self._answer.set_content("<p>computing …</p>")
         try:
-            answer = await self._work.command(command, str(self._root / session), *options)
+            answer = await self._jobs.command(command, str(self._root / session), *options)
         finally:
             self._computing = False
         self._answer.set_content(answer.html())
@@ -239,16 +241,16 @@ class AfterView:
 
     async def _show(self, session: FoundSession, epoch: FoundEpoch) -> None:
         """Draw an epoch: raw signals, and measured and modelled torque with their difference."""
-        if self._desk.busy:
+        if self._state.busy:
             ui.notify("not while a session runs")
             return
         folder = self._root / session.name
         self._answer.set_content("<p>reading …</p>")
         with tempfile.TemporaryDirectory(prefix="rigidimeter-epoch-") as name:
             fitted = Path(name) / "torque.csv"
-            await self._work.command("estimate", str(folder), "--subject-torque", str(fitted))
+            await self._jobs.command("estimate", str(folder), "--subject-torque", str(fitted))
             try:
-                panes: list[dict[str, Any]] = epoch_traces(folder, epoch.label, fitted)
+                panes: list[dict[str, Any]] = epoch_panes(folder, epoch.label, fitted)
             except UserError as error:
                 self._answer.set_content("")
                 ui.notify(str(error))
@@ -256,3 +258,93 @@ class AfterView:
         self._answer.set_content("")
         title = json.dumps(f"{session.name}, epoch {epoch.label}")
         ui.run_javascript(f"rigEpoch({title}, {json.dumps(panes)})")
+
+
+@dataclass(frozen=True)
+class Acts:
+    """What the buttons of a row do, with the session as it was last found."""
+
+    recover: Callable[[FoundSession], Any]
+    run_rest: Callable[[FoundSession], Any]
+    estimate: Callable[[FoundSession], Any]
+    report: Callable[[FoundSession], Any]
+    show: Callable[[FoundSession, FoundEpoch], Any]
+    repeat: Callable[[FoundSession, FoundEpoch], Any]
+    leave_out: Callable[[FoundSession, FoundEpoch], Any]
+
+
+class SessionRow:
+    """The row of a session, made in the present container.
+
+    Parameters
+    ----------
+    acts : Acts
+    session : FoundSession
+
+    Attributes
+    ----------
+    session : FoundSession
+        As it was last found.
+    frame : expansion
+        What is unfolded.
+    """
+
+    def __init__(self, acts: Acts, session: FoundSession) -> None:
+        self._acts, self.session = acts, session
+        self._epochs: dict[str, _EpochRow] = {}
+        self.frame = ui.expansion().classes("w-full session")
+        with self.frame:
+            self._reason = ui.label()
+            with ui.row():
+                self._recover = self._button("Recover", acts.recover)
+                self._rest = self._button("", acts.run_rest)
+                self._button("Estimate", acts.estimate)
+                self._button("Report", acts.report)
+                target = report_link(report_folder(session.name))
+                self._link = ui.link("Open its report", target, new_tab=True)
+
+    def _button(self, words: str, act: Callable[[FoundSession], Any]) -> ui.button:
+        return ui.button(words, on_click=lambda: act(self.session))
+
+    def show(self, session: FoundSession, *, reported: bool) -> None:
+        """Show what is known of the session now."""
+        self.session = session
+        how = session.outcome or session.reason
+        self.frame.text = f"{session.name}: {session.good} of {session.planned} epochs good, {how}"
+        _show(self._reason, in_buttons(session.reason))
+        self._recover.set_visibility(not session.outcome and not session.recording)
+        _show(self._rest, f"Run what is left: {len(session.left)}" if session.left else "")
+        self._link.set_visibility(reported)
+        for epoch in session.epochs:
+            if epoch.label not in self._epochs:
+                with self.frame:
+                    self._epochs[epoch.label] = _EpochRow(self._acts)
+            self._epochs[epoch.label].show(session, epoch)
+
+
+class _EpochRow:
+    def __init__(self, acts: Acts) -> None:
+        with ui.row().classes("items-center w-full"):
+            self._words = ui.label().classes("grow")
+            self._button("Show", acts.show)
+            self._repeat = self._button("Repeat", acts.repeat)
+            self._leave_out = self._button("Leave out", acts.leave_out)
+
+    def _button(self, words: str, act: Callable[[FoundSession, FoundEpoch], Any]) -> ui.button:
+        return ui.button(words, on_click=lambda: act(*self._found))
+
+    def show(self, session: FoundSession, epoch: FoundEpoch) -> None:
+        self._found = session, epoch
+        parts = [f"epoch {epoch.label}", epoch.condition, epoch.task, epoch.outcome, epoch.reason]
+        if epoch.rating:
+            parts.append(f"rated {epoch.rating}")
+        if epoch.excluded:
+            parts.append(f"left out: {epoch.excluded}")
+        self._words.text = " · ".join(filter(None, parts))
+        self._repeat.set_visibility(bool(session.outcome))
+        self._leave_out.set_visibility(not epoch.excluded)
+
+
+def _show(at: ui.label | ui.button, words: str) -> None:
+    at.text = words
+    at.set_visibility(bool(words))

@@ -12,18 +12,19 @@ from typing import Any
 from nicegui import ui
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import read_json, toml_text, write_json
+from rigidimeter.core.files import read_json, read_toml, toml_text, write_json
 from rigidimeter.core.session import count_epochs
-from rigidimeter.core.settings import Settings, dump_settings
-from rigidimeter.rig.console.page.desk import Desk, StartRequest
+from rigidimeter.core.settings import Settings, dump_settings, load_settings
+from rigidimeter.core.study_files import STUDY_FILE
+from rigidimeter.rig.console.page.jobs import Jobs
 from rigidimeter.rig.console.page.prediction import dry_run_lines, prediction_lines
-from rigidimeter.rig.console.page.protocols import protocol_names, read_protocol
-from rigidimeter.rig.console.page.rig_steps import refusal
+from rigidimeter.rig.console.page.rig_steps import start_refusal
 from rigidimeter.rig.console.page.rig_view import RigView
+from rigidimeter.rig.console.page.server_state import ServerState, StartRequest
 from rigidimeter.rig.console.page.session_form import (
     BLINDED,
+    MAX_BLOCKS,
     METADATA,
-    MOST_BLOCKS,
     NOTE,
     SETTINGS,
     STIMULATION,
@@ -33,13 +34,16 @@ from rigidimeter.rig.console.page.session_form import (
     block_form,
     blocks_of,
     empty_form,
-    kept_form,
     read_form,
+    restored_form,
 )
-from rigidimeter.rig.console.page.work import Work
 
 DRAFT = "draft.json"
 DETECTED = ("--detect", "damping=20%", "--detect", "stiffness=20%")
+
+MAX_FILES = 100
+OF_A_RIG = ("torque_sensor", "drive")
+"""Tables that a rig file has, and no protocol."""
 
 
 class BeforeView:
@@ -47,19 +51,19 @@ class BeforeView:
 
     Parameters
     ----------
-    desk : Desk
-    work : Work
+    state : ServerState
+    jobs : Jobs
     in_control : callable
         Whether the page may act.
     """
 
-    def __init__(self, desk: Desk, work: Work, in_control: Callable[[], bool]) -> None:
-        self._desk, self._work, self._in_control = desk, work, in_control
-        self._base = desk.place.settings
-        self._form = kept_form(_stored(desk.place.root / DRAFT), self._base)
+    def __init__(self, state: ServerState, jobs: Jobs, in_control: Callable[[], bool]) -> None:
+        self._state, self._jobs, self._in_control = state, jobs, in_control
+        self._base = state.place.settings
+        self._form = restored_form(_stored(state.place.root / DRAFT), self._base)
         self._inputs: dict[str, Any] = {}
         self._entered: EnteredSession | None = None
-        place = desk.place
+        place = state.place
         rig = "the virtual rig" if place.rig is None else place.rig.name
         with ui.row().classes("w-full items-center"):
             ui.label(f"Rig: {rig}. Protocol: {place.settings_name}.").classes("text-lg").mark(
@@ -71,8 +75,10 @@ class BeforeView:
                 chosen.classes("entry").mark("protocol")
                 chosen.on_value_change(lambda event: self._choose(str(event.value or "")))
         self._wrong_file = ui.label("").classes("problem").props('role="alert"')
-        self._not_kept = ui.label("").classes("problem").props('role="alert"')
-        self._rig = RigView(desk, work, self._may_act, in_control, self._settings, self._show_steps)
+        self._not_stored = ui.label("").classes("problem").props('role="alert"')
+        self._rig = RigView(
+            state, jobs, self._may_act, in_control, self._settings, self._show_steps
+        )
         with ui.row().classes("w-full"):
             for one in (*METADATA, NOTE):
                 self._input(one)
@@ -108,7 +114,7 @@ class BeforeView:
 
     def _choose(self, name: str) -> None:
         """Begin the form anew with another protocol; of a wrong one the page says what is wrong."""
-        place = self._desk.place
+        place = self._state.place
         if not name or not self._may_act():
             return
         try:
@@ -117,8 +123,10 @@ class BeforeView:
             self._wrong_file.text = f"{error}. The form is still that of {place.settings_name}."
             return
         path = place.protocols / name
-        self._desk.place = replace(place, settings=settings, settings_name=name, settings_path=path)
-        self._keep(kept_form(self._form, settings))
+        self._state.place = replace(
+            place, settings=settings, settings_name=name, settings_path=path
+        )
+        self._store(restored_form(self._form, settings))
         ui.navigate.reload()
 
     def _input(self, one: Field) -> None:
@@ -144,10 +152,10 @@ class BeforeView:
                     label="Task",
                 ).classes("entry")
                 task.on_value_change(lambda event, k=k: self._change(f"task{k}", event.value))
-                self._input(Field(f"condition{k}", "Condition, or its code"))
+                self._input(Field(f"condition{k}", "ProcessCondition, or its code"))
                 self._input(Field(f"epochs{k}", "Epochs"))
         with ui.row():
-            if len(blocks) < MOST_BLOCKS:
+            if len(blocks) < MAX_BLOCKS:
                 ui.button("Add a block", on_click=self._add)
             if len(blocks) > 1:
                 ui.button("Remove the last block", on_click=self._remove)
@@ -178,15 +186,15 @@ class BeforeView:
         self._form[key] = str(value or "")[:400]
         self._check()
         if self._in_control():
-            self._keep(self._form)
+            self._store(self._form)
 
-    def _keep(self, form: Mapping[str, str]) -> None:
+    def _store(self, form: Mapping[str, str]) -> None:
         """Keep the form for a reload; say why where that is not possible."""
         try:
-            write_json(self._desk.place.root / DRAFT, form)
-            self._not_kept.text = ""
+            write_json(self._state.place.root / DRAFT, form)
+            self._not_stored.text = ""
         except UserError as error:
-            self._not_kept.text = f"A reload would empty this form: {error}"
+            self._not_stored.text = f"A reload would empty this form: {error}"
 
     def _check(self) -> None:
         """Say under each field what is wrong with it."""
@@ -202,13 +210,13 @@ class BeforeView:
 
     def _show_steps(self) -> None:
         """Show the steps for what was entered, and why a session cannot start."""
-        if self._desk.busy or self._entered is None:
+        if self._state.busy or self._entered is None:
             return
-        steps = self._work.rig_steps(
-            self._entered.settings or self._base, self._desk.place.settings_path
+        steps = self._jobs.rig_steps(
+            self._entered.settings or self._base, self._state.place.settings_path
         )
         self._rig.show(steps)
-        why = refusal(steps)
+        why = start_refusal(steps)
         self._refused.text = f"No session can start: {why}." if why else ""
         self._start.set_enabled(not self._entered.errors and not why)
 
@@ -218,7 +226,7 @@ class BeforeView:
     def _may_act(self) -> bool:
         if not self._in_control():
             ui.notify("this page can only look: another one has control")
-        elif self._desk.busy:
+        elif self._state.busy:
             ui.notify("not while a session runs or the rig is checked")
         else:
             return True
@@ -233,9 +241,9 @@ class BeforeView:
         now = time.localtime()
         folder = f"{entered.subject}-{time.strftime('%Y%m%d-%H%M%S', now)}"
         request = StartRequest(
-            self._desk.place.one_session or folder, entered.settings, entered.about
+            self._state.place.one_session or folder, entered.settings, entered.about
         )
-        self._desk.ask(request)
+        self._state.ask(request)
 
     async def _predict(self) -> None:
         """Say what the session would tell, and what to change."""
@@ -274,14 +282,14 @@ class BeforeView:
             folder = Path(name)
             path = folder / "protocol.toml"
             path.write_text(toml_text(dump_settings(settings)), encoding="utf-8")
-            answer = await self._work.command(
+            answer = await self._jobs.command(
                 *command, "--settings", str(path), *options, folder=folder
             )
             try:
-                said = lines(folder, settings)
+                texts = lines(folder, settings)
             except UserError as error:
-                said = [str(error)]
-        self._answer.set_content(answer.html(name, said))
+                texts = [str(error)]
+        self._answer.set_content(answer.html(name, texts))
 
 
 def _stored(path: Path) -> Any:
@@ -290,3 +298,34 @@ def _stored(path: Path) -> Any:
         return read_json(path) if path.is_file() else None
     except UserError:
         return None
+
+
+def protocol_names(folder: Path) -> list[str]:
+    """Return the names of the TOML files of a folder that can be protocols, or are damaged."""
+    here = folder.resolve()
+    found = sorted(path for path in folder.glob("*.toml") if path.resolve().parent == here)
+    return [path.name for path in found[:MAX_FILES] if path.is_file() and _may_be_one(path)]
+
+
+def read_protocol(folder: Path, name: str) -> Settings:
+    """Return the settings of a protocol file of the folder.
+
+    Raises
+    ------
+    UserError
+        If it is none of them, or wrong.
+    """
+    names = protocol_names(folder)
+    if name not in names:
+        known = ", ".join(names) or "none"
+        raise UserError(f"{name[:100]}: is no protocol file of {folder}; there are: {known}")
+    return load_settings(folder / name)
+
+
+def _may_be_one(path: Path) -> bool:
+    if path.name == STUDY_FILE:
+        return False
+    try:
+        return not any(table in read_toml(path) for table in OF_A_RIG)
+    except UserError:
+        return True

@@ -1,4 +1,4 @@
-"""What is said on the page names its buttons, where a terminal names commands."""
+"""What the page says names its buttons, where a terminal names commands."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from rigidimeter.rig.console.page.sessions_found import FoundSession
 
-_MOST = 3
+_MAX_TEXTS = 3
 
 _BUTTONS = (
     (re.compile(r"`rigidimeter run --resume[^`]*`"), "“Run what is left” under After"),
@@ -54,10 +54,10 @@ def next_buttons(*, closed: bool, good: int, left: int) -> str:
 
 def unfinished_words(sessions: Sequence[FoundSession]) -> str:
     """Return which sessions were interrupted or have epochs left, and what to do about it."""
-    said = []
+    texts = []
     for one in (each for each in sessions if each.unfinished):
         done = f"{one.name}: {one.good} of {one.planned} epochs are good"
         button = "“Run what is left”" if one.outcome else "it was interrupted; “Recover”"
-        said.append(f"{done}, {button} under After.")
-    more = f" {len(said) - _MOST} more are unfinished." if len(said) > _MOST else ""
-    return " ".join(said[:_MOST]) + more
+        texts.append(f"{done}, {button} under After.")
+    more = f" {len(texts) - _MAX_TEXTS} more are unfinished." if len(texts) > _MAX_TEXTS else ""
+    return " ".join(texts[:_MAX_TEXTS]) + more

@@ -19,12 +19,18 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from rigidimeter.core.files import json_line
 from rigidimeter.rig.acquisition import Command, Order
-from rigidimeter.rig.acquisition.processes import Condition, Flag, Role, SessionMemory
+from rigidimeter.rig.acquisition.processes import Flag, ProcessCondition, Role, SessionMemory
 from rigidimeter.rig.console import BandTorque, Observer, TraceReader, save_to
-from rigidimeter.rig.console.page.desk import Desk, RunningSession
-from rigidimeter.rig.console.page.kept_study import off_scale
-from rigidimeter.rig.console.page.page_messages import Message, RefusedMessage, parse_message
-from rigidimeter.rig.console.page.session_state import is_known, points, session_state
+from rigidimeter.rig.console.page.page_messages import (
+    PageMessage,
+    RefusedMessage,
+    is_known,
+    parse_message,
+    points,
+    session_state,
+)
+from rigidimeter.rig.console.page.server_state import RunningSession, ServerState
+from rigidimeter.rig.console.page.sessions_found import off_scale
 
 FRAME_S = 1 / 30
 """How often samples are sent."""
@@ -35,14 +41,14 @@ POINTS_PER_S = 125.0
 STATE_FRAMES = 3
 """Every so many frames the state is sent."""
 
-MOST_WAITING = 30
+MAX_WAITING = 30
 """Frames that wait for a slow page; older ones are dropped."""
 
-MOST_PAGES = 8
-MOST_KNOWN = 1000
+MAX_PAGES = 8
+MAX_KNOWN = 1000
 """Pages that were sent and may open a socket; the oldest are forgotten."""
 
-MOST_NOTES = 20
+MAX_NOTES = 20
 """Notes that wait for the loop to take them."""
 
 _HELLO_S = 5.0
@@ -56,10 +62,10 @@ class OpenPage:
 
     socket: WebSocket
     secret: str
-    waiting: deque[bytes | str] = field(default_factory=lambda: deque(maxlen=MOST_WAITING))
+    waiting: deque[bytes | str] = field(default_factory=lambda: deque(maxlen=MAX_WAITING))
     wake: asyncio.Event = field(default_factory=asyncio.Event)
 
-    def tell(self, frame: bytes | str) -> None:
+    def send(self, frame: bytes | str) -> None:
         """Send a frame soon; of those that wait too long the oldest is dropped."""
         self.waiting.append(frame)
         self.wake.set()
@@ -85,10 +91,10 @@ class _Attached:
 
     def state(self) -> dict[str, Any]:
         live = self.memory.status.live()
-        facts = self._observer.look()
+        facts = self._observer.facts_now()
         # Of the epoch in which J, B and K are known, and of no other.
         self._known_since_s = live.since_s if live is not None and is_known(facts) else math.nan
-        full = self.memory.status.condition(Role.RECORDER) is Condition.TROUBLE
+        full = self.memory.status.condition(Role.RECORDER) is ProcessCondition.TROUBLE
         state = session_state(facts, self._observer.progress)
         return state | {"number": self.running.number, "save": full}
 
@@ -102,14 +108,14 @@ class LiveSockets:
 
     Parameters
     ----------
-    desk : Desk
+    state : ServerState
     """
 
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, state: ServerState) -> None:
+        self._state = state
         self._pages: set[OpenPage] = set()
         self._attached: _Attached | None = None
-        self._known: deque[str] = deque(maxlen=MOST_KNOWN)
+        self._known: deque[str] = deque(maxlen=MAX_KNOWN)
 
     def admit(self, secret: str) -> None:
         """Let a page come that was just sent; the secret is its own."""
@@ -123,17 +129,22 @@ class LiveSockets:
         except (RefusedMessage, TimeoutError, WebSocketDisconnect, KeyError):
             await _close(socket)
             return
-        if hello.kind != "hello" or hello.page not in self._known or len(self._pages) >= MOST_PAGES:
+        if hello.kind != "hello" or hello.page not in self._known or len(self._pages) >= MAX_PAGES:
             await _close(socket)
             return
         page = OpenPage(socket, hello.page)
-        presence, now_ns = self._desk.presence, time.monotonic_ns()
-        presence.arrive(page.secret, hello.tab, now_ns, session=self._desk.busy)
+        presence, now_ns = self._state.presence, time.monotonic_ns()
+        presence.arrive(page.secret, hello.tab, now_ns, session=self._state.busy)
         self._pages.add(page)
         sender = asyncio.create_task(_send(page))
         try:
             while True:
-                self._hear(page, await socket.receive_text())
+                text = await socket.receive_text()
+                try:
+                    self._obey(page, parse_message(text))
+                except (RefusedMessage, ValueError) as error:
+                    is_note = text.startswith(_NOTE)
+                    page.send(_refused(str(error)) if is_note else json.dumps({"say": str(error)}))
         except (WebSocketDisconnect, KeyError):  # it is gone, or sent bytes
             pass
         finally:
@@ -141,16 +152,9 @@ class LiveSockets:
             presence.gone(page.secret)
             sender.cancel()
 
-    def _hear(self, page: OpenPage, text: str) -> None:
-        try:
-            self._obey(page, parse_message(text))
-        except (RefusedMessage, ValueError) as error:
-            is_note = text.startswith(_NOTE)
-            page.tell(_refused(str(error)) if is_note else json.dumps({"say": str(error)}))
-
-    def _obey(self, page: OpenPage, message: Message) -> None:
+    def _obey(self, page: OpenPage, message: PageMessage) -> None:
         """Do what a page in control says; a page that looks is told so."""
-        presence, now_ns = self._desk.presence, time.monotonic_ns()
+        presence, now_ns = self._state.presence, time.monotonic_ns()
         if message.kind == "beat":
             presence.beat(page.secret, now_ns)
             if self._attached is not None and presence.has_control(page.secret):
@@ -161,16 +165,16 @@ class LiveSockets:
             return
         if not presence.has_control(page.secret):
             why = "this page can only look: another one has control"
-            page.tell(_refused(why) if message.kind == "note" else json.dumps({"say": why}))
+            page.send(_refused(why) if message.kind == "note" else json.dumps({"say": why}))
             return
         if message.kind == "leave":
             presence.leave(page.secret, now_ns)
         if message.kind in ("emergency", "leave"):
-            self._desk.stop_check()
+            self._state.stop_check()
         attached = self._attached
         if attached is None:
             if message.kind == "emergency":
-                self._desk.press_stop()
+                self._state.press_stop()
             return
         status = attached.memory.status
         if message.kind == "emergency":
@@ -180,16 +184,16 @@ class LiveSockets:
         elif message.kind == "order":
             status.post(Order(message.command))
         elif message.kind == "save":
-            page.tell(json.dumps({"say": save_to(message.folder, status)}))
+            page.send(json.dumps({"say": save_to(message.folder, status)}))
         elif message.note is not None:
-            if len(attached.notes) < MOST_NOTES:
+            if len(attached.notes) < MAX_NOTES:
                 attached.notes.append(json_line(message.note).decode())
                 attached.post_notes()
                 score = message.note.get("score")
-                doubt = "" if score is None else off_scale(self._desk.place, score)
-                page.tell(json.dumps({"noted": True} | ({"say": doubt} if doubt else {})))
+                doubt = "" if score is None else off_scale(self._state.place, score)
+                page.send(json.dumps({"noted": True} | ({"say": doubt} if doubt else {})))
             else:
-                page.tell(_refused("the loop takes no notes now; send it again later"))
+                page.send(_refused("the loop takes no notes now; send it again later"))
 
     async def pump(self) -> None:
         """Send samples and state to every page, for ever."""
@@ -205,13 +209,13 @@ class LiveSockets:
                 samples = attached.samples()
                 if samples:
                     for page in self._pages:
-                        page.tell(samples)
+                        page.send(samples)
             if count % STATE_FRAMES == 0:
-                self._tell_state()
+                self._send_state()
 
     def _follow(self) -> None:
         """Attach to a session that began, let go of one that ended."""
-        running, attached = self._desk.running, self._attached
+        running, attached = self._state.running, self._attached
         if attached is not None and attached.running is not running:
             attached.memory.leave()
             self._attached = None
@@ -219,27 +223,27 @@ class LiveSockets:
             with suppress(FileNotFoundError):  # it ended meanwhile
                 self._attached = _Attached(running)
 
-    def _tell_state(self) -> None:
-        desk, attached = self._desk, self._attached
-        state: dict[str, Any] = {
-            "starting": desk.starting,
-            "checking": desk.checking,
+    def _send_state(self) -> None:
+        state, attached = self._state, self._attached
+        shown: dict[str, Any] = {
+            "starting": state.starting,
+            "checking": state.checking,
             "session": None,
             "finished": None,
         }
         if attached is not None:
-            state["session"] = attached.state()
-        elif desk.finished is not None and not desk.in_session:
-            finished = desk.finished
-            state["finished"] = {
+            shown["session"] = attached.state()
+        elif state.finished is not None and not state.in_session:
+            finished = state.finished
+            shown["finished"] = {
                 "number": finished.number,
                 "folder": finished.folder.name,
                 "outcome": finished.outcome,
                 "sentences": list(finished.sentences),
             }
         for page in self._pages:
-            control = desk.presence.has_control(page.secret)
-            page.tell(json.dumps({"state": state, "control": control}))
+            control = state.presence.has_control(page.secret)
+            page.send(json.dumps({"state": shown, "control": control}))
 
 
 def _refused(why: str) -> str:

@@ -19,11 +19,11 @@ from rigidimeter.core.session import EVENTS, SAMPLES, read_events, read_samples
 from rigidimeter.core.spectrum import density
 from rigidimeter.core.units import deg_from_rad
 
-MOST_POINTS = 4000
-LEAST_SAMPLES = 16
+MAX_POINTS = 4000
+MIN_SAMPLES = 16
 """Of fewer there is no spectrum."""
 
-LEAST_PART = 1e-4
+MIN_PART = 1e-4
 """Densities below this part of the largest are not drawn: a filter's stop band, rounding."""
 
 RAW = (
@@ -35,7 +35,7 @@ FITTED = ("torque_nm", "joint_torque_nm", "subject_torque_nm")
 NAMES = ("measured", "J θ″ + B θ′ + K θ", "difference")
 
 
-def epoch_traces(folder: Path, label: str, fitted: Path) -> list[dict[str, Any]]:
+def epoch_panes(folder: Path, label: str, fitted: Path) -> list[dict[str, Any]]:
     """Return panes: title, names of the lines, times with a list for each line, and the spectrum.
 
     Parameters
@@ -81,7 +81,7 @@ def _pane(
     name: str, unit: str, names: Any, time_s: NDArray[np.float64], lines: list[NDArray[np.float64]]
 ) -> dict[str, Any]:
     """Return a pane with every so many samples; NaN is a gap."""
-    step = max(1, math.ceil(time_s.size / MOST_POINTS))
+    step = max(1, math.ceil(time_s.size / MAX_POINTS))
     return {
         "title": f"{name} [{unit}]",
         "names": list(names),
@@ -97,7 +97,7 @@ def amplitude_densities(
 
     Samples that are missing, or no numbers, lie on straight lines.
     """
-    if time_s.size < LEAST_SAMPLES:
+    if time_s.size < MIN_SAMPLES:
         return [[], *([] for _ in lines)]
     every_s = float(np.median(np.diff(time_s)))
     grid_s = np.arange(time_s[0], time_s[-1] + every_s / 2, every_s)
@@ -107,7 +107,7 @@ def amplitude_densities(
         even = np.interp(grid_s, time_s[known], line[known]) if known.any() else 0.0 * grid_s
         frequency_hz, power = density(even, 1.0 / every_s)
         roots.append(np.sqrt(power))
-    least = LEAST_PART * max(float(np.max(root[1:])) for root in roots)
+    least = MIN_PART * max(float(np.max(root[1:])) for root in roots)
     drawn = [np.where(root > least, root, np.nan)[1:] for root in roots]
     return [as_json(frequency_hz[1:]), *map(as_json, drawn)]
 

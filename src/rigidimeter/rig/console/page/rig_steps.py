@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-State = Literal["done", "not done", "not needed", "optional"]
+StepState = Literal["done", "not done", "not needed", "optional"]
 
 SIGNS = {"done": "✓", "not done": "✗", "not needed": "–", "optional": "–"}
 """What stands before the words of a state, so that its colour says nothing alone."""
 
 LEVELS = {"done": "ok", "not done": "bad", "not needed": "off", "optional": "off"}
-"""Of which colour it is, as the lamps."""
+"""Of which colour it is, as the indicators."""
 
 
 @dataclass(frozen=True)
@@ -34,14 +34,14 @@ class RigStep:
     """
 
     title: str
-    state: State
+    state: StepState
     found: str = ""
     remedy: str = ""
     action: Literal["", "check", "zero"] = ""
     required: bool = True
 
 
-def refusal(steps: Sequence[RigStep]) -> str:
+def start_refusal(steps: Sequence[RigStep]) -> str:
     """Return why no session can start, as `run` says it; empty if one can."""
     missing = (step.remedy for step in steps if step.required and step.state == "not done")
     return next(missing, "")

@@ -13,12 +13,12 @@ from nicegui import ui
 
 from rigidimeter.core.files import toml_text
 from rigidimeter.core.settings import Settings, dump_settings
-from rigidimeter.rig.console.page.desk import Desk
+from rigidimeter.rig.console.page.jobs import CommandResult, Jobs
 from rigidimeter.rig.console.page.rig_steps import LEVELS, SIGNS, RigStep
-from rigidimeter.rig.console.page.work import Answer, Work
+from rigidimeter.rig.console.page.server_state import ServerState
 
 BUTTONS = {"check": "Check the rig", "zero": "Read zero and noise"}
-SAID = {"check": "checking the rig", "zero": "reading zero and noise of the sensor"}
+CHECKING = {"check": "checking the rig", "zero": "reading zero and noise of the sensor"}
 
 
 class RigView:
@@ -26,8 +26,8 @@ class RigView:
 
     Parameters
     ----------
-    desk : Desk
-    work : Work
+    state : ServerState
+    jobs : Jobs
     may_act : callable
         Whether the page may act now; it says why not.
     in_control : callable
@@ -40,21 +40,21 @@ class RigView:
 
     def __init__(
         self,
-        desk: Desk,
-        work: Work,
+        state: ServerState,
+        jobs: Jobs,
         may_act: Callable[[], bool],
         in_control: Callable[[], bool],
         settings: Callable[[], Settings | None],
         checked: Callable[[], None],
     ) -> None:
-        self._desk, self._work = desk, work
+        self._state, self._jobs = state, jobs
         self._may_act, self._in_control, self._settings = may_act, in_control, settings
         self._checked = checked
         self._steps: tuple[RigStep, ...] = ()
         self._rows()
         self._question = ui.element("div").props('role="alertdialog" aria-label="Question"')
         self._question.classes("question").set_visibility(False)
-        self._stop = ui.button("Stop the check", on_click=desk.stop_check).mark("stop-check")
+        self._stop = ui.button("Stop the check", on_click=state.stop_check).mark("stop-check")
         self._stop.set_visibility(False)
         self._said = ui.html("", sanitize=False).classes("answer")
 
@@ -67,7 +67,7 @@ class RigView:
 
     def _with_reading(self, step: RigStep) -> RigStep:
         """Return the step of the zero with what was read last."""
-        read = self._work.zero_read
+        read = self._jobs.zero_read
         if step.action != "zero" or read is None:
             return step
         return replace(step, state="done" if read.good else "not done", found=read.text)
@@ -96,40 +96,40 @@ class RigView:
         if settings is None:
             ui.notify("first put right what is wrong in the form")
             return
-        if not self._desk.begin_check(SAID[action]):
+        if not self._state.begin_check(CHECKING[action]):
             return
         self._stop.set_visibility(True)
-        self._said.set_content(f"<p>{SAID[action]} …</p>")
+        self._said.set_content(f"<p>{CHECKING[action]} …</p>")
         try:
             with tempfile.TemporaryDirectory(prefix="rigidimeter-check-") as name:
                 path = Path(name) / "protocol.toml"
                 path.write_text(toml_text(dump_settings(settings)), encoding="utf-8")
-                rig = () if self._desk.place.rig is None else (str(self._desk.place.rig),)
-                answer = await self._work.conversation(
+                rig = () if self._state.place.rig is None else (str(self._state.place.rig),)
+                answer = await self._jobs.conversation(
                     "check", *rig, "--settings", str(path), "--piped",
                     *(("--zero",) if action == "zero" else ()),
-                    said=self._say,
-                    asked=self._ask,
+                    on_output=self._say,
+                    on_question=self._ask,
                     going_on=self._going_on,
                 )  # fmt: skip
         finally:
-            self._desk.end_check()
+            self._state.end_check()
             self._stop.set_visibility(False)
             self._question.set_visibility(False)
         if action == "zero":
             at = time.strftime("%Y-%m-%d %H:%M")
-            self._work.zero_read = Answer(answer.good, f"{at}: {answer.last_lines}")
+            self._jobs.zero_read = CommandResult(answer.good, f"{at}: {answer.last_lines}")
             self._said.set_content("")
         else:
             self._said.set_content(answer.html())
         self._checked()
 
     def _say(self, text: str) -> None:
-        self._said.set_content(Answer(True, text).html())
+        self._said.set_content(CommandResult(True, text).html())
 
     def _going_on(self) -> bool:
-        lost = self._desk.presence.lost(time.monotonic_ns())
-        return self._in_control() and not lost and not self._desk.check_stopped
+        lost = self._state.presence.lost(time.monotonic_ns())
+        return self._in_control() and not lost and not self._state.check_stopped
 
     async def _ask(self, question: str) -> bool:
         """Put a question on the page, beside nothing that could hide the emergency stop."""

@@ -1,4 +1,4 @@
-"""The server of the operator's page, in a thread of the console's process.
+"""The server of the operator's page, in a thread of the console's process, and the page it sends.
 
 Loop and recorder are processes of their own, which nothing here can hold up. Every file that a page
 loads comes from this server.
@@ -13,6 +13,7 @@ import secrets
 import socket
 import threading
 from collections.abc import AsyncIterator
+from functools import cache
 from pathlib import Path
 
 import uvicorn
@@ -22,13 +23,14 @@ from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.rig.console.page.connections import bound_connections
-from rigidimeter.rig.console.page.desk import Desk
-from rigidimeter.rig.console.page.gate import Gate, is_loopback
+from rigidimeter.core.version import __version__
+from rigidimeter.rig.console.page.access import AccessCheck, bound_connections, is_loopback
+from rigidimeter.rig.console.page.after_view import AfterView
+from rigidimeter.rig.console.page.before_view import BeforeView
+from rigidimeter.rig.console.page.jobs import Jobs
 from rigidimeter.rig.console.page.live_socket import LiveSockets
-from rigidimeter.rig.console.page.page_view import show_page
-from rigidimeter.rig.console.page.report_files import POLICY, report_file
-from rigidimeter.rig.console.page.work import Work
+from rigidimeter.rig.console.page.server_state import ServerState
+from rigidimeter.rig.console.page.sessions_found import POLICY, report_file
 
 ASSETS = Path(__file__).parent / "assets"
 LARGEST_MESSAGE = 65_536
@@ -42,8 +44,8 @@ class PageServer:
 
     Parameters
     ----------
-    desk : Desk
-    work : Work
+    state : ServerState
+    jobs : Jobs
         What the page can have computed beside a session.
     host : str
     port : int
@@ -57,19 +59,21 @@ class PageServer:
         If the token is too short, or the address cannot be served.
     """
 
-    def __init__(self, desk: Desk, work: Work, host: str, port: int, token: str = "") -> None:
+    def __init__(
+        self, state: ServerState, jobs: Jobs, host: str, port: int, token: str = ""
+    ) -> None:
         if token and _TOKEN.fullmatch(token) is None:
             raise UserError(
                 f"--token: {len(token)} characters, which can be guessed or do not fit into an "
                 "address; use 16 or more of A-Z, a-z, digits, - and _"
             )
         self._token = token or ("" if is_loopback(host) else secrets.token_urlsafe(24))
-        self._desk, self._work = desk, work
+        self._state, self._jobs = state, jobs
         self._socket = _listening(host, port)
         self._host, self._port = host, self._socket.getsockname()[1]
         names = ("localhost", socket.gethostname(), host)
         config = uvicorn.Config(
-            Gate(self._app(), self._token, names),
+            AccessCheck(self._app(), self._token, names),
             ws_max_size=LARGEST_MESSAGE,
             log_level="warning",
             lifespan="on",
@@ -113,7 +117,7 @@ class PageServer:
         asyncio.run(self._server.serve(sockets=[self._socket]))
 
     def _app(self) -> FastAPI:
-        sockets = LiveSockets(self._desk)
+        sockets = LiveSockets(self._state)
 
         @contextlib.asynccontextmanager
         async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -127,7 +131,7 @@ class PageServer:
 
         @app.get("/report/{folder}/{path:path}")
         def report(folder: str, path: str) -> Response:
-            found = report_file(self._desk.place.root, folder, path)
+            found = report_file(self._state.place.root, folder, path)
             if found is None:
                 return PlainTextResponse("there is no such report", 404)
             return FileResponse(found, headers={"Content-Security-Policy": POLICY})
@@ -139,7 +143,7 @@ class PageServer:
         def page() -> None:
             secret = secrets.token_urlsafe(24)
             sockets.admit(secret)
-            show_page(self._desk, self._work, secret)
+            show_page(self._state, self._jobs, secret)
 
         ui.page("/", title="rigidimeter")(page)
         # To compress what a page loads would hold up the beats of the page in control.
@@ -174,3 +178,39 @@ def _listening(host: str, port: int) -> socket.socket:
             "name another with --host and --port"
         ) from None
     return made
+
+
+def show_page(state: ServerState, jobs: Jobs, secret: str) -> None:
+    """Build a page.
+
+    Parameters
+    ----------
+    state : ServerState
+    jobs : Jobs
+    secret : str
+        Of this page alone: the script says it to the socket, so the server knows both as one.
+    """
+
+    def in_control() -> bool:
+        return state.presence.has_control(secret)
+
+    ui.colors(primary="#0050a0")  # white on it has a contrast of 8 to 1
+    ui.add_head_html(
+        f'<meta name="rig-page" content="{secret}">'
+        f'<link rel="stylesheet" href="/vendored/uPlot.min.css?{__version__}">'
+        f'<link rel="stylesheet" href="/assets/page.css?{__version__}">'
+        f'<script src="/vendored/uPlot.iife.min.js?{__version__}"></script>'
+        f'<script src="/assets/traces.js?{__version__}" defer></script>'
+        f'<script src="/assets/page.js?{__version__}" defer></script>'
+    )
+    ui.html(_during(), sanitize=False).classes("rig")
+    with ui.element("section").classes("view").props("id=view-before"):
+        unfinished = ui.label("").classes("problem").props('role="status"')
+        BeforeView(state, jobs, in_control)
+    with ui.element("section").classes("view").props("id=view-after"):
+        AfterView(state, jobs, in_control, unfinished)
+
+
+@cache
+def _during() -> str:
+    return (ASSETS / "page.html").read_text(encoding="utf-8")

@@ -11,12 +11,19 @@ import itertools
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
+from operator import getitem
 from typing import Any
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings, changed_settings, dump_settings, validated
 from rigidimeter.core.study_files import ConditionTable
-from rigidimeter.rig.console.page.entered import line, name, number, whole_number
+from rigidimeter.rig.console.page.form_values import (
+    parse_integer,
+    parse_line,
+    parse_name,
+    parse_number,
+)
 
 
 @dataclass(frozen=True)
@@ -63,7 +70,7 @@ BLINDED, YES = "blinded", "yes"
 _OF_THE_SESSION = (*(one.key for one in (*METADATA, NOTE, *STIMULATION)), BLINDED)
 """Fields that no protocol fills."""
 
-MOST_BLOCKS = 12
+MAX_BLOCKS = 12
 """To which blocks can be added; a protocol may have more."""
 
 LONGEST_VALUE = 400
@@ -98,7 +105,7 @@ def empty_form(settings: Settings) -> dict[str, str]:
 
 def _shown(values: Mapping[str, Any]) -> dict[str, str]:
     """Return the settings as the form shows them: with fewer digits than they may have."""
-    shown = {one.key: f"{_at(values, one.path):.10g}" for one in SETTINGS}
+    shown = {one.key: f"{reduce(getitem, one.path.split('.'), values):.10g}" for one in SETTINGS}
     return shown | {
         "rests": "; ".join(f"{rest_s:.10g}" for rest_s in values["protocol"]["rests_s"])
     }
@@ -114,7 +121,7 @@ def blocks_of(form: Mapping[str, str]) -> list[int]:
     return list(itertools.takewhile(lambda k: f"task{k}" in form, itertools.count()))
 
 
-def kept_form(stored: Any, settings: Settings) -> dict[str, str]:
+def restored_form(stored: Any, settings: Settings) -> dict[str, str]:
     """Return a form that was kept, so far as it is one; otherwise the form of the settings.
 
     Of a form that was made from other settings, what these say is not kept.
@@ -159,38 +166,38 @@ def read_form(form: Mapping[str, str], base: Settings) -> EnteredSession:
         # What is as it was shown is the protocol's own value, which may have more digits.
         if form.get(one.key, "").strip() == shown[one.key]:
             continue
-        value = read(one.key, number, one.label)
+        value = read(one.key, parse_number, one.label)
         if value is not None:
             table, _, key = one.path.partition(".")
             changes.setdefault(table, {})[key] = value
     blocks = []
     for k in blocks_of(form):
-        condition = read(f"condition{k}", name, "condition")
-        epochs = read(f"epochs{k}", whole_number, "epochs")
+        condition = read(f"condition{k}", parse_name, "condition")
+        epochs = read(f"epochs{k}", parse_integer, "epochs")
         blocks.append({"task": form[f"task{k}"], "condition": condition, "epochs": epochs})
     changes.setdefault("protocol", {})["blocks"] = blocks
     if form.get("rests", "").strip() != shown["rests"]:
         changes["protocol"]["rests_s"] = read("rests", _numbers, "rests")
     about: dict[str, Any] = {
-        "subject": read("subject", name, "subject"),
+        "subject": read("subject", parse_name, "subject"),
         "operator": read("operator", _needed, "operator"),
-        "note": read("note", line, "note"),
+        "note": read("note", parse_line, "note"),
         "blinded": form.get(BLINDED) == YES,
     }
     stimulation: dict[str, Any] = {}
     for one in STIMULATION:
         text = form.get(one.key, "").strip()
         if text and one.path:
-            stimulation[one.path] = read(one.key, number, one.label)
+            stimulation[one.path] = read(one.key, parse_number, one.label)
         elif text:
-            stimulation["electrodes"] = read(one.key, line, one.label)
+            stimulation["electrodes"] = read(one.key, parse_line, one.label)
     if errors:
         return EnteredSession(None, about, about["subject"] or "", errors)
     settings = None
     try:
-        said = validated(ConditionTable, stimulation, "stimulation")
+        entered = validated(ConditionTable, stimulation, "stimulation")
         if stimulation:
-            about["stimulation"] = said.model_dump(exclude_unset=True)
+            about["stimulation"] = entered.model_dump(exclude_unset=True)
     except UserError as error:
         errors |= _placed(str(error).removeprefix("stimulation: "), STIMULATION)
     try:
@@ -203,7 +210,7 @@ def read_form(form: Mapping[str, str], base: Settings) -> EnteredSession:
 
 
 def _with_subjects(base: Settings, blocks: Sequence[Mapping[str, Any]]) -> Settings:
-    """Return settings in which each condition has a virtual joint: the first one if none is said.
+    """Return settings in which each condition has a virtual joint: the first one if none is.
 
     Conditions may be codes, of which the settings know nothing.
     """
@@ -235,17 +242,11 @@ def _numbers(text: str, what: str) -> list[float]:
             f"{what}: {text.strip()} may be one time, {before}.{behind}, or two, "
             f"{before}; {behind}; write it with a point or a semicolon"
         )
-    return [number(part, what) for part in parts]
+    return [parse_number(part, what) for part in parts]
 
 
 def _needed(text: str, what: str) -> str:
-    entered = line(text, what, 40)
+    entered = parse_line(text, what, 40)
     if not entered:
         raise UserError(f"{what}: must be given")
     return entered
-
-
-def _at(values: Mapping[str, Any], path: str) -> Any:
-    for part in path.split("."):
-        values = values[part]
-    return values

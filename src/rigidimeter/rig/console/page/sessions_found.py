@@ -1,7 +1,11 @@
-"""The sessions of a folder, their epochs, and what was said of them; nothing here changes them.
+"""The folder of the console: its sessions, the study that they make, and their reports.
 
-An epoch is left out of results by a row in `exclusions.csv`, as in a study folder: path, epoch,
-reason, by. The samples stay as they are.
+Nothing here changes a session. An epoch is left out of results by a row in `exclusions.csv`, as in
+a study folder: path, epoch, reason, by. The samples stay as they are.
+
+Of reports only folders that hold a `report.html` are served. A report comes with
+`Content-Security-Policy: sandbox`, so whatever stands in it can neither read the operator's page
+nor order anything.
 """
 
 from __future__ import annotations
@@ -23,12 +27,25 @@ from rigidimeter.core.session import (
     read_manifest,
     rest_of,
 )
-from rigidimeter.core.study_files import add_rows, table_path, table_rows
-from rigidimeter.rig.console.page.entered import line, name
+from rigidimeter.core.study_files import (
+    STUDY_FILE,
+    add_rows,
+    extend_study,
+    read_study_toml,
+    table_path,
+    table_rows,
+)
+from rigidimeter.rig.console.page.form_values import parse_line, parse_name
+from rigidimeter.rig.console.page.server_state import Place
 
-MOST_SESSIONS = 200
+MAX_SESSIONS = 200
 NEVER_S = 1e9
 """When an epoch ended that nobody ended: later than any."""
+
+PAGE = "report.html"
+OF_STUDY = "report"
+_FOR_SESSION = "-report"
+POLICY = "sandbox allow-scripts allow-downloads allow-popups"
 
 
 @dataclass(frozen=True)
@@ -100,9 +117,17 @@ def found_sessions(root: Path) -> tuple[list[FoundSession], list[str]]:
     """Return the sessions of a folder, newest first, and a sentence for each that is not read."""
     folders = [path for path in root.iterdir() if path.is_dir() and is_session(path)]
     folders = sorted(folders, key=lambda path: path.stat().st_mtime, reverse=True)
-    excluded, problems = _exclusions(root)
+    problems: list[str] = []
+    try:
+        rows = _rows(table_path(root, "exclusions"))
+    except UserError as error:
+        rows, problems = [], [str(error)]
+    excluded = {
+        (row["path"], row["epoch"]): row["reason"] + (f" ({row['by']})" if row.get("by") else "")
+        for row in rows
+    }
     found = []
-    for folder in folders[:MOST_SESSIONS]:
+    for folder in folders[:MAX_SESSIONS]:
         try:
             found.append(_session(folder, excluded))
         except (UserError, OSError, KeyError, TypeError) as error:
@@ -135,9 +160,9 @@ def exclude(root: Path, session: str, epoch: str, reason: str, by: str) -> None:
     UserError
         If there is no such epoch, it is left out already, or reason or name is missing.
     """
-    folder = root / name(session, "session")
+    folder = root / parse_name(session, "session")
     found = _session(folder, {})
-    reason, by = line(reason, "reason"), line(by, "name", 40)
+    reason, by = parse_line(reason, "reason"), parse_line(by, "name", 40)
     if not reason or not by:
         raise UserError("to leave an epoch out, give a reason and your name")
     if epoch not in {one.label for one in found.epochs}:
@@ -210,18 +235,58 @@ def _epochs(
     ]
 
 
-def _exclusions(root: Path) -> tuple[dict[tuple[str, str], str], list[str]]:
-    try:
-        rows = _rows(table_path(root, "exclusions"))
-    except UserError as error:
-        return {}, [str(error)]
-    return {
-        (row["path"], row["epoch"]): row["reason"] + (f" ({row['by']})" if row.get("by") else "")
-        for row in rows
-    }, []
-
-
 def _rows(path: Path) -> list[dict[str, str]]:
     """Return the exclusions that were written down, each path as `found_sessions` names it."""
     rows = table_rows(path, "exclusions")
     return [row | {"path": os.path.normpath(row["path"])} for row in rows]
+
+
+def extended(place: Place) -> list[str]:
+    """Add what was recorded to the study of the console's folder; return what is to be said.
+
+    A page for one session may lie in any folder, which is not made a study.
+    """
+    if place.one_session:
+        return []
+    try:
+        return extend_study(place.root, known=list(place.settings.subject))
+    except (UserError, OSError) as error:
+        return [f"not in the study: {error}"]
+
+
+def off_scale(place: Place, score: float) -> str:
+    """Return what is to be said of a score outside the study's scale; an empty text of others."""
+    path = place.root / STUDY_FILE
+    if place.one_session or not path.is_file():
+        return ""
+    try:
+        low, high = read_study_toml(path).rating.scale
+    except UserError:
+        return ""  # the reading of the study says why
+    if low <= score <= high:
+        return ""
+    return (
+        f"noted, but {score:g} is outside the scale of {low:g} to {high:g} in {path}: rate the "
+        "epoch again, or change `scale` there; the study cannot be compared until then"
+    )
+
+
+def report_folder(session: str = "") -> str:
+    """Return the name of the folder in which a session's report lies, or that of the study."""
+    return f"{session}{_FOR_SESSION}" if session else OF_STUDY
+
+
+def report_link(folder: str) -> str:
+    """Return the address of a report, below that of the page."""
+    return f"/report/{folder}/{PAGE}"
+
+
+def report_file(root: Path, folder: str, path: str) -> Path | None:
+    """Return a file of a report; None where there is none, or it lies elsewhere."""
+    if folder != OF_STUDY and not folder.endswith(_FOR_SESSION):
+        return None
+    within = os.path.realpath(root / folder)
+    found = os.path.realpath(os.path.join(within, path))
+    inside = os.path.dirname(within) == os.path.realpath(root) and found.startswith(within + os.sep)
+    report = Path(within, PAGE).is_file()
+    return Path(found) if inside and report and os.path.isfile(found) else None

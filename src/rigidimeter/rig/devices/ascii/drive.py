@@ -30,7 +30,7 @@ import math
 from collections.abc import Mapping
 from typing import ClassVar
 
-from rigidimeter.rig.devices.ascii.language import Feedback, get, move_target, set_
+from rigidimeter.rig.devices.ascii.language import Feedback, move_target, read_request, set_request
 from rigidimeter.rig.devices.ascii.line import AsciiLine
 from rigidimeter.rig.devices.ascii.setup import (
     OFF,
@@ -72,7 +72,7 @@ class AsciiDrive:
         self._line: AsciiLine | None = None
         self._speaking = self._configured = False
         self._powered = self._commanding = False
-        self._said_off = True
+        self._reported_off = True
         self._cycle_s = 0.0
         self._sent = 0  # in 0.1 counts/s, on the drive's side of the sign
         self._commanded_s = -math.inf
@@ -155,18 +155,15 @@ class AsciiDrive:
         if not self._configured:
             raise DeviceError("drive: enable before configure; call connect and configure first")
         try:
-            self._enable()
+            self._powered, self._reported_off = True, False
+            self._talking().energise(self._state_on, self._jump)
+            self._sent = 0
+            self._start_sampling()
+            self._commanded_s = self._now()
+            self._commanding = True
         except DeviceError:
             self.disable()
             raise
-
-    def _enable(self) -> None:
-        self._powered, self._said_off = True, False
-        self._talking().energise(self._state_on, self._jump)
-        self._sent = 0
-        self._start_sampling()
-        self._commanded_s = self._now()
-        self._commanding = True
 
     # -- the loop -----------------------------------------------------------------------------
 
@@ -236,20 +233,20 @@ class AsciiDrive:
     @property
     def powered(self) -> bool:
         """Whether it was given power and has not confirmed that it is gone."""
-        return not self._said_off
+        return not self._reported_off
 
     def stop(self) -> None:
         """Abort the move: the drive brakes with its own deceleration and stays at rest."""
         self._commanding = False
         if self._powered:
-            request = "t 0" if self._settings.mode == "moves" else set_(0x2F, 0)
+            request = "t 0" if self._settings.mode == "moves" else set_request(0x2F, 0)
             self._try(request)
 
     def disable(self) -> None:
         """Remove the power at once; a drive that does not confirm it is reported as lost."""
         self._commanding = False
         self._powered = False
-        self._said_off = self._try(set_(0x24, OFF)) or self._said_off
+        self._reported_off = self._try(set_request(0x24, OFF)) or self._reported_off
 
     def close(self) -> None:
         """Remove the power and close the port."""
@@ -263,7 +260,7 @@ class AsciiDrive:
 
     def _requests(self, counts_s: float) -> tuple[str, ...]:
         if self._settings.mode == "velocity":
-            return (set_(0x2F, round(10.0 * counts_s)),)
+            return (set_request(0x2F, round(10.0 * counts_s)),)
         if counts_s == 0.0:
             return ("t 0",)
         feedback = self._feedback
@@ -276,14 +273,14 @@ class AsciiDrive:
             self._deceleration,
             self._settings.horizon_s,
         )
-        return set_(0xCA, target), set_(0xCB, abs(round(10.0 * counts_s))), "t 1"
+        return set_request(0xCA, target), set_request(0xCB, abs(round(10.0 * counts_s))), "t 1"
 
     def _send(self, *commands: str, ask_all: bool = False) -> None:
         line = self._line
         if line is not None:
             self._cycle += 1
             turns = (0xA0, 0x24) if ask_all else ((0x24,) if self._cycle % 2 else (0xA0,))
-            requests = (*commands, *map(get, (0x32, 0x18, *turns)))
+            requests = (*commands, *map(read_request, (0x32, 0x18, *turns)))
             self._feedback.asked(requests, self._now())
             line.submit(*requests)
 

@@ -103,12 +103,12 @@ def addressed(request: str) -> str:
     return " ".join(request.split()[:2])
 
 
-def get(register: int) -> str:
+def read_request(register: int) -> str:
     """Return the request that reads a register."""
     return f"g r0x{register:02x}"
 
 
-def set_(register: int, value: int) -> str:
+def set_request(register: int, value: int) -> str:
     """Return the request that sets a register."""
     return f"s r0x{register:02x} {value}"
 
@@ -118,7 +118,7 @@ def named_bits(status: int, names: dict[int, str]) -> str:
     return ", ".join(name for bit, name in names.items() if status >> bit & 1)
 
 
-def seconds(characters: int, baud: int) -> float:
+def line_time_s(characters: int, baud: int) -> float:
     """Return the time in s that so many characters take on the line."""
     return characters * BITS_PER_CHARACTER / baud
 
@@ -245,20 +245,22 @@ class Feedback:
                 self.latch(Cause.DRIVE_LOST)
         else:
             self.counts["received"] += 1
-            self._take_value(request, reply, at_s - seconds(len(text) + 1, self._baud), commanding)
+            self._take_value(
+                request, reply, at_s - line_time_s(len(text) + 1, self._baud), commanding
+            )
 
     def _take_value(self, request: str, reply: Reply, asked_s: float, commanding: bool) -> None:
-        if request == get(0x32):
+        if request == read_request(0x32):
             reach = self._jump + self._fastest * max(0.0, asked_s - self.position_s)
             if abs(reply.value - self.position) > reach:
                 self.latch(Cause.NOT_FOLLOWING)
             self.position, self.position_s = reply.value, asked_s
             self.sequence += 1
-        elif request == get(0x18):
+        elif request == read_request(0x18):
             self.speed = reply.value
-        elif request == get(0xA0):
+        elif request == read_request(0xA0):
             self._take_status(reply.value, commanding)
-        elif request == get(0x24) and commanding and reply.value != self._state_on:
+        elif request == read_request(0x24) and commanding and reply.value != self._state_on:
             self.latch(Cause.DRIVE_STATE)
 
     def _take_status(self, status: int, commanding: bool) -> None:

@@ -15,11 +15,11 @@ from rigidimeter.rig.devices.ascii.language import (
     STATUS_DISABLED,
     STATUS_FAULTS,
     Reply,
-    get,
+    line_time_s,
     named_bits,
     parse,
-    seconds,
-    set_,
+    read_request,
+    set_request,
 )
 from rigidimeter.rig.devices.ascii.line import AsciiLine, Port
 from rigidimeter.rig.devices.base import DeviceError, Now
@@ -121,7 +121,7 @@ class AsciiTalk:
         DeviceError
             If the drive returns no value.
         """
-        reply = self.answer(get(register))
+        reply = self.answer(read_request(register))
         if reply is None or reply.kind != "v":
             raise DeviceError(
                 f"drive: register 0x{register:02x} gave {_found(reply)}; expected a value"
@@ -130,7 +130,7 @@ class AsciiTalk:
 
     def text(self, register: int) -> str:
         """Read a text register; empty if the drive has none."""
-        answer = self._line.ask(get(register), self._patience_s)
+        answer = self._line.ask(read_request(register), self._patience_s)
         return answer[2:] if answer is not None and answer.startswith("v ") else ""
 
     def command(self, request: str) -> None:
@@ -153,7 +153,7 @@ class AsciiTalk:
         DeviceError
             If the drive keeps another value.
         """
-        self.command(set_(register, value))
+        self.command(set_request(register, value))
         found = self.value(register)
         if found != value:
             raise DeviceError(
@@ -174,7 +174,7 @@ class AsciiTalk:
         port.send_break(0.05)
         for rate in dict.fromkeys((POWER_UP_BAUD, baud)):
             port.baudrate = rate
-            if self.answer(get(0x90)) is not None:
+            if self.answer(read_request(0x90)) is not None:
                 break
         else:
             raise DeviceError(
@@ -183,9 +183,9 @@ class AsciiTalk:
             )
         if port.baudrate != baud:
             # The reply may come at either rate, so it is ignored.
-            line.ask(set_(0x90, baud), self._patience_s)
+            line.ask(set_request(0x90, baud), self._patience_s)
             port.baudrate = baud
-        found = self.answer(get(0x90))
+        found = self.answer(read_request(0x90))
         if found is None or found.value != baud:
             raise DeviceError(
                 f"drive: the baud rate is {'unknown' if found is None else found.value} "
@@ -202,7 +202,7 @@ class AsciiTalk:
         """
         latched = self.value(0xA4)
         if latched:
-            self.command(set_(0xA4, latched))
+            self.command(set_request(0xA4, latched))
         status = self.value(0xA0)
         if status & STATUS_FAULTS:
             raise DeviceError(
@@ -233,14 +233,14 @@ class AsciiTalk:
             self.set(register, value)
         return 10.0 * moves if self._settings.mode == "moves" else 1000.0 * velocity
 
-    def energise(self, state_on: int, most_counts: float) -> None:
+    def energise(self, state_on: int, max_counts: float) -> None:
         """Write zero velocity and the present position as target, read them back, then energise.
 
         Parameters
         ----------
         state_on : int
             The desired state of an enabled drive.
-        most_counts : float
+        max_counts : float
             Largest movement allowed meanwhile.
 
         Raises
@@ -255,7 +255,7 @@ class AsciiTalk:
         self.set(0xCB, 0)
         before = self.value(0x32)
         self.set(0xCA, before)
-        self.command(set_(0x24, state_on))
+        self.command(set_request(0x24, state_on))
         state, status = self.value(0x24), self.value(0xA0)
         if state != state_on or status & (STATUS_FAULTS | STATUS_DISABLED):
             why = named_bits(status, FAULT_BITS | DISABLED_BITS) or "no reason given"
@@ -264,7 +264,7 @@ class AsciiTalk:
                 f"expected state {state_on} without these bits"
             )
         moved = self.value(0x32) - before
-        if abs(moved) > most_counts:
+        if abs(moved) > max_counts:
             raise DeviceError(f"drive: moved {moved} counts on enable; it must stand still")
 
     def measured_cycle_s(self, now: Now) -> float:
@@ -276,10 +276,10 @@ class AsciiTalk:
             If the drive stops answering.
         """
         line = self._line
-        commands: tuple[str, ...] = (set_(0xCA, -100_000), set_(0xCB, 100_000), "t 0")
+        commands: tuple[str, ...] = (set_request(0xCA, -100_000), set_request(0xCB, 100_000), "t 0")
         if self._settings.mode == "velocity":
-            commands = (set_(0x2F, 0),)
-        cycle = (*commands, get(0x32), get(0x18), get(0xA0))
+            commands = (set_request(0x2F, 0),)
+        cycle = (*commands, read_request(0x32), read_request(0x18), read_request(0xA0))
         taken_s = []
         for _ in range(MEASURED_CYCLES):
             began_s = now()
@@ -292,7 +292,7 @@ class AsciiTalk:
         # Never shorter than the time that the characters take.
         replies = len(commands) * len("ok\r") + 3 * len("v -1234567\r")
         sent = sum(len(request) + 1 for request in cycle)
-        return max(MARGIN * median(taken_s), seconds(sent + replies, self._settings.baud))
+        return max(MARGIN * median(taken_s), line_time_s(sent + replies, self._settings.baud))
 
 
 def _found(reply: Reply | None) -> str:

@@ -36,15 +36,15 @@ from rigidimeter.rig.devices.ati.rdt_packets import (
 from rigidimeter.rig.devices.ati.rdt_setup import (
     AtiRdtSettings,
     SensorPage,
-    changes,
     fetch_page,
+    page_changes,
     refuse_unexpected,
 )
 from rigidimeter.rig.devices.ati.sample_clock import LONGEST_DELAY_S
 from rigidimeter.rig.devices.base import DeviceError, DeviceFacts, Now, TorqueSample
 from rigidimeter.rig.guard import Cause
 
-MOST_PACKETS_A_READ = 256
+MAX_PACKETS_A_READ = 256
 """Limit of one read, well below a tick; further packets are left for the next read."""
 
 RECEIVE_BUFFER = (socket.SOL_SOCKET, socket.SO_RCVBUF)
@@ -125,8 +125,17 @@ class AtiRdt:
         if self._socket is None:
             raise DeviceError(f"{self._device}: it is not connected; connect before configuring")
         self._configured = False
-        settings, page = self._settings, self._fetch()
-        self._check(page)
+        settings = self._settings
+        page = fetch_page(
+            self._sensor[0], settings.http_port, settings.timeout_s, self._device, self._now
+        )
+        refuse_unexpected(settings, page, self._device)
+        changed = page_changes(self._page, page) if self._page is not None else ""
+        if changed:
+            raise DeviceError(
+                f"{self._device}: it came back changed ({changed}); set it back, or check it and "
+                "begin a new session"
+            )
         force = settings.sign * page.newton_per_count
         torque = settings.sign * page.newton_metre_per_count
         scales = (force, force, force, torque, torque, torque)
@@ -158,7 +167,7 @@ class AtiRdt:
         touched = backlog = False
         before_s = stream.sampled_s
         try:
-            for _ in range(MOST_PACKETS_A_READ):
+            for _ in range(MAX_PACKETS_A_READ):
                 size, notes, _, source = wire.recvmsg_into(buffers, NOTE_BYTES)
                 if source == sensor:
                     touched = True
@@ -233,21 +242,6 @@ class AtiRdt:
         self._socket = wire
         self._stream.restart(rate_hz)
         self._sample = TorqueSample(math.nan, -math.inf)
-
-    def _fetch(self) -> SensorPage:
-        settings = self._settings
-        return fetch_page(
-            self._sensor[0], settings.http_port, settings.timeout_s, self._device, self._now
-        )
-
-    def _check(self, page: SensorPage) -> None:
-        refuse_unexpected(self._settings, page, self._device)
-        changed = changes(self._page, page) if self._page is not None else ""
-        if changed:
-            raise DeviceError(
-                f"{self._device}: it came back changed ({changed}); set it back, or check it and "
-                "begin a new session"
-            )
 
     def _start(self, page: SensorPage) -> None:
         """Request samples until the first one arrives, soon after a request.

@@ -141,7 +141,7 @@ class SensorPage:
         return TORQUE_UNITS_NM[self.torque_unit] / self.counts_per_torque
 
 
-def changes(before: SensorPage, after: SensorPage) -> str:
+def page_changes(before: SensorPage, after: SensorPage) -> str:
     """Return the differences between two pages as text, without the status; empty if none."""
     old, new = asdict(before), asdict(after)
     return ", ".join(

@@ -18,22 +18,23 @@ such order on this bus, and nothing on it can be placed: `unplaced`.
 from __future__ import annotations
 
 import math
-import select
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from rigidimeter.rig.devices.base import DeviceError, Now
-from rigidimeter.rig.devices.cia402.setup import Cia402Settings, library
+from rigidimeter.rig.devices.base import Now
+from rigidimeter.rig.devices.cia402.can_port import CanPort
+from rigidimeter.rig.devices.cia402.sdo_transfers import library
+from rigidimeter.rig.devices.cia402.setup import Cia402Settings
 from rigidimeter.rig.devices.cia402.state_words import (
     BOOTED,
     OPERATIONAL,
     PROFILE_VELOCITY,
     STOPPED,
     SYNC_ID,
+    Cia402State,
     Control,
     Nmt,
-    State,
     command_bytes,
     emergency,
     frames,
@@ -70,13 +71,9 @@ class NodeBus:
     """
 
     def __init__(self, settings: Cia402Settings, now: Now, who: str) -> None:
-        self._settings, self._now, self._who = settings, now, who
+        self._settings, self._now = settings, now
         self._ids = frames(settings.node_id)
         self._statusword = settings.axis(0x6041)
-        self._can: Any = None
-        self._bus: Any = None
-        self._ready: select.poll | None = None  # says whether something has come
-        self._room: select.poll | None = None  # says whether something can be sent
         self._open = False  # the last SYNC is not answered
         self._probing = False  # an SDO read was sent because of that, and is not answered
         self._repeats_s = math.inf  # when a stop is sent again, or what it did is asked for
@@ -94,7 +91,7 @@ class NodeBus:
         """When the SYNC of that measurement was sent."""
         self.sync_s = -math.inf
         """When the last SYNC was sent."""
-        self.told_s = -math.inf
+        self.commanded_s = -math.inf
         """When the last command was sent."""
         self.asked_s = math.inf
         """When the first SYNC after that measurement was due; infinite if none was."""
@@ -123,21 +120,22 @@ class NodeBus:
         self.counts = dict.fromkeys(
             ("received", "lost", "damaged", "unsent", "unplaced", "backlog", "emergencies"), 0
         )
+        self._port = CanPort(settings, who, self.counts)
 
     @property
     def is_open(self) -> bool:
         """Whether the bus is open."""
-        return self._bus is not None
+        return self._port.is_open
 
     @property
-    def state(self) -> State:
+    def state(self) -> Cia402State:
         """The state that the drive last reported."""
         return state_of(self.statusword)
 
     @property
     def in_operation(self) -> bool:
         """Whether the drive last reported that it is enabled, and in the right mode."""
-        return self.state is State.OPERATION_ENABLED and self.mode == PROFILE_VELOCITY
+        return self.state is Cia402State.OPERATION_ENABLED and self.mode == PROFILE_VELOCITY
 
     def open(self) -> None:
         """Open the bus.
@@ -147,44 +145,20 @@ class NodeBus:
         DeviceError
             If python-can cannot open it.
         """
-        if self._bus is not None:
+        if self._port.is_open:
             return
-        library("canopen")
-        self._can = can = library("can")
-        settings = self._settings
-        more = {"port": settings.port} if settings.interface == "udp_multicast" else {}
-        try:
-            self._bus = can.Bus(
-                interface=settings.interface,
-                channel=settings.channel,
-                bitrate=settings.bitrate,
-                ignore_config=True,
-                **more,
-            )
-        except Exception as error:  # each interface raises what its vendor's library does
-            raise DeviceError(
-                f"{self._who}: the bus does not open ({error}); check interface, channel and that "
-                "the operating system has brought the bus up"
-            ) from None
-        try:
-            self._ready, self._room = select.poll(), select.poll()
-            self._ready.register(self._bus.fileno(), select.POLLIN)
-            self._room.register(self._bus.fileno(), select.POLLOUT)
-        except NotImplementedError:  # no file behind it: what has come is in a queue of its own
-            self._ready = self._room = None
-        self._command = self._message(self._ids.command, command_bytes(0, 0))
-        self._sync = self._message(SYNC_ID)
-        self._heartbeat = self._message(0x700 + settings.master_id, bytes([OPERATIONAL]))
+        self._port.open()
+        self._command = self._port.message(self._ids.command, command_bytes(0, 0))
+        self._sync = self._port.message(SYNC_ID)
+        self._heartbeat = self._port.message(0x700 + self._settings.master_id, bytes([OPERATIONAL]))
 
     def close(self) -> None:
         """Close the bus."""
-        bus, self._bus = self._bus, None
-        if bus is not None:
-            bus.shutdown()
+        self._port.close()
 
     def network(self, command: Nmt) -> None:
         """Send a network management command to the node."""
-        self._send(self._message(0, bytes([command, self._settings.node_id])))
+        self._port.send(self._port.message(0, bytes([command, self._settings.node_id])))
 
     def ask(self, control: Control, target: int) -> bool:
         """Send a SYNC, a command and, if due, our heartbeat; return if the command was sent.
@@ -192,18 +166,18 @@ class NodeBus:
         The SYNC comes first, so that the drive reports the state that it fell to by itself before
         the command can bring it back. It is left out while an answer is awaited.
         """
-        self.told_s = now_s = self._now()
+        self.commanded_s = now_s = self._now()
         late = self._open and now_s - self.sync_s > self._settings.lost_s / 4
         if late and not self._probing:
             self._probing = self._send_sdo(sdo_read_bytes(DEVICE_TYPE, 0))
         elif not (self._open or self._probing):
-            self._open = self._send(self._sync)
+            self._open = self._port.send(self._sync)
             self.sync_s = now_s
         self.asked_s = min(self.asked_s, now_s)
         self._command.data[:] = command_bytes(control, target)
-        sent = self._send(self._command)
+        sent = self._port.send(self._command)
         if now_s - self._beaten_s >= self._settings.heartbeat_s:
-            self._send(self._heartbeat)
+            self._port.send(self._heartbeat)
             self._beaten_s = now_s
         if control in STOPS and now_s > self._repeats_s and (late or self._probing):
             self._repeat_by_sdo(control)
@@ -232,25 +206,10 @@ class NodeBus:
 
     def receive(self, wait_s: float = 0.0) -> bool:
         """Process one frame, waiting for it up to `wait_s`; return whether there was one."""
-        if self._bus is None:
-            return False
-        try:
-            if self._ready is not None:
-                # An adapter's own messages give no frame, although more has come behind them.
-                if not self._ready.poll(1e3 * wait_s):
-                    return False
-                wait_s = 0.0
-            message = self._bus.recv(wait_s)
-        except (self._can.CanError, OSError, ValueError, IndexError):
+        came, message = self._port.receive(wait_s)
+        if message is not None and not self._take(message.arbitration_id, message.data):
             self.counts["damaged"] += 1
-            return True
-        if message is None:
-            return self._ready is not None
-        if message.is_error_frame or message.is_remote_frame or message.is_extended_id:
-            self.counts["damaged"] += message.is_error_frame
-        elif not self._take(message.arbitration_id, message.data):
-            self.counts["damaged"] += 1
-        return True
+        return came
 
     def drain(self, wait_s: float = QUIET_S) -> None:
         """Process frames that piled up, until none arrives for `wait_s`."""
@@ -267,37 +226,20 @@ class NodeBus:
         canopen = library("canopen")
         # Late answers to SDO writes that nobody waited for must not be mistaken for new ones.
         self.drain()
-        network = canopen.Network(self._bus)
+        network = canopen.Network(self._port.bus)
         node = network.add_node(
             canopen.RemoteNode(self._settings.node_id, canopen.ObjectDictionary())
         )
         node.sdo.RESPONSE_TIMEOUT = self._settings.sdo_timeout_s
         network.subscribe(self._ids.heartbeat, lambda _id, data, _at: self._take_heartbeat(data))
-        notifier = self._can.Notifier(self._bus, network.listeners, QUIET_S)
+        notifier = self._port.notifier(network.listeners, QUIET_S)
         try:
             yield node.sdo
         finally:
             notifier.stop()
 
-    def _message(self, identifier: int, data: bytes = b"") -> Any:
-        return self._can.Message(
-            arbitration_id=identifier, data=bytearray(data), is_extended_id=False
-        )
-
     def _send_sdo(self, request: bytes) -> bool:
-        return self._send(self._message(self._ids.sdo_request, request))
-
-    def _send(self, message: Any) -> bool:
-        try:
-            # python-can waits, whatever its timeout, for a serial adapter that takes nothing.
-            if self._room is not None and not self._room.poll(0):
-                raise BlockingIOError
-            self._bus.send(message, timeout=0)
-        except (self._can.CanError, OSError):
-            # Not raised: the drive will not answer a frame it did not receive and counts as lost.
-            self.counts["unsent"] += 1
-            return False
-        return True
+        return self._port.send(self._port.message(self._ids.sdo_request, request))
 
     def _take(self, identifier: int, data: bytearray) -> bool:
         """Decode one frame; return False if it is damaged."""

@@ -20,6 +20,13 @@ from collections.abc import Mapping
 from rigidimeter.rig.devices.base import DeviceError, DeviceFacts, MotionSample, Now
 from rigidimeter.rig.devices.cia402.bus import NodeBus
 from rigidimeter.rig.devices.cia402.power_up_sequence import FAULTS, power_up, reset_fault
+from rigidimeter.rig.devices.cia402.sdo_transfers import (
+    read_back,
+    read_object,
+    read_text,
+    refuse_two_nodes,
+    write_object,
+)
 from rigidimeter.rig.devices.cia402.setup import (
     BRAKING,
     CONTROLWORD,
@@ -27,25 +34,20 @@ from rigidimeter.rig.devices.cia402.setup import (
     TARGET,
     Cia402Settings,
     displayed_mode,
-    get,
     objects,
-    put,
-    read_back,
-    refuse_two_nodes,
     scale,
-    text,
 )
 from rigidimeter.rig.devices.cia402.state_words import (
     OPERATIONAL,
     POWERED,
+    Cia402State,
     Control,
     Nmt,
-    State,
     fastest_tick_rate_hz,
 )
 from rigidimeter.rig.guard import Cause
 
-MOST_FRAMES_A_READ = 400
+MAX_FRAMES_A_READ = 400
 """A full bus at 1 Mbit/s brings 18 frames a ms, which is 364 in a tick of 20 ms."""
 
 
@@ -119,9 +121,9 @@ class Cia402Drive:
         with self._wire.sdo_client() as sdo:
             self._wire.booted = False
             refuse_two_nodes(sdo, who)
-            identity = {entry.name: get(sdo, entry, who) for entry in IDENTITY}
-            firmware, name = text(sdo, 0x100A, who), text(sdo, 0x1008, who)
-            absent = [entry for entry in self._objects if not put(sdo, entry, who)]
+            identity = {entry.name: read_object(sdo, entry, who) for entry in IDENTITY}
+            firmware, name = read_text(sdo, 0x100A, who), read_text(sdo, 0x1008, who)
+            absent = [entry for entry in self._objects if not write_object(sdo, entry, who)]
             found = read_back(sdo, self._readable, who)
         self._wire.network(Nmt.START)
         self._configured = True
@@ -171,7 +173,7 @@ class Cia402Drive:
             with wire.sdo_client() as sdo:
                 for entry in self._objects:
                     if entry.name in (CONTROLWORD, TARGET):
-                        put(sdo, entry, self._who)
+                        write_object(sdo, entry, self._who)
                 read_back(sdo, self._readable, self._who)
             wire.network(Nmt.START)
             wire.drain()
@@ -190,7 +192,7 @@ class Cia402Drive:
     def read(self) -> MotionSample:
         """Return the newest sample without waiting; the previous one if there is no new one."""
         wire = self._wire
-        for _ in range(MOST_FRAMES_A_READ):
+        for _ in range(MAX_FRAMES_A_READ):
             if not wire.receive():
                 break
         else:
@@ -223,7 +225,7 @@ class Cia402Drive:
         if self._control is not Control.ENABLE_OPERATION:
             return
         wire = self._wire
-        if now_s - min(wire.told_s, wire.asked_s) > self._stops_itself_s:
+        if now_s - min(wire.commanded_s, wire.asked_s) > self._stops_itself_s:
             answered = wire.asked_s == math.inf
             self._cause = self._cause or (Cause.DRIVE_STATE if answered else Cause.DRIVE_LOST)
             self._halt(Control.QUICK_STOP)
@@ -241,7 +243,7 @@ class Cia402Drive:
                 return Cause.DRIVE_STATE
             if wire.unplaced or now_s - wire.heard_s > settings.heartbeat_s + settings.lost_s:
                 return Cause.DRIVE_LOST
-        elif wire.state is State.OPERATION_ENABLED and now_s > self._settled_s:
+        elif wire.state is Cia402State.OPERATION_ENABLED and now_s > self._settled_s:
             return Cause.DRIVE_STATE
         lost = not wire.is_open or now_s - wire.asked_s > settings.lost_s
         return Cause.DRIVE_LOST if lost else Cause.NONE
@@ -255,8 +257,8 @@ class Cia402Drive:
         self._check_watchdog(self._now())
         target = 0
         if self._control is Control.ENABLE_OPERATION and math.isfinite(velocity_rad_s):
-            most = self._settings.max_velocity_rad_s
-            wanted = max(-most, min(most, velocity_rad_s)) * self._scale.units_per_rad_s
+            limit = self._settings.max_velocity_rad_s
+            wanted = max(-limit, min(limit, velocity_rad_s)) * self._scale.units_per_rad_s
             target = max(-(2**31), min(2**31 - 1, round(wanted)))
         if self._wire.is_open:
             if self._halted:

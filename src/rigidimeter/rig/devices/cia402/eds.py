@@ -13,18 +13,18 @@ from typing import Any, NamedTuple
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import TABLE_BYTES, read_bytes
+from rigidimeter.rig.devices.cia402.sdo_transfers import library
 from rigidimeter.rig.devices.cia402.setup import (
     IDENTITY,
     INVALID,
     Cia402Settings,
     Object,
     displayed_mode,
-    library,
     objects,
 )
 
 
-class Fit(NamedTuple):
+class EdsMatch(NamedTuple):
     """One object: its name and address, whether it fits, what the EDS says, what must be."""
 
     label: str
@@ -33,7 +33,7 @@ class Fit(NamedTuple):
     needed: str
 
 
-def fits(path: Path, settings: Cia402Settings) -> list[Fit]:
+def compare_eds(path: Path, settings: Cia402Settings) -> list[EdsMatch]:
     """Compare an EDS with what the driver writes, reads and maps with these settings.
 
     Raises
@@ -87,46 +87,46 @@ def _variable(described: Any, index: int, subindex: int) -> Any:
     return members.get(subindex)
 
 
-def _missing(entry: Object, described: Any) -> Fit:
+def _missing(entry: Object, described: Any) -> EdsMatch:
     found = "no such sub-index" if entry.index in described else "no such object"
-    return Fit(entry.label, entry.optional, found, "optional" if entry.optional else "needed")
+    return EdsMatch(entry.label, entry.optional, found, "optional" if entry.optional else "needed")
 
 
-def _read(entry: Object, described: Any) -> Fit:
+def _read(entry: Object, described: Any) -> EdsMatch:
     variable = _variable(described, entry.index, entry.subindex)
     if variable is None:
         return _missing(entry, described)
-    return Fit(entry.label, variable.readable, variable.access_type, "readable")
+    return EdsMatch(entry.label, variable.readable, variable.access_type, "readable")
 
 
-def _written(entry: Object, described: Any) -> Fit:
+def _written(entry: Object, described: Any) -> EdsMatch:
     variable = _variable(described, entry.index, entry.subindex)
     if variable is None:
         return _missing(entry, described)
     if len(variable) != 8 * entry.size:
-        return Fit(entry.label, False, f"{len(variable)} bits", f"{8 * entry.size} bits")
+        return EdsMatch(entry.label, False, f"{len(variable)} bits", f"{8 * entry.size} bits")
     if not (variable.writable and variable.readable):
         default = variable.default
         fixed = entry.fixed and variable.readable and default is not None
         fits = fixed and not (default ^ entry.value) & entry.mask
         found = f"{variable.access_type}, {_number(entry, default)}"
-        return Fit(entry.label, fits, found, f"rw, or fixed at {_number(entry, entry.value)}")
+        return EdsMatch(entry.label, fits, found, f"rw, or fixed at {_number(entry, entry.value)}")
     low, high = variable.min, variable.max
     inside = (low is None or entry.value >= low) and (high is None or entry.value <= high)
     if not inside:
         found = f"{_number(entry, low)} to {_number(entry, high)}"
-        return Fit(entry.label, False, found, f"takes {_number(entry, entry.value)}")
-    return Fit(entry.label, True, variable.access_type, f"takes {_number(entry, entry.value)}")
+        return EdsMatch(entry.label, False, found, f"takes {_number(entry, entry.value)}")
+    return EdsMatch(entry.label, True, variable.access_type, f"takes {_number(entry, entry.value)}")
 
 
-def _mapped(entry: Object, described: Any) -> Fit:
+def _mapped(entry: Object, described: Any) -> EdsMatch:
     index, subindex, bits = entry.value >> 16, entry.value >> 8 & 0xFF, entry.value & 0xFF
     label = f"0x{index:04X}:{subindex:02X} in a frame"
     variable = _variable(described, index, subindex)
     if variable is None:
-        return Fit(label, False, "no such object", f"{bits} bits")
+        return EdsMatch(label, False, "no such object", f"{bits} bits")
     found = f"{len(variable)} bits" + ("" if variable.pdo_mappable else ", not to be mapped")
-    return Fit(label, variable.pdo_mappable and len(variable) == bits, found, f"{bits} bits")
+    return EdsMatch(label, variable.pdo_mappable and len(variable) == bits, found, f"{bits} bits")
 
 
 def _number(entry: Object, value: int | None) -> str:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from rigidimeter.rig.devices.base import DeviceError, Now
 from rigidimeter.rig.devices.cia402.bus import NodeBus
-from rigidimeter.rig.devices.cia402.state_words import NEXT_CONTROL, Control, State
+from rigidimeter.rig.devices.cia402.state_words import NEXT_CONTROL, Cia402State, Control
 
 STEP_S = 0.005
-FAULTS = (State.FAULT, State.FAULT_REACTION)
+FAULTS = (Cia402State.FAULT, Cia402State.FAULT_REACTION)
 
 
 def power_up(wire: NodeBus, now: Now, timeout_s: float, who: str) -> None:
@@ -27,16 +27,16 @@ def power_up(wire: NodeBus, now: Now, timeout_s: float, who: str) -> None:
     while True:
         state = _step(wire, now, control)
         # Whatever the drive was doing before, the sequence starts without power.
-        off = off or state is State.SWITCH_ON_DISABLED
+        off = off or state is Cia402State.SWITCH_ON_DISABLED
         if state in FAULTS or wire.alarmed or wire.booted:
             what = "restarted" if wire.booted else state.words
             raise DeviceError(
                 f"{who}: {what}, emergency code 0x{wire.emergency:04X}; remove its cause; "
                 "a fault must be reset by hand"
             )
-        if off and state is State.OPERATION_ENABLED:
+        if off and state is Cia402State.OPERATION_ENABLED:
             return
-        if off and state is not State.UNKNOWN:
+        if off and state is not Cia402State.UNKNOWN:
             control = NEXT_CONTROL.get(state, Control.DISABLE_VOLTAGE)
         if now() > deadline_s:
             raise DeviceError(
@@ -56,13 +56,13 @@ def reset_fault(wire: NodeBus, now: Now, timeout_s: float, who: str) -> None:
     wire.drain()
     deadline_s = now() + timeout_s
     # The reset is the rising edge of its bit, so the bit is cleared before and after.
-    control, state = Control.DISABLE_VOLTAGE, State.UNKNOWN
+    control, state = Control.DISABLE_VOLTAGE, Cia402State.UNKNOWN
     while now() <= deadline_s:
         state = _step(wire, now, control)
-        if state is State.FAULT:
+        if state is Cia402State.FAULT:
             reset = control is Control.DISABLE_VOLTAGE
             control = Control.FAULT_RESET if reset else Control.DISABLE_VOLTAGE
-        elif state not in (State.UNKNOWN, State.FAULT_REACTION):
+        elif state not in (Cia402State.UNKNOWN, Cia402State.FAULT_REACTION):
             _step(wire, now, Control.DISABLE_VOLTAGE)
             wire.alarmed = False
             wire.emergency = 0
@@ -74,7 +74,7 @@ def reset_fault(wire: NodeBus, now: Now, timeout_s: float, who: str) -> None:
     )
 
 
-def _step(wire: NodeBus, now: Now, control: Control) -> State:
+def _step(wire: NodeBus, now: Now, control: Control) -> Cia402State:
     """Send a controlword with zero velocity; return the state in the answer, or UNKNOWN."""
     before = wire.sequence
     wire.ask(control, 0)
@@ -83,4 +83,4 @@ def _step(wire: NodeBus, now: Now, control: Control) -> State:
         wire.receive(STEP_S / 5)
         if wire.sequence != before:
             return wire.state
-    return State.UNKNOWN
+    return Cia402State.UNKNOWN

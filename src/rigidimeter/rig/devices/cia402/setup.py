@@ -1,4 +1,4 @@
-"""Settings of a CiA 402 drive, the objects that are written, and the SDO transfers.
+"""Settings of a CiA 402 drive, and the objects that are written.
 
 Angle, velocity and acceleration are those of the joint; the drive counts at its motor:
 
@@ -6,8 +6,7 @@ Angle, velocity and acceleration are those of the joint; the drive counts at its
     velocity units      velocity_units_per_rev_s · gear_ratio / 2π    per rad/s
     acceleration units  acceleration_units_per_rev_s2 · gear_ratio / 2π per rad/s²
 
-`sign` −1 reverses position and velocity. Every object is written and read back. Enabling reads all
-of them again, because a drive that restarted in between has lost them, including its watchdog.
+`sign` −1 reverses position and velocity.
 
 A drive of several axes has each object of the profile (0x6000 to 0x67FF) once an axis: by CiA 402
 at `axis_offset` = 0x800, 0x1000, … more, in some drives at the sub-index `axis_subindex`.
@@ -15,10 +14,7 @@ at `axis_offset` = 0x800, 0x1000, … more, in some drives at the sub-index `axi
 
 from __future__ import annotations
 
-import importlib
 import math
-import time
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal, NamedTuple, Self
@@ -26,20 +22,10 @@ from typing import Any, Literal, NamedTuple, Self
 from pydantic import Field, field_validator, model_validator
 
 from rigidimeter.core.settings import Section, quantity
-from rigidimeter.rig.devices.base import DeviceError
 from rigidimeter.rig.devices.cia402.state_words import PROFILE_VELOCITY, Frames, frames
 
 INVALID = 1 << 31
 NO_REMOTE_REQUEST = 1 << 30
-
-NOT_THERE = {
-    0x06020000: "the drive has no such object",
-    0x06090011: "the drive has no such sub-index",
-}
-"""What the abort codes of an index and of a subindex that do not exist mean."""
-
-SECOND_ANSWER_S = 0.05
-"""A node answers within some ms; the second of two has the bus as soon as the first has sent."""
 
 
 class Cia402Settings(Section):
@@ -190,13 +176,13 @@ def objects(settings: Cia402Settings) -> tuple[Object, ...]:
     def of_axis(name: str, index: int, size: int, value: int, **more: bool) -> Object:
         return Object(name, *settings.axis(index), size, value, **more)
 
-    most = math.ceil(settings.max_velocity_rad_s * abs(units.units_per_rad_s))
+    max_units = math.ceil(settings.max_velocity_rad_s * abs(units.units_per_rad_s))
     return (
         of_axis(CONTROLWORD, 0x6040, 2, 0),
         of_axis("mode of operation", 0x6060, 1, PROFILE_VELOCITY, signed=True),
         of_axis(TARGET, 0x60FF, 4, 0, signed=True),
         # The drive's own limit is a second one: `write` sends nothing above it.
-        of_axis("max profile velocity", 0x607F, 4, most, optional=True),
+        of_axis("max profile velocity", 0x607F, 4, max_units, optional=True),
         of_axis("profile acceleration", 0x6083, 4, acceleration(settings.acceleration_rad_s2)),
         of_axis(BRAKING[0], 0x6084, 4, acceleration(settings.deceleration_rad_s2)),
         of_axis(BRAKING[1], 0x6085, 4, acceleration(settings.quick_stop_rad_s2)),
@@ -275,127 +261,4 @@ def _message(
         *(fixed(f"{name}'s entry {k}", index + 0x200, k, 4, e) for k, e in enumerate(entries, 1)),
         count,
         identifier,
-    )
-
-
-def library(name: str) -> Any:
-    """Import a library that only this drive needs."""
-    try:
-        return importlib.import_module(name)
-    except ModuleNotFoundError:
-        raise DeviceError(
-            f"the CiA 402 drive needs the package {name}, which is not installed: "
-            "pip install 'rigidimeter[canopen]'"
-        ) from None
-
-
-def put(sdo: Any, entry: Object, who: str) -> bool:
-    """Write one object; return False if it is optional and the drive does not have it.
-
-    Raises
-    ------
-    DeviceError
-        If the drive does not answer or refuses the value.
-    """
-    data = entry.value.to_bytes(entry.size, "little", signed=entry.signed)
-    try:
-        sdo.download(entry.index, entry.subindex, data)
-    except library("canopen").SdoAbortedError as error:
-        missing = NOT_THERE.get(error.code)
-        if entry.optional and missing:
-            return False
-        if entry.fixed and not missing:
-            return True  # `read_back` says whether it is as it must be
-        why = missing or "the settings must name a value the drive takes"
-        raise DeviceError(
-            f"{who}: {entry.label} = {entry.value} was refused with abort code 0x{error.code:08X}; "
-            f"{why}"
-        ) from None
-    except _silence() as error:
-        raise _no_answer(entry, who, error) from None
-    return True
-
-
-def get(sdo: Any, entry: Object, who: str) -> int | None:
-    """Read one object, None if it is optional and the drive does not have it.
-
-    Raises
-    ------
-    DeviceError
-        If the drive does not answer or does not have it.
-    """
-    try:
-        data = sdo.upload(entry.index, entry.subindex)
-    except library("canopen").SdoAbortedError as error:
-        if entry.optional and error.code in NOT_THERE:
-            return None
-        raise DeviceError(
-            f"{who}: {entry.label} cannot be read, abort code 0x{error.code:08X}; "
-            f"{NOT_THERE.get(error.code, 'the drive must have this object')}"
-        ) from None
-    except _silence() as error:
-        raise _no_answer(entry, who, error) from None
-    return int.from_bytes(data[: entry.size], "little", signed=entry.signed)
-
-
-def refuse_two_nodes(sdo: Any, who: str) -> None:
-    """Ask one question and wait a moment for a second answer.
-
-    Two nodes of one number would both move at each command, and answer for each other.
-
-    Raises
-    ------
-    DeviceError
-        If nobody answers, or two do.
-    """
-    get(sdo, IDENTITY[0], who)
-    time.sleep(SECOND_ANSWER_S)
-    if not sdo.responses.empty():
-        raise DeviceError(
-            f"{who}: two answers came to one question, so another node on the bus has this node_id "
-            "too; give each node its own, or take the other off the bus"
-        )
-
-
-def text(sdo: Any, index: int, who: str) -> str:
-    """Read an optional text object; empty if the drive does not have it."""
-    try:
-        data = bytes(sdo.upload(index, 0))
-    except library("canopen").SdoAbortedError:
-        return ""
-    except _silence() as error:
-        raise _no_answer(Object("text", index, 0, 0, 0), who, error) from None
-    return data.rstrip(b"\0").decode("ascii", "replace")
-
-
-def read_back(sdo: Any, written: Iterable[Object], who: str) -> Mapping[str, int]:
-    """Read every object and return the values by name, without the optional ones that are absent.
-
-    Raises
-    ------
-    DeviceError
-        If a value is not the one that was written.
-    """
-    kept = {(entry.index, entry.subindex): entry for entry in written}
-    found: dict[str, int] = {}
-    for entry in kept.values():
-        value = get(sdo, entry, who)
-        if value is None:
-            continue
-        if (value ^ entry.value) & entry.mask:
-            raise DeviceError(
-                f"{who}: {entry.label} reads back as {value} where it must be {entry.value}; the "
-                "drive must take this value, or the settings must name one that it takes"
-            )
-        found[entry.label] = value
-    return found
-
-
-def _silence() -> tuple[type[Exception], ...]:
-    return (library("canopen").SdoCommunicationError, library("can").CanError, OSError)
-
-
-def _no_answer(entry: Object, who: str, error: Exception) -> DeviceError:
-    return DeviceError(
-        f"{who}: no answer about {entry.label} ({error}); check power, wiring, bit rate and node_id"
     )

@@ -36,7 +36,7 @@ TICK_FRAMES = (6, 0, 7, 4)
 HIGHEST_LOAD = 0.7
 
 
-class State(IntEnum):
+class Cia402State(IntEnum):
     """State of the drive's finite state automaton; UNKNOWN if the bits code none."""
 
     UNKNOWN = 0
@@ -56,15 +56,15 @@ class State(IntEnum):
 
 
 _WORDS = {
-    State.UNKNOWN: "an unknown state",
-    State.NOT_READY: "not ready to switch on",
-    State.SWITCH_ON_DISABLED: "switch-on disabled",
-    State.READY: "ready to switch on",
-    State.SWITCHED_ON: "switched on",
-    State.OPERATION_ENABLED: "operation enabled",
-    State.QUICK_STOP_ACTIVE: "quick stop active",
-    State.FAULT_REACTION: "fault reaction active",
-    State.FAULT: "fault",
+    Cia402State.UNKNOWN: "an unknown state",
+    Cia402State.NOT_READY: "not ready to switch on",
+    Cia402State.SWITCH_ON_DISABLED: "switch-on disabled",
+    Cia402State.READY: "ready to switch on",
+    Cia402State.SWITCHED_ON: "switched on",
+    Cia402State.OPERATION_ENABLED: "operation enabled",
+    Cia402State.QUICK_STOP_ACTIVE: "quick stop active",
+    Cia402State.FAULT_REACTION: "fault reaction active",
+    Cia402State.FAULT: "fault",
 }
 
 
@@ -86,44 +86,49 @@ class Nmt(IntEnum):
     PRE_OPERATIONAL = 0x80
 
 
-POWERED = (State.UNKNOWN, State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION)
+POWERED = (
+    Cia402State.UNKNOWN,
+    Cia402State.OPERATION_ENABLED,
+    Cia402State.QUICK_STOP_ACTIVE,
+    Cia402State.FAULT_REACTION,
+)
 """States in which the drive may turn the motor; in all others its torque is off."""
 
 NEXT_CONTROL = {
-    State.SWITCH_ON_DISABLED: Control.SHUTDOWN,
-    State.READY: Control.SWITCH_ON,
-    State.SWITCHED_ON: Control.ENABLE_OPERATION,
-    State.OPERATION_ENABLED: Control.ENABLE_OPERATION,
+    Cia402State.SWITCH_ON_DISABLED: Control.SHUTDOWN,
+    Cia402State.READY: Control.SWITCH_ON,
+    Cia402State.SWITCHED_ON: Control.ENABLE_OPERATION,
+    Cia402State.OPERATION_ENABLED: Control.ENABLE_OPERATION,
 }
 """The controlword for the next step toward operation, from the states that have one."""
 
 
-def state_of(statusword: int) -> State:
+def state_of(statusword: int) -> Cia402State:
     """Return the state that a statusword codes.
 
     >>> state_of(0x0637)
-    <State.OPERATION_ENABLED: 5>
+    <Cia402State.OPERATION_ENABLED: 5>
     """
     return _STATES[statusword & 0x6F]
 
 
-def _coded(bits: int) -> State:
+def _coded(bits: int) -> Cia402State:
     # Bit 5 (quick stop) is not defined in the first two states and in the two fault states.
     short = bits & 0x4F
     if short == 0x00:
-        return State.NOT_READY
+        return Cia402State.NOT_READY
     if short == 0x40:
-        return State.SWITCH_ON_DISABLED
+        return Cia402State.SWITCH_ON_DISABLED
     if short == 0x0F:
-        return State.FAULT_REACTION
+        return Cia402State.FAULT_REACTION
     if short == 0x08:
-        return State.FAULT
+        return Cia402State.FAULT
     return {
-        0x21: State.READY,
-        0x23: State.SWITCHED_ON,
-        0x27: State.OPERATION_ENABLED,
-        0x07: State.QUICK_STOP_ACTIVE,
-    }.get(bits, State.UNKNOWN)
+        0x21: Cia402State.READY,
+        0x23: Cia402State.SWITCHED_ON,
+        0x27: Cia402State.OPERATION_ENABLED,
+        0x07: Cia402State.QUICK_STOP_ACTIVE,
+    }.get(bits, Cia402State.UNKNOWN)
 
 
 _STATES = tuple(_coded(bits) for bits in range(0x70))

@@ -11,7 +11,7 @@ from nicegui.page import page
 
 from rigidimeter.core.session import SessionWriter
 from rigidimeter.core.settings import Settings
-from rigidimeter.rig.console.page import AfterView, Answer, Desk, Place, Work
+from rigidimeter.rig.console.page import AfterView, CommandResult, Jobs, Place, ServerState
 
 BEGUN = {"task": "prbs", "condition": "OFF", "time_s": 0.0}
 
@@ -44,8 +44,8 @@ def shown(client: Client, kind: type[ui.element]) -> dict[int, str]:
 
 def test_a_row_stays_when_a_session_ends_so_that_no_click_on_it_is_lost(client, tmp_path):
     ended(session(tmp_path, "S01-1"))
-    desk = Desk(Place(tmp_path, Settings(), "the protocol"))
-    AfterView(desk, Work(), lambda: True, ui.label())
+    state = ServerState(Place(tmp_path, Settings(), "the protocol"))
+    AfterView(state, Jobs(), lambda: True, ui.label())
     (timer,) = (one for one in client.elements.values() if isinstance(one, ui.timer))
     (first,) = (one for one in client.elements.values() if isinstance(one, ui.expansion))
     before = shown(client, ui.button)
@@ -54,7 +54,7 @@ def test_a_row_stays_when_a_session_ends_so_that_no_click_on_it_is_lost(client, 
 
     second = session(tmp_path, "S01-2")
     ended(second)
-    desk.over(second.folder, "success", ())
+    state.over(second.folder, "success", ())
     timer.callback()
     assert before.items() <= shown(client, ui.button).items()
     rows = first.parent_slot.children
@@ -64,15 +64,15 @@ def test_a_row_stays_when_a_session_ends_so_that_no_click_on_it_is_lost(client, 
 
 def test_rows_say_what_is_known_now(client, tmp_path):
     writer = session(tmp_path, "S01-1")
-    desk = Desk(Place(tmp_path, Settings(), "the protocol"))
-    AfterView(desk, Work(), lambda: True, ui.label())
+    state = ServerState(Place(tmp_path, Settings(), "the protocol"))
+    AfterView(state, Jobs(), lambda: True, ui.label())
     (timer,) = (one for one in client.elements.values() if isinstance(one, ui.timer))
     assert "still being recorded" in shown(client, ui.label).values()
     assert "Repeat" not in shown(client, ui.button).values()
     writer.event("epoch_ended", epoch=1, outcome="success", reason="", time_s=1.0)
     writer.event("epoch_started", epoch=2, label="2", **BEGUN)
     ended(writer)
-    desk.over(writer.folder, "success", ())
+    state.over(writer.folder, "success", ())
     timer.callback()
     words = list(shown(client, ui.label).values())
     assert "epoch 1 · OFF · prbs · success" in words
@@ -84,13 +84,13 @@ def test_rows_say_what_is_known_now(client, tmp_path):
 def test_a_double_click_runs_a_command_once(client, tmp_path):
     asked = []
 
-    class Slow(Work):
+    class Slow(Jobs):
         async def command(self, *arguments, **_):
             asked.append(arguments)
             await asyncio.sleep(0.01)
-            return Answer(True, "done")
+            return CommandResult(True, "done")
 
-    view = AfterView(Desk(Place(tmp_path, Settings(), "")), Slow(), lambda: True, ui.label())
+    view = AfterView(ServerState(Place(tmp_path, Settings(), "")), Slow(), lambda: True, ui.label())
 
     async def run(command):
         with client:

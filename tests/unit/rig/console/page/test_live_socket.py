@@ -16,15 +16,22 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings
 from rigidimeter.rig.acquisition import NOTHING, Command
 from rigidimeter.rig.acquisition.processes import (
-    Condition,
     Flag,
+    ProcessCondition,
     Role,
     SessionMemory,
     SharedStatus,
     SharedSupervision,
     shared_memory,
 )
-from rigidimeter.rig.console.page import ORDERS, Desk, LiveSockets, OpenPage, Place, StartRequest
+from rigidimeter.rig.console.page import (
+    ORDERS,
+    LiveSockets,
+    OpenPage,
+    Place,
+    ServerState,
+    StartRequest,
+)
 
 
 @pytest.fixture
@@ -32,9 +39,9 @@ def said(tmp_path, monkeypatch):
     """Let a page in control say something while a session runs; return what it is told."""
     monkeypatch.setattr(shared_memory, "WHERE", tmp_path)
     status = SharedStatus.create()
-    desk = Desk(Place(tmp_path, Settings(), "defaults"))
-    desk.presence.arrive("page", "tab", 1, session=False)
-    sockets = LiveSockets(desk)
+    state = ServerState(Place(tmp_path, Settings(), "defaults"))
+    state.presence.arrive("page", "tab", 1, session=False)
+    sockets = LiveSockets(state)
     memory = SimpleNamespace(status=status)
     sockets._attached = SimpleNamespace(memory=memory, notes=deque(), post_notes=lambda: None)
 
@@ -82,7 +89,7 @@ def test_another_folder_is_taken_when_the_disk_takes_nothing(said, tmp_path):
     order = {"kind": "save", "folder": str(tmp_path / "disk")}
     assert "the recorder can write" in say(order)
     assert status.asked_folder() is None
-    status.set_condition(Role.RECORDER, Condition.TROUBLE, "the disk is full")
+    status.set_condition(Role.RECORDER, ProcessCondition.TROUBLE, "the disk is full")
     assert "can only look" in say(order, "another")
     assert "whole path" in say(order | {"folder": "disk"})
     assert status.asked_folder() is None
@@ -92,24 +99,24 @@ def test_another_folder_is_taken_when_the_disk_takes_nothing(said, tmp_path):
 
 def test_the_emergency_stop_counts_while_a_session_starts(tmp_path, monkeypatch):
     monkeypatch.setattr(shared_memory, "WHERE", tmp_path)
-    desk = Desk(Place(tmp_path, Settings(), "defaults"))
-    desk.presence.arrive("page", "tab", 1, session=False)
-    sockets, page = LiveSockets(desk), OpenPage(None, "page")
+    state = ServerState(Place(tmp_path, Settings(), "defaults"))
+    state.presence.arrive("page", "tab", 1, session=False)
+    sockets, page = LiveSockets(state), OpenPage(None, "page")
     press = json.dumps({"kind": "emergency"})
     sockets._hear(page, press)
-    assert desk.ask(StartRequest("first"))
-    desk.refuse_stopped()  # what was pressed before is not of this session
-    look = desk.console(None, tmp_path)
+    assert state.ask(StartRequest("first"))
+    state.refuse_stopped()  # what was pressed before is not of this session
+    look = state.console(None, tmp_path)
     sockets._hear(page, press)
     with pytest.raises(UserError, match="emergency stop was pressed while"):
-        desk.refuse_stopped()
+        state.refuse_stopped()
     status = SharedStatus.create()
     look(SimpleNamespace(status=status, names=("", "", "")))
     assert status.flag(Flag.EMERGENCY_STOP)
     status.close()
-    desk.over(tmp_path, "not run", ())
-    assert desk.ask(StartRequest("second"))
-    desk.refuse_stopped()
+    state.over(tmp_path, "not run", ())
+    assert state.ask(StartRequest("second"))
+    state.refuse_stopped()
 
 
 class Operator:
@@ -118,9 +125,9 @@ class Operator:
     def __init__(self, place):
         self.memory = SessionMemory.create(tick_rate_hz=50.0, ring_s=1.0)
         self.status = self.memory.status
-        self.desk = Desk(Place(place, Settings(), "defaults"))
-        self.desk.presence.arrive("page", "tab", 1, session=False)
-        self.sockets = LiveSockets(self.desk)
+        self.state = ServerState(Place(place, Settings(), "defaults"))
+        self.state.presence.arrive("page", "tab", 1, session=False)
+        self.sockets = LiveSockets(self.state)
         self.sockets._attached = SimpleNamespace(memory=self.memory, notes=deque())
         self.told = []
 
@@ -199,12 +206,12 @@ def test_a_page_that_is_left_has_the_arm_held_until_it_says_to_go_on(operator):
 
 def test_the_stop_and_a_page_that_leaves_also_end_a_check_of_the_rig(operator):
     for kind in ("emergency", "leave"):
-        assert operator.desk.begin_check("daily check")
+        assert operator.state.begin_check("daily check")
         operator.sends("beat")
-        assert not operator.desk.check_stopped
+        assert not operator.state.check_stopped
         operator.sends(kind)
-        assert operator.desk.check_stopped, kind
-        operator.desk.end_check()
+        assert operator.state.check_stopped, kind
+        operator.state.end_check()
 
 
 def test_each_message_does_what_it_says_and_nothing_else(operator):
@@ -234,7 +241,7 @@ def test_a_page_that_only_looks_orders_nothing_and_its_beat_is_nobodys(operator)
 
 
 def test_a_page_is_there_by_its_beat_and_may_be_away_once_it_said_so(operator):
-    presence = operator.desk.presence
+    presence = operator.state.presence
     later_ns = time.monotonic_ns() + 5_000_000_000
     operator.sends("beat")
     beat_ns = presence.seen_ns(later_ns, still=True)
@@ -266,7 +273,7 @@ HELLO = {"kind": "hello", "page": "page", "tab": "tab"}
 
 
 def test_nobody_is_there_once_the_connection_is_closed(operator):
-    presence, sockets = operator.desk.presence, operator.sockets
+    presence, sockets = operator.state.presence, operator.sockets
     presence.gone("page")
     sockets.admit("page")
     asyncio.run(sockets.serve(Socket(HELLO, {"kind": "beat"}, {"kind": "leave"})))
@@ -279,7 +286,7 @@ def test_nobody_is_there_once_the_connection_is_closed(operator):
 
 def test_a_page_that_was_not_sent_from_here_is_turned_away(operator):
     socket = Socket(HELLO, {"kind": "emergency"})
-    operator.desk.presence.gone("page")
+    operator.state.presence.gone("page")
     asyncio.run(operator.sockets.serve(socket))
     assert (socket.closed, len(socket.messages)) == (1008, 1)
     assert not operator.status.flag(Flag.EMERGENCY_STOP)

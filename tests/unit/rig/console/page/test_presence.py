@@ -6,7 +6,7 @@ import pytest
 
 from rigidimeter.rig.acquisition import State
 from rigidimeter.rig.acquisition.processes import LoopStatus
-from rigidimeter.rig.console.page import AWAY_S, SILENT_S, Desk, Place, Presence
+from rigidimeter.rig.console.page import AWAY_S, SILENT_S, Place, Presence, ServerState
 
 S = 1_000_000_000
 BEGAN = 1000 * S
@@ -81,12 +81,12 @@ def test_a_page_that_is_lost_without_a_word_gives_control_to_the_next(presence):
 @pytest.mark.parametrize(("state", "may"), [(State.PAUSED, True), (State.RUNNING, False)])
 def test_a_page_may_be_away_from_a_session_that_shows_that_it_is_paused(tmp_path, state, may):
     now_ns = BEGAN + 2 * S
-    desk = Desk(Place(tmp_path, None, ""), now_ns=lambda: now_ns)
-    desk.presence.arrive("page", "tab", BEGAN, session=False)
-    assert desk.operator_seen_ns() == BEGAN
-    desk.presence.leave("page", BEGAN + S)
-    desk.presence.gone("page")
+    state = ServerState(Place(tmp_path, None, ""), now_ns=lambda: now_ns)
+    state.presence.arrive("page", "tab", BEGAN, session=False)
+    assert state.operator_seen_ns() == BEGAN
+    state.presence.leave("page", BEGAN + S)
+    state.presence.gone("page")
     loop = LoopStatus(tick=1, state=int(state))
     status = SimpleNamespace(loop=lambda: loop)
-    desk.console(None, tmp_path)(SimpleNamespace(status=status, names=()))
-    assert desk.operator_seen_ns() == (now_ns if may else BEGAN)
+    state.console(None, tmp_path)(SimpleNamespace(status=status, names=()))
+    assert state.operator_seen_ns() == (now_ns if may else BEGAN)

@@ -12,12 +12,12 @@ from websockets.sync.client import connect
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings
 from rigidimeter.rig.console.page import (
-    MOST_MESSAGES,
-    Desk,
+    MAX_MESSAGES,
+    Jobs,
     PageServer,
     Place,
-    Work,
-    connections,
+    ServerState,
+    access,
     cookie_name,
 )
 
@@ -41,7 +41,7 @@ PATHS = (
 def port(tmp_path_factory):
     """Serve the page of a folder to whoever has the token; return the port."""
     place = Place(tmp_path_factory.mktemp("sessions"), Settings(), "the defaults")
-    server = PageServer(Desk(place), Work(), "127.0.0.1", 0, TOKEN)
+    server = PageServer(ServerState(place), Jobs(), "127.0.0.1", 0, TOKEN)
     server.start()
     yield int(server.address.partition("127.0.0.1:")[2].partition("/")[0])
     server.stop()
@@ -80,7 +80,7 @@ def secret(port):
 
 
 def flood(one):
-    for _ in range(100 * MOST_MESSAGES):
+    for _ in range(100 * MAX_MESSAGES):
         one.send('{"kind": "note", "what": "note", "text": "x"}')
 
 
@@ -135,9 +135,9 @@ def test_with_the_token_the_page_is_served_and_in_no_frame(port):
 @pytest.mark.parametrize(
     "path",
     [
-        "/assets/../gate.py",
-        "/assets/%2e%2e/gate.py",
-        "/assets/..%2fgate.py",
+        "/assets/../access.py",
+        "/assets/%2e%2e/access.py",
+        "/assets/..%2faccess.py",
         "/assets//etc/passwd",
         "/vendored/../version.py",
         "/assets/page.js%00.css",
@@ -256,11 +256,11 @@ def test_500_connections_that_say_nothing_leave_room_for_the_operator(port, sile
         while "say" not in json.loads(page.recv(timeout=20)):
             pass
         assert alive(port)
-    assert all(ended(one) for one in made[: len(made) - connections.MOST_CONNECTIONS])
+    assert all(ended(one) for one in made[: len(made) - access.MAX_CONNECTIONS])
 
 
 def test_a_connection_without_a_request_is_closed_in_time(port, silent, monkeypatch):
-    monkeypatch.setattr(connections, "HEAD_S", 0.05)
+    monkeypatch.setattr(access, "HEAD_S", 0.05)
     silent(2)
     assert all(map(ended, silent(1, b"GET / HTTP/1.1\r\n")))
     monkeypatch.undo()
@@ -279,4 +279,4 @@ def test_a_head_without_an_end_is_cut_off(port, silent):
 def test_a_token_that_can_be_guessed_is_refused(tmp_path, token):
     place = Place(tmp_path, Settings(), "the defaults")
     with pytest.raises(UserError, match="16 or more"):
-        PageServer(Desk(place), Work(), "127.0.0.1", 0, token)
+        PageServer(ServerState(place), Jobs(), "127.0.0.1", 0, token)

@@ -4,7 +4,7 @@ import pytest
 
 from rigidimeter.core.files import toml_text
 from rigidimeter.core.settings import Settings, dump_settings, load_settings, parse_settings
-from rigidimeter.rig.console.page import empty_form, kept_form, read_form
+from rigidimeter.rig.console.page import empty_form, read_form, restored_form
 
 BASE = Settings()
 
@@ -72,14 +72,14 @@ def test_a_kept_form_comes_back_and_a_damaged_one_does_not(form):
     kept = form | {"prbs_amplitude": "wrong"}
     for key in ("task1", "condition1", "epochs1"):
         del kept[key]
-    assert kept_form(kept, BASE) == kept
+    assert restored_form(kept, BASE) == kept
     for damaged in (None, [], {"subject": 1}, {"task0": "prbs"}, {"more": "x"}):
-        assert kept_form(damaged, BASE) == empty_form(BASE)
+        assert restored_form(damaged, BASE) == empty_form(BASE)
 
 
 def test_a_session_stays_blinded_when_the_page_is_loaded_again(form):
     assert read_form(form, BASE).about["blinded"] is False
-    again = kept_form(form | {"blinded": "yes"}, parse_settings({"seed": 7}))
+    again = restored_form(form | {"blinded": "yes"}, parse_settings({"seed": 7}))
     assert read_form(again, BASE).about["blinded"] is True
 
 
@@ -90,7 +90,7 @@ def test_every_block_of_a_protocol_is_in_the_form_and_one_that_was_removed_stays
     assert read_form(form, long).settings == long
     for part in ("task", "condition", "epochs"):
         del form[f"{part}13"]
-    again = read_form(kept_form(form, long), long)
+    again = read_form(restored_form(form, long), long)
     assert again.settings.protocol.blocks == long.protocol.blocks[:13]
 
 
@@ -98,8 +98,8 @@ def test_a_form_of_another_protocol_keeps_who_was_there_alone(form):
     """The values of a protocol file that was edited since are those of the file."""
     kept = form | {"stim_ma": "2", "prbs_amplitude": "1.7"}
     edited = parse_settings({"prbs": {"duration_s": 33.0}})
-    assert kept_form(kept, BASE) == kept
-    again = kept_form(kept, edited)
+    assert restored_form(kept, BASE) == kept
+    again = restored_form(kept, edited)
     assert again == empty_form(edited) | {"subject": "S01", "operator": "Op", "stim_ma": "2"}
     assert again["prbs_duration"] == "33"
 

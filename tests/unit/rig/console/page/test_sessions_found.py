@@ -9,7 +9,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import SessionWriter, again, read_manifest
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.planning import plan
-from rigidimeter.rig.console.page import epoch_traces, exclude, found_sessions
+from rigidimeter.rig.console.page import epoch_panes, exclude, found_sessions
 
 EXCLUSIONS = "exclusions.csv"
 TWICE = parse_settings({"protocol": {"blocks": [{"epochs": 4}], "rests_s": [4.0]}})
@@ -114,7 +114,7 @@ def test_a_table_that_is_none_is_not_written_over(root):
 
 
 def test_an_epoch_is_drawn_from_its_samples(root):
-    panes = epoch_traces(root / "S01-1", "2", root / "none.csv")
+    panes = epoch_panes(root / "S01-1", "2", root / "none.csv")
     assert [pane["title"] for pane in panes] == [
         "torque [N·m]",
         "angle [deg]",
@@ -133,7 +133,7 @@ def test_an_epoch_is_drawn_from_its_samples(root):
         assert len(pane["spectrum"]["data"]) == len(pane["data"])
         assert pane["spectrum"]["data"][0][-1] == pytest.approx(rate_hz / 2)
     with pytest.raises(UserError, match="no samples of epoch 3"):
-        epoch_traces(root / "S01-1", "3", root / "none.csv")
+        epoch_panes(root / "S01-1", "3", root / "none.csv")
 
 
 def test_one_epoch_is_planned_again(root):

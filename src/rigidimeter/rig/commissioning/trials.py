@@ -29,7 +29,7 @@ Stretch = Callable[[ControlLoop], object]
 
 DROP_S = 2.5
 FRESH_S = 0.03
-MOST_READS = 400
+MAX_READS = 400
 """A read empties at most a part of what piled up while a question waited."""
 
 PILED_UP = {int(Cause.TORQUE_STALE), int(Cause.TORQUE_PACKETS), int(Cause.TORQUE_FROZEN)}
@@ -215,14 +215,14 @@ def trial(setup: Setup, *stretches: Stretch, spread: float = 0.0) -> TrialResult
     return TrialResult(_readings([_OF_SAMPLE(sample) for sample in samples]), cause)
 
 
-def follow(velocity_rad_s: Array, rate_hz: float) -> Stretch:
+def follow_stretch(velocity_rad_s: Array, rate_hz: float) -> Stretch:
     """Return the stretch that commands velocities, one a tick; their sum is for the record."""
     angle = (np.cumsum(velocity_rad_s) / rate_hz).tolist()
     velocity = velocity_rad_s.tolist()
     return lambda loop: control_modes.follow(loop, DURING_TRIAL, angle, velocity)
 
 
-def hold(duration_s: float) -> Stretch:
+def hold_stretch(duration_s: float) -> Stretch:
     """Return the stretch that stands still."""
     return lambda loop: control_modes.hold(loop, duration_s)
 
@@ -276,7 +276,7 @@ def drop_old_samples(setup: Setup) -> None:
 
 
 def _empty(setup: Setup) -> None:
-    for _ in range(MOST_READS):
+    for _ in range(MAX_READS):
         if setup.time.now() - setup.rig.read().torque_time_s < FRESH_S:
             return
 

@@ -16,9 +16,9 @@ from typing import Any
 
 from rigidimeter.rig.commissioning.checks import yes
 from rigidimeter.rig.commissioning.commissioning_record import CommissioningRecord
-from rigidimeter.rig.commissioning.daily_record import DailyRecord, Reference, objection
+from rigidimeter.rig.commissioning.daily_record import DailyRecord, ReferenceInertia, objection
 from rigidimeter.rig.commissioning.first_steps import (
-    Findings,
+    CheckResults,
     at_rest,
     move,
     power_allowed,
@@ -35,7 +35,7 @@ from rigidimeter.rig.commissioning.torque_checks import (
     precision_check,
     sign_check,
 )
-from rigidimeter.rig.commissioning.trial import Setup, stopped_for
+from rigidimeter.rig.commissioning.trials import Setup, stopped_for
 from rigidimeter.rig.devices import RigFile
 from rigidimeter.rig.devices.base import DeviceError
 from rigidimeter.rig.guard import Cause
@@ -55,41 +55,41 @@ class Compared:
     ----------
     known_inertia_kg_m2 : float, optional
         Of everything beyond the sensor; compared in place of the reference, which stays.
-    reference : Reference, optional
+    reference : ReferenceInertia, optional
         Of the check before.
     new : bool
         Whether today's inertia is to be the reference from now on.
     """
 
     known_inertia_kg_m2: float | None = None
-    reference: Reference | None = None
+    reference: ReferenceInertia | None = None
     new: bool = False
 
     def known(self, commissioning_digest: str) -> KnownInertia | None:
         """Return what the inertia must be; None where nothing is known yet."""
         if self.known_inertia_kg_m2 is not None:
             return KnownInertia(self.known_inertia_kg_m2, 0.0, "as told")
-        kept = self.kept(commissioning_digest)
-        if kept is None or self.new:
+        reference = self.valid_reference(commissioning_digest)
+        if reference is None or self.new:
             return None
-        source = f"as on {kept.made_utc[:10]}"
-        return KnownInertia(kept.inertia_kg_m2, kept.inertia_se_kg_m2, source)
+        source = f"as on {reference.made_utc[:10]}"
+        return KnownInertia(reference.inertia_kg_m2, reference.inertia_se_kg_m2, source)
 
-    def kept(self, commissioning_digest: str) -> Reference | None:
+    def valid_reference(self, commissioning_digest: str) -> ReferenceInertia | None:
         """Return the reference if it is of this commissioning."""
-        kept = self.reference
-        if kept is None or kept.commissioning_digest != commissioning_digest:
+        reference = self.reference
+        if reference is None or reference.commissioning_digest != commissioning_digest:
             return None
-        return kept
+        return reference
 
     def after(
         self, answer: TorqueAnswer, commissioning_digest: str, made_utc: str
-    ) -> Reference | None:
+    ) -> ReferenceInertia | None:
         """Return the reference after a check that passed."""
-        kept = self.kept(commissioning_digest)
-        if not self.new and (kept is not None or self.known_inertia_kg_m2 is not None):
-            return kept
-        return Reference(
+        reference = self.valid_reference(commissioning_digest)
+        if not self.new and (reference is not None or self.known_inertia_kg_m2 is not None):
+            return reference
+        return ReferenceInertia(
             inertia_kg_m2=answer.inertia_kg_m2,
             inertia_se_kg_m2=answer.inertia_se_kg_m2,
             made_utc=made_utc,
@@ -124,7 +124,7 @@ def daily_check(
     made_utc, software : str
         For the record.
     """
-    rig, found = setup.rig, Findings()
+    rig, found = setup.rig, CheckResults()
     commissioned: CommissioningRecord | None = None
     answer: TorqueAnswer | None = None
     name = "devices read back"
@@ -160,7 +160,7 @@ def daily_check(
 
 
 def _try(
-    setup: Setup, found: Findings, commissioned: CommissioningRecord, compared: Compared
+    setup: Setup, found: CheckResults, commissioned: CommissioningRecord, compared: Compared
 ) -> TorqueAnswer | None:
     """Try rest, a small move and the quick motion; return what the torque answered."""
     settings, limits = setup.settings, setup.limits

@@ -8,26 +8,37 @@ refused too: a page in a frame could be clicked on unseen, and to make many page
 the beats. On any other address than the loopback there is a token beside that.
 
 Sockets that say too much are closed: what they say is heard in the thread that hears the beats.
+
+A peer that opens connections and says nothing, or never ends the head of its request, would take
+the file descriptors and the memory of the program that leads the session. So there is a bound;
+where it is reached the oldest idle connection is closed, of the address that has most of them. What
+asks for nothing within `HEAD_S`, or begins a request with too long a head, is closed in any case.
+The sockets of pages are not idle.
 """
 
 from __future__ import annotations
 
+import asyncio
 import hmac
 import ipaddress
+import itertools
 import time
+from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable, Mapping, MutableMapping
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
+import uvicorn
+
 COOKIE = "rigidimeter_token"
 LONGEST_BODY = 200_000
 """Bytes of a request; the largest that the page sends is a protocol."""
 
-MOST_MESSAGES_S = 200.0
-"""Messages a second on a socket, on average over `MOST_MESSAGES` of them; a page sends some 20."""
+MAX_MESSAGES_S = 200.0
+"""Messages a second on a socket, on average over `MAX_MESSAGES` of them; a page sends some 20."""
 
-MOST_MESSAGES = 400
+MAX_MESSAGES = 400
 
 SENT_WITH_ALL = (
     (b"content-security-policy", b"frame-ancestors 'none'"),
@@ -42,6 +53,17 @@ Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
 Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
+
+MAX_CONNECTIONS = 128
+"""At once, with the sockets of pages; a browser opens some eight for a page."""
+
+HEAD_S = 10.0
+"""So long a connection may last without a whole head of a request."""
+
+LONGEST_HEAD = 262_144
+"""Bytes of it; what reads them ahead is not to grow with what is sent."""
+
+_numbers = itertools.count()
 
 
 def is_loopback(host: str) -> bool:
@@ -129,7 +151,7 @@ def same_token(given: str, token: str) -> bool:
     return hmac.compare_digest(given.encode(), token.encode())
 
 
-class Gate:
+class AccessCheck:
     """Answers in place of the application where a request may not pass.
 
     Parameters
@@ -207,7 +229,7 @@ def slow_enough(
     receive: Receive, send: Send, now_s: Callable[[], float] = time.monotonic
 ) -> Receive:
     """Return what receives a socket's messages, until they come too fast; then it is closed."""
-    left, before_s = float(MOST_MESSAGES), now_s()
+    left, before_s = float(MAX_MESSAGES), now_s()
 
     async def received() -> MutableMapping[str, Any]:
         nonlocal left, before_s
@@ -215,10 +237,10 @@ def slow_enough(
         if message["type"] != "websocket.receive":
             return message
         passed_s, before_s = now_s() - before_s, now_s()
-        left = min(left + MOST_MESSAGES_S * passed_s, MOST_MESSAGES) - 1.0
+        left = min(left + MAX_MESSAGES_S * passed_s, MAX_MESSAGES) - 1.0
         if left >= 0.0:
             return message
-        why = f"a page may send {MOST_MESSAGES_S:g} messages a second"
+        why = f"a page may send {MAX_MESSAGES_S:g} messages a second"
         await send({"type": "websocket.close", "code": 1008, "reason": why})
         return {"type": "websocket.disconnect", "code": 1008}
 
@@ -250,3 +272,47 @@ async def _refuse(scope: Scope, receive: Receive, send: Send, why: str) -> None:
     ]
     await send({"type": "http.response.start", "status": 403, "headers": headers})
     await send({"type": "http.response.body", "body": body})
+
+
+def bound_connections(config: uvicorn.Config) -> None:
+    """Have the server of a configuration keep to these bounds, whatever reads its HTTP."""
+    config.load()
+    protocol: Any = config.http_protocol_class
+
+    class Bounded(protocol):  # type: ignore[misc]
+        """A connection that is closed where it is idle and in the way."""
+
+        def connection_made(self, transport: asyncio.Transport) -> None:
+            super().connection_made(transport)
+            self.number, self.address = next(_numbers), self.client[0] if self.client else ""
+            self.head_bytes, self.cycle_before = 0, None
+            self.loop.call_later(HEAD_S, self.end_without_request)
+            if len(self.connections) > MAX_CONNECTIONS:
+                idle = [one for one in self.connections if isinstance(one, Bounded) and one.idle]
+                of_each = Counter(one.address for one in idle)
+                max(idle, key=lambda one: (of_each[one.address], -one.number)).end()
+
+        def data_received(self, data: bytes) -> None:
+            if self.cycle is not self.cycle_before:
+                self.head_bytes, self.cycle_before = 0, self.cycle
+            self.head_bytes += len(data) if self.idle else 0
+            if self.head_bytes > LONGEST_HEAD:
+                self.end()
+            else:
+                super().data_received(data)
+
+        @property
+        def idle(self) -> bool:
+            """Whether no request is being answered."""
+            return self.cycle is None or bool(self.cycle.response_complete)
+
+        def end_without_request(self) -> None:
+            if self.cycle is None and self in self.connections:
+                self.end()
+
+        def end(self) -> None:
+            """Close it at once; it does not count from here on."""
+            self.connections.discard(self)
+            self.transport.abort()
+
+    config.http_protocol_class = Bounded

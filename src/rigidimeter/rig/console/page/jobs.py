@@ -23,14 +23,14 @@ LONGEST_S = 300.0
 NICENESS = 10
 """Of a command that computes: a session that is started beside it comes first."""
 
-LOOKS_S = 0.1
+POLL_S = 0.1
 """How often it is looked whether a command is to be ended."""
 
 RigSteps = Callable[[Settings, Path | None], tuple[RigStep, ...]]
 
 
 @dataclass(frozen=True)
-class Answer:
+class CommandResult:
     """What a command printed, and whether it ended well."""
 
     good: bool
@@ -56,15 +56,15 @@ class Answer:
         if not self.good:
             lines = lines or [line for line in text.splitlines() if line.startswith("error: ")]
         sign = "" if self.good else "<p><b>✗ not good:</b></p>"
-        whole = f'<pre tabindex="0">{escape(text)}</pre>'
+        full_text = f'<pre tabindex="0">{escape(text)}</pre>'
         if not lines:
-            return sign + whole
+            return sign + full_text
         listed = "".join(f"<li>{escape(line)}</li>" for line in lines)
         begin = "<details>" if self.good else "<details open>"
-        return f"{sign}<ul>{listed}</ul>{begin}<summary>All numbers</summary>{whole}</details>"
+        return f"{sign}<ul>{listed}</ul>{begin}<summary>All numbers</summary>{full_text}</details>"
 
 
-class Work:
+class Jobs:
     """Runs commands of `rigidimeter`, one at a time.
 
     Parameters
@@ -75,12 +75,12 @@ class Work:
 
     def __init__(self, rig_steps: RigSteps = lambda *_: ()) -> None:
         self.rig_steps = rig_steps
-        self.zero_read: Answer | None = None
+        self.zero_read: CommandResult | None = None
         self._one = asyncio.Lock()
 
     async def command(
         self, *arguments: str, timeout_s: float = LONGEST_S, folder: Path | None = None
-    ) -> Answer:
+    ) -> CommandResult:
         """Run a command in a folder and return what it printed.
 
         Its arguments come from this program alone.
@@ -98,29 +98,29 @@ class Work:
             try:
                 out, _ = await asyncio.wait_for(process.communicate(), timeout_s)
             except TimeoutError:
-                return Answer(False, f"it took longer than {timeout_s:g} s and was ended")
+                return CommandResult(False, f"it took longer than {timeout_s:g} s and was ended")
             finally:
                 if process.returncode is None:
                     with suppress(ProcessLookupError):
                         process.kill()
-        return Answer(process.returncode == 0, out.decode(errors="replace").strip())
+        return CommandResult(process.returncode == 0, out.decode(errors="replace").strip())
 
     async def conversation(
         self,
         *arguments: str,
-        said: Callable[[str], None],
-        asked: Callable[[str], Awaitable[bool]],
+        on_output: Callable[[str], None],
+        on_question: Callable[[str], Awaitable[bool]],
         going_on: Callable[[], bool],
-    ) -> Answer:
+    ) -> CommandResult:
         """Run a command that moves a rig and asks before.
 
         Parameters
         ----------
         *arguments : str
             They come from this program alone.
-        said : callable
+        on_output : callable
             Takes all that it has printed so far.
-        asked : callable
+        on_question : callable
             Takes a question; True is consent.
         going_on : callable
             Whether it may go on. If not it is told to end, and stops the rig as it does so.
@@ -139,17 +139,17 @@ class Work:
                 async for raw in process.stdout:
                     line = raw.decode(errors="replace").rstrip()
                     if line.startswith(QUESTION):
-                        await _answer(process, asked(line.removeprefix(QUESTION)))
+                        await _answer(process, on_question(line.removeprefix(QUESTION)))
                     else:
                         lines.append(line)
-                        said("\n".join(lines))
+                        on_output("\n".join(lines))
                 await process.wait()
             finally:
                 watch.cancel()
                 if process.returncode is None:
                     with suppress(ProcessLookupError):
                         process.terminate()
-        return Answer(process.returncode == 0, "\n".join(lines).strip())
+        return CommandResult(process.returncode == 0, "\n".join(lines).strip())
 
 
 async def _answer(process: asyncio.subprocess.Process, asked: Awaitable[bool]) -> None:
@@ -166,7 +166,7 @@ async def _answer(process: asyncio.subprocess.Process, asked: Awaitable[bool]) -
 
 async def _end_when(process: asyncio.subprocess.Process, going_on: Callable[[], bool]) -> None:
     while going_on():
-        await asyncio.sleep(LOOKS_S)
+        await asyncio.sleep(POLL_S)
     with suppress(ProcessLookupError):
         process.terminate()
 

@@ -14,12 +14,16 @@ from rigidimeter.core.session import PlannedEpoch
 from rigidimeter.core.units import deg_from_rad
 from rigidimeter.rig.acquisition import State
 from rigidimeter.rig.acquisition.processes import PAUSE_NEXT, STOP_NEXT, LiveEstimate, LoopStatus
-from rigidimeter.rig.console.lamps import Lamp, RecorderState, lamps
-from rigidimeter.rig.console.limit_distances import LimitDistance, limit_distances
-from rigidimeter.rig.console.live_values import LiveValue, live_values
-from rigidimeter.rig.console.recent_samples import RecentSamples
-from rigidimeter.rig.console.session_plan import SessionPlan
-from rigidimeter.rig.console.session_progress import Progress
+from rigidimeter.rig.console.indicators import (
+    Indicator,
+    LimitDistance,
+    RecentSamples,
+    RecorderState,
+    all_indicators,
+    limit_distances,
+)
+from rigidimeter.rig.console.live_parameters import LiveValue, live_values
+from rigidimeter.rig.console.session_progress import Progress, SessionPlan
 from rigidimeter.rig.guard import Cause, Reaction
 
 
@@ -81,7 +85,7 @@ class Facts:
     angle_deg, torque_nm : float
         Now; the torque is the mean of 0.1 s.
     distances : tuple of LimitDistance
-    lamps : tuple of Lamp
+    indicators : tuple of Indicator
     cause : Cause
         For which the guard holds or has stopped the rig.
     stop_words : str
@@ -102,7 +106,7 @@ class Facts:
     angle_deg: float
     torque_nm: float
     distances: tuple[LimitDistance, ...]
-    lamps: tuple[Lamp, ...]
+    indicators: tuple[Indicator, ...]
     cause: Cause
     stop_words: str
 
@@ -151,7 +155,9 @@ def facts(
         angle_deg=deg_from_rad(loop.angle_rad),
         torque_nm=recent.torque_nm,
         distances=distances,
-        lamps=lamps(plan.settings, loop, recent, distances, recorder, left_s, caution),
+        indicators=all_indicators(
+            plan.settings, loop, recent, distances, recorder, left_s, caution
+        ),
         cause=Cause(loop.cause),
         stop_words=_stop_words(progress, loop),
     )

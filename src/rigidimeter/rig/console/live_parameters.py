@@ -33,7 +33,7 @@ from statistics import NormalDist, median
 from rigidimeter.core.settings import OnlineSettings
 from rigidimeter.rig.acquisition.processes import LiveEstimate
 
-MOST_PART = 0.5
+MAX_PART = 0.5
 """Half an interval, and a shift, above this part of the value say that it is not known yet."""
 
 KNOWN_PART = 0.1
@@ -128,10 +128,10 @@ def _value(
     value, half_width = getattr(now, name), NORMAL_95 * getattr(now, f"{name}_se")
     shift = abs(value - getattr(before, name)) if before is not None else math.inf
     if not why:
-        if not half_width < MOST_PART * abs(value):
+        if not half_width < MAX_PART * abs(value):
             percent = 100.0 * half_width / abs(value) if value else math.inf
             why = f"not known yet (±{percent:.0f} %)" if percent < 1000 else "not known yet"
-        elif not shift < MOST_PART * abs(value):
+        elif not shift < MAX_PART * abs(value):
             why = "still changes"
     return LiveValue(symbol, unit, value, half_width, not why, why)
 

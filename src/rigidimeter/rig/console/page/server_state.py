@@ -1,7 +1,17 @@
-"""What the server of the page and the session beside it know of each other.
+"""What the server of the page and the session beside it know of each other, and of the operator.
 
 The session is seen through by the program's first thread, as in a terminal; the server has a thread
-of its own. They share this desk. Each attribute is written by one of the two.
+of its own. They share this state. Each attribute is written by one of the two.
+
+Whether an operator is there, and at which of several pages, is their `Presence`. The page that has
+control beats about twenty times a second, by a script of its own, so a page that is closed, frozen,
+or cut off is silent. The time of its last beat is the console's heartbeat in the shared status,
+which the loop looks at every tick: the server cannot beat for a page.
+
+There is one exception. A page that says that it goes away, because it is reloaded, closed or no
+longer in front, has its session paused: the arm is held still. As long as the loop shows that it is
+paused, and for `AWAY_S` at most, it may come back. Then its silence counts again, and the loop ends
+the session. Only the same tab may come back meanwhile; any other page can only look.
 """
 
 from __future__ import annotations
@@ -18,7 +28,98 @@ from rigidimeter.core.settings import Settings
 from rigidimeter.rig.acquisition import State
 from rigidimeter.rig.acquisition.processes import Flag, SessionMemory
 from rigidimeter.rig.console import SessionPlan
-from rigidimeter.rig.console.page.presence import Presence
+
+AWAY_S = 20.0
+"""For so long a page that said that it goes may be away from a paused session."""
+
+SETTLES_S = 0.3
+"""So long after it said so the loop may take to show that it is paused."""
+
+SILENT_S = 0.45
+"""A page that was silent for so long is lost: with the ramp to rest it is less than 0.5 s."""
+
+_NS = 1_000_000_000
+
+
+@dataclass
+class Presence:
+    """The page in control; each attribute is written by the server's thread alone.
+
+    Attributes
+    ----------
+    page : str
+        The secret of the page that has control; empty if none has.
+    tab : str
+        The browser's tab in which it was last, which may take control again after a reload.
+    beat_ns : int
+        When it was last heard of, on CLOCK_MONOTONIC.
+    left_ns : int
+        When it said that it goes; 0 while it is there.
+    """
+
+    page: str = ""
+    tab: str = ""
+    beat_ns: int = 0
+    left_ns: int = 0
+
+    def arrive(self, page: str, tab: str, now_ns: int, *, session: bool) -> bool:
+        """Let a page in; return whether it has control.
+
+        Parameters
+        ----------
+        page, tab : str
+            Secrets of the page and of the tab.
+        now_ns : int
+        session : bool
+            Whether a session runs: then only the tab that had control takes it again.
+        """
+        comes_back = tab == self.tab and (not self.page or self.left_ns > 0)
+        free = self.lost(now_ns) or (not self.page and not session)
+        if comes_back or free:
+            self.page, self.tab = page, tab
+            self.beat_ns, self.left_ns = now_ns, 0
+        return self.page == page
+
+    def has_control(self, page: str) -> bool:
+        """Whether a page may act."""
+        return bool(page) and page == self.page
+
+    def beat(self, page: str, now_ns: int) -> None:
+        """Take a beat of a page; of one that looks, nothing."""
+        if self.has_control(page):
+            self.beat_ns, self.left_ns = now_ns, 0
+
+    def leave(self, page: str, now_ns: int) -> bool:
+        """Take the word of a page that it goes; return whether it had control."""
+        if not self.has_control(page):
+            return False
+        self.left_ns = now_ns
+        return True
+
+    def gone(self, page: str) -> None:
+        """Take note that the connection to a page is closed."""
+        if self.has_control(page):
+            self.page = ""
+
+    def seen_ns(self, now_ns: int, *, still: bool) -> int:
+        """Return the heartbeat of the operator.
+
+        Parameters
+        ----------
+        now_ns : int
+        still : bool
+            Whether the loop shows that the arm is held still.
+        """
+        if self.left_ns:
+            away_ns = now_ns - self.left_ns
+            if away_ns < SETTLES_S * _NS or (still and away_ns < AWAY_S * _NS):
+                return now_ns
+        return self.beat_ns
+
+    def lost(self, now_ns: int) -> bool:
+        """Whether the page that had control may no longer come back."""
+        until_ns = self.left_ns + AWAY_S * _NS if self.left_ns else self.beat_ns + SILENT_S * _NS
+        return now_ns > until_ns
 
 
 @dataclass(frozen=True)
@@ -87,7 +188,7 @@ class Place:
         return self.settings_path.parent if self.settings_path is not None else Path.cwd()
 
 
-class Desk:
+class ServerState:
     """Requests to the session's thread, and the session to the server's.
 
     Parameters
@@ -106,7 +207,7 @@ class Desk:
         self.checking = ""
         self.check_stopped = False
         self.stop_pressed = False
-        self.told_to_end = False
+        self.ending = False
         self._now_ns = now_ns
         self._requests: queue.SimpleQueue[StartRequest] = queue.SimpleQueue()
         self._still = True
@@ -176,7 +277,7 @@ class Desk:
         self._count += 1
         self._still = True
 
-        def look(shared: SessionMemory) -> None:
+        def follow(shared: SessionMemory) -> None:
             if self.stop_pressed:
                 shared.status.raise_flag(Flag.EMERGENCY_STOP)
             loop = shared.status.loop()
@@ -184,7 +285,7 @@ class Desk:
             if self.running is None:
                 self.running = RunningSession(self._count, shared.names, plan, folder)
 
-        return look
+        return follow
 
     def operator_seen_ns(self) -> int:
         """Return the operator's heartbeat: when the page in control was last heard of."""

@@ -3,7 +3,7 @@
 import pytest
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.rig.console.page import line, name, number, whole_number
+from rigidimeter.rig.console.page import parse_integer, parse_line, parse_name, parse_number
 
 
 @pytest.mark.parametrize(
@@ -22,13 +22,13 @@ from rigidimeter.rig.console.page import line, name, number, whole_number
     ],
 )
 def test_a_decimal_comma_is_understood(text, value):
-    assert number(text, "x") == value
+    assert parse_number(text, "x") == value
 
 
 @pytest.mark.parametrize("text", ["1,500", "12,000", "-3,250"])
 def test_a_comma_that_may_separate_thousands_is_refused(text):
     with pytest.raises(UserError, match=r"may be .* or .*; write it without a comma"):
-        number(text, "amplitude")
+        parse_number(text, "amplitude")
 
 
 @pytest.mark.parametrize(
@@ -36,10 +36,10 @@ def test_a_comma_that_may_separate_thousands_is_refused(text):
 )
 def test_what_is_no_number_is_refused(text):
     with pytest.raises(UserError, match="is no number"):
-        number(text, "amplitude")
+        parse_number(text, "amplitude")
 
 
-@pytest.mark.parametrize("read", [number, whole_number])
+@pytest.mark.parametrize("read", [parse_number, parse_integer])
 @pytest.mark.parametrize("text", ["1e999", "-1e400", "9" * 400])
 def test_what_no_number_of_the_computer_holds_is_refused(read, text):
     with pytest.raises(UserError, match="too large"):
@@ -47,9 +47,9 @@ def test_what_no_number_of_the_computer_holds_is_refused(read, text):
 
 
 def test_epochs_are_whole():
-    assert whole_number("4", "epochs") == 4
+    assert parse_integer("4", "epochs") == 4
     with pytest.raises(UserError, match="no whole number"):
-        whole_number("4,5", "epochs")
+        parse_integer("4,5", "epochs")
 
 
 @pytest.mark.parametrize(
@@ -57,10 +57,10 @@ def test_epochs_are_whole():
 )
 def test_a_name_cannot_be_a_path_nor_markup(text):
     with pytest.raises(UserError, match="subject"):
-        name(text + ("" if text.strip() == text else "x/"), "subject")
+        parse_name(text + ("" if text.strip() == text else "x/"), "subject")
 
 
 def test_a_line_is_one_line():
-    assert line(" said ", "note") == "said"
+    assert parse_line(" said ", "note") == "said"
     with pytest.raises(UserError, match="cannot be shown"):
-        line("a\nb", "note")
+        parse_line("a\nb", "note")

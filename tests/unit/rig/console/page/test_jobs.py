@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from rigidimeter.rig.console.page import QUESTION, Answer, Work, work
+from rigidimeter.rig.console.page import QUESTION, CommandResult, Jobs, jobs
 
 ASKS = f"""
 import sys
@@ -17,13 +17,13 @@ sys.stdin.readline()
 
 
 def converse(monkeypatch, script, asked, going_on):
-    monkeypatch.setattr(work, "_python", lambda: (sys.executable, "-S", "-c", script))
+    monkeypatch.setattr(jobs, "_python", lambda: (sys.executable, "-S", "-c", script))
     said = []
 
     async def run():
-        one = Work()
+        one = Jobs()
         return await one.conversation(
-            said=said.append, asked=asked, going_on=lambda: going_on(said)
+            on_output=said.append, on_question=asked, going_on=lambda: going_on(said)
         )
 
     return asyncio.run(run()), said
@@ -56,7 +56,7 @@ def test_a_command_that_may_not_go_on_is_ended_though_nobody_answers(monkeypatch
 
 
 def test_an_answer_names_no_folder_that_is_gone_and_no_markup():
-    answer = Answer(False, "/tmp/x/protocol.toml: <b>wrong</b>")
+    answer = CommandResult(False, "/tmp/x/protocol.toml: <b>wrong</b>")
     assert answer.html("/tmp/x", ["do <this>"]) == (
         "<p><b>✗ not good:</b></p><ul><li>do &lt;this&gt;</li></ul><details open>"
         '<summary>All numbers</summary><pre tabindex="0">…/protocol.toml: '
@@ -70,5 +70,5 @@ import os, time
 while os.getpriority(os.PRIO_PROCESS, 0) < 10: time.sleep(0.01)
 print("gives way")
 """
-    monkeypatch.setattr(work, "_python", lambda: (sys.executable, "-S", "-c", script))
-    assert asyncio.run(Work().command(timeout_s=30.0)) == Answer(True, "gives way")
+    monkeypatch.setattr(jobs, "_python", lambda: (sys.executable, "-S", "-c", script))
+    assert asyncio.run(Jobs().command(timeout_s=30.0)) == CommandResult(True, "gives way")

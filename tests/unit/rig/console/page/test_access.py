@@ -7,7 +7,7 @@ import pytest
 
 from rigidimeter.rig.console.page import (
     LONGEST_BODY,
-    Gate,
+    AccessCheck,
     cookie_name,
     host_allowed,
     is_loopback,
@@ -39,7 +39,7 @@ def ask(token="", kind="http", method="GET", query="", **headers):
     }
     if kind == "http":
         scope["method"] = method
-    asyncio.run(Gate(app, token, ["localhost"])(scope, receive, send))
+    asyncio.run(AccessCheck(app, token, ["localhost"])(scope, receive, send))
     first = sent[0]
     if first == "passed":
         return "passed", {}

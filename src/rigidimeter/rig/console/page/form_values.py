@@ -12,7 +12,7 @@ _COMMA = re.compile(r"([-+\u2212]?\d*),(\d+)", re.ASCII)
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,39}")
 
 
-def number(text: str, what: str) -> float:
+def parse_number(text: str, what: str) -> float:
     """Return the number that was entered, with a decimal point or a decimal comma.
 
     A comma before three digits may separate thousands, so it is refused.
@@ -24,7 +24,7 @@ def number(text: str, what: str) -> float:
 
     Examples
     --------
-    >>> number("1,5", "amplitude"), number(" 20 ", "duration")
+    >>> parse_number("1,5", "amplitude"), parse_number(" 20 ", "duration")
     (1.5, 20.0)
     """
     plain = text.strip().replace("\N{NO-BREAK SPACE}", "")
@@ -43,7 +43,7 @@ def number(text: str, what: str) -> float:
     return value
 
 
-def whole_number(text: str, what: str) -> int:
+def parse_integer(text: str, what: str) -> int:
     """Return the whole number that was entered.
 
     Raises
@@ -51,13 +51,13 @@ def whole_number(text: str, what: str) -> int:
     UserError
         If it is none.
     """
-    value = number(text, what)
+    value = parse_number(text, what)
     if value != int(value):
         raise UserError(f"{what}: {text.strip()} is no whole number")
     return int(value)
 
 
-def name(text: str, what: str) -> str:
+def parse_name(text: str, what: str) -> str:
     """Return a name that can be a folder's: letters, digits, - and _, at most 40.
 
     Raises
@@ -67,7 +67,7 @@ def name(text: str, what: str) -> str:
 
     Examples
     --------
-    >>> name("S01", "subject")
+    >>> parse_name("S01", "subject")
     'S01'
     """
     stripped = text.strip()
@@ -81,7 +81,7 @@ def name(text: str, what: str) -> str:
     return stripped
 
 
-def line(text: str, what: str, most: int = 200) -> str:
+def parse_line(text: str, what: str, max_length: int = 200) -> str:
     """Return one line of text, which may be empty.
 
     Raises
@@ -90,8 +90,8 @@ def line(text: str, what: str, most: int = 200) -> str:
         If it is too long, or holds characters that cannot be shown.
     """
     stripped = text.strip()
-    if len(stripped) > most:
-        raise UserError(f"{what} has {len(stripped)} characters; {most} are possible")
+    if len(stripped) > max_length:
+        raise UserError(f"{what} has {len(stripped)} characters; {max_length} are possible")
     if not stripped.isprintable():
         raise UserError(f"{what} holds characters that cannot be shown, such as a line feed")
     return stripped
