@@ -80,12 +80,11 @@ def each(
     yielded, died = 0, False
     with _cluster(scheduler) if scheduler else _machine(jobs) as (submit, size, death, gone):
         while True:
-            if not suspects:
-                new = [*islice(left, _AHEAD * size - len(begun))]
-            else:
-                # One of those that were begun ended its process: which, shows when each runs alone.
+            new: Iterable[tuple[int, Item]] = islice(left, _AHEAD * size - len(begun))
+            if suspects:  # one of them ended its process: which, shows when each runs alone
                 new = [] if begun else [*suspects.items()][:1]
-            begun |= {submit(function, item): (number, item) for number, item in new}
+            for number, item in new:
+                begun[submit(function, item)] = number, item
             if not begun:
                 break
             for future in wait(begun, return_when=FIRST_COMPLETED).done:
