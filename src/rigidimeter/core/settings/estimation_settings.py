@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar, Literal, Self
-
-from pydantic import model_validator
+from typing import ClassVar, Literal
 
 from rigidimeter.core.settings.section import Section, quantity
 
@@ -31,6 +29,12 @@ class EstimationSettings(Section):
     it does to the torque is then done to the motion too.
     """
 
+    ascending: ClassVar = (
+        ("band_low_hz", "band_high_hz"),
+        ("band_low_hz", "band_high_unknown_hz"),
+        ("band_low_hz", "band_high_closed_loop_hz"),
+    )
+
     band_low_hz: float = quantity(0.15, "Hz", 0.001, 100.0)
     band_high_hz: float = quantity(10.0, "Hz", 0.1, 1000.0)
     band_high_unknown_hz: float = quantity(50.0, "Hz", 0.1, 1000.0)
@@ -43,16 +47,6 @@ class EstimationSettings(Section):
     published_highpass_order: int = quantity(2, "1", 1, 6)
     correct_delay: bool = True
     max_delay_s: float = quantity(0.04, "s", 0.001, 0.2)
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        highest = min(self.band_high_hz, self.band_high_unknown_hz, self.band_high_closed_loop_hz)
-        if self.band_low_hz >= highest:
-            raise ValueError(
-                "band_low_hz must be below band_high_hz, band_high_unknown_hz and "
-                "band_high_closed_loop_hz"
-            )
-        return self
 
 
 class ScoreSettings(Section):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 
 def quantity(default: float, unit: str, low: float, high: float, *, above: bool = False) -> Any:
@@ -26,8 +26,19 @@ def quantity(default: float, unit: str, low: float, high: float, *, above: bool 
 
 
 class Section(BaseModel):
-    """One table of the settings: no unknown keys, no silent conversions, no changes afterwards."""
+    """One table of the settings: no unknown keys, no silent conversions, no changes afterwards.
+
+    Of each pair of keys in `ascending` the first must be below the second.
+    """
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, strict=True, allow_inf_nan=False, validate_default=True
     )
+    ascending: ClassVar[tuple[tuple[str, str], ...]] = ()
+
+    @model_validator(mode="after")
+    def _ascends(self) -> Self:
+        for low, high in self.ascending:
+            if getattr(self, low) >= getattr(self, high):
+                raise ValueError(f"{low} must be below {high}")
+        return self

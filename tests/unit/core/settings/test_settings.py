@@ -55,6 +55,21 @@ def test_the_controller_is_read_per_degree():
         ({"sinusoid": {"amplitude_deg": 60.0}}, "must stay below guard.position_limit_deg"),
         ({"guard": {"reaction_time_s": 0.001}}, "is shorter than this rig may take to react"),
         ({"rig": {"torque": {"rate_hz": 2000.0}}}, "must not exceed rig.tick_rate_hz"),
+        *(
+            ({table: {low: 2.0, high: 2.0}}, f"{table}: {low} must be below {high}")
+            for table, low, high in (
+                ("prbs", "wanted_low_hz", "wanted_high_hz"),
+                ("estimation", "band_low_hz", "band_high_unknown_hz"),
+                ("scores", "band_low_hz", "band_high_hz"),
+                ("diagnostics", "voluntary_low_hz", "voluntary_high_hz"),
+                ("diagnostics", "min_inertia_kg_m2", "max_inertia_kg_m2"),
+                ("online", "band_low_hz", "band_high_hz"),
+            )
+        ),
+        (
+            {"subject": {"OFF": {"voluntary_low_hz": 5.0}}},
+            "subject.OFF: voluntary_low_hz must be below voluntary_high_hz",
+        ),
     ],
 )  # fmt: skip
 def test_a_bad_value_is_answered_with_key_value_unit_and_range(values, sentence):
