@@ -1,6 +1,5 @@
 """Validated settings: TOML with the unit in every key."""
 
-from rigidimeter.core.settings.commissioning_settings import CommissioningSettings
 from rigidimeter.core.settings.estimation_settings import (
     FEWEST_LINES,
     USABLE_FRACTION_OF_RATE,
@@ -34,7 +33,7 @@ from rigidimeter.core.settings.loop_settings import (
     ZeroingSettings,
 )
 from rigidimeter.core.settings.messages import validated
-from rigidimeter.core.settings.models import Settings
+from rigidimeter.core.settings.models import CommissioningSettings, Settings
 from rigidimeter.core.settings.renamed import RENAMED, with_new_names
 from rigidimeter.core.settings.rig_settings import (
     MotionSensorSettings,
