@@ -229,8 +229,8 @@ class EmulatedRig:
 
     def _tell_drive(self, name: str, value: float | None) -> None:
         # Emergency codes, modes and bits are whole numbers.
-        whole = int(value) if value is not None and value.is_integer() else value
-        self.drive.misbehave(name, *(() if whole is None else (whole,)))
+        integer = int(value) if value is not None and value.is_integer() else value
+        self.drive.misbehave(name, *(() if integer is None else (integer,)))
 
     def _behave(self) -> dict[str, Any]:
         self._wrong.clear()

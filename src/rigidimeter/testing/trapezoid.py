@@ -57,15 +57,15 @@ class Trapezoid:
     def change(self, wanted: float, ramps: Ramps, step_s: float) -> float:
         """Change the speed toward the wanted one; return the largest change allowed."""
         speeding_up = wanted * self.speed >= 0.0 and abs(wanted) > abs(self.speed)
-        most = (ramps.up if speeding_up else ramps.down) * step_s
-        self.speed += max(-most, min(most, wanted - self.speed))
-        return most
+        change = (ramps.up if speeding_up else ramps.down) * step_s
+        self.speed += max(-change, min(change, wanted - self.speed))
+        return change
 
     def step(self, ramps: Ramps, step_s: float) -> None:
         """Advance the move by a time step."""
-        most = self.change(self.wanted(ramps), ramps, step_s)
+        change = self.change(self.wanted(ramps), ramps, step_s)
         left, step = self.target - self.position, self.speed * step_s
-        arrives = not self.aborting and abs(self.speed) <= 2.0 * most
+        arrives = not self.aborting and abs(self.speed) <= 2.0 * change
         if arrives and abs(left) <= max(1.0, abs(step)):
             self.position, self.speed = self.target, 0.0
         else:

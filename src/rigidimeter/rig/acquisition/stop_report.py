@@ -139,8 +139,8 @@ def _motion_age(latched: Latched) -> Found:
 def _ahead(latched: Latched) -> Found:
     sample, limits = latched.sample, latched.limits
     ahead_s = max(sample.motion_time_s, sample.torque_time_s) - sample.tick * limits.interval_s
-    most_s = limits.reaction_time_s + limits.interval_s
-    return Found(1e3 * ahead_s, 1e3 * most_s, "ms", setting="guard.reaction_time_s and one tick")
+    limit_s = limits.reaction_time_s + limits.interval_s
+    return Found(1e3 * ahead_s, 1e3 * limit_s, "ms", setting="guard.reaction_time_s and one tick")
 
 
 def _position(latched: Latched) -> Found:

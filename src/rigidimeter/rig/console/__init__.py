@@ -3,7 +3,6 @@
 from rigidimeter.rig.console.after_session import new_folder, next_steps, resume_command
 from rigidimeter.rig.console.indicators import (
     Level,
-    LimitDistance,
     RecentSamples,
     RecorderState,
     all_indicators,
@@ -14,7 +13,7 @@ from rigidimeter.rig.console.line_view import LineView, status_line
 from rigidimeter.rig.console.live_parameters import LiveValue, caution, live_values, settling_s
 from rigidimeter.rig.console.observer import Observer
 from rigidimeter.rig.console.orders import KEYS, order_of, save_to
-from rigidimeter.rig.console.session_facts import ConditionCount, Facts, facts
+from rigidimeter.rig.console.session_facts import Facts, facts
 from rigidimeter.rig.console.session_progress import (
     Progress,
     SessionPlan,

@@ -164,11 +164,15 @@ def caution(
         return ""
     inertia, others = now.inertia_kg_m2, [one.inertia_kg_m2 for one in before if _known(one)]
     usual = median(others) if others else math.nan
-    least, most = arms_kg_m2
+    lightest, heaviest = arms_kg_m2
     for low, high, what in (
         (LIGHTER * alone_kg_m2, math.inf, f"less than the rig's alone, {alone_kg_m2:.3g}"),
         (usual / ALIKE, usual * ALIKE, f"{inertia / usual:.2g} times that of the epochs before"),
-        (least, most, f"not within {least:.3g} to {most:.3g}, for which the margins hold"),
+        (
+            lightest,
+            heaviest,
+            f"not within {lightest:.3g} to {heaviest:.3g}, for which the margins hold",
+        ),
     ):
         if inertia < low or inertia > high:
             found = f"J {inertia:.3g} kg·m² is {what}"

@@ -50,7 +50,7 @@ class SimulatedRig:
     ) -> None:
         self._settings = settings
         self._interval_s = 1.0 / settings.tick_rate_hz
-        self._whole_tick = drive(
+        self._full_tick = drive(
             settings.drive_bandwidth_hz, settings.drive_damping_ratio, self._interval_s
         )
         streams = rig_streams(rng)
@@ -175,7 +175,7 @@ class SimulatedRig:
         if self._tick > 0:
             self._voluntary_before = self._voluntary_now
             self._voluntary_now = next(self._voluntary)
-            self._state = drive_step(self._whole_tick, before, self._command)
+            self._state = drive_step(self._full_tick, before, self._command)
         until_s = now_s + SAME_TIME_S
         while self._torque_next_s <= until_s:
             self._take_torque(self._torque_next_s, now_s, before)

@@ -160,8 +160,8 @@ class Servo:
         """Return the present target velocity, in drive units."""
         if "stale target" in self.wrong:
             return float(self.wrong["stale target"]) * UNITS_PER_RAD
-        most = self._node.value(0x607F)
-        return max(-most, min(most, self._node.value(0x60FF)))
+        limit = self._node.value(0x607F)
+        return max(-limit, min(limit, self._node.value(0x60FF)))
 
     def measured(self) -> tuple[int, int]:
         """Return the reported position and velocity, in drive units."""

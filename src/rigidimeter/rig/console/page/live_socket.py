@@ -139,18 +139,20 @@ class LiveSockets:
         sender = asyncio.create_task(_send(page))
         try:
             while True:
-                text = await socket.receive_text()
-                try:
-                    self._obey(page, parse_message(text))
-                except (RefusedMessage, ValueError) as error:
-                    is_note = text.startswith(_NOTE)
-                    page.send(_refused(str(error)) if is_note else json.dumps({"say": str(error)}))
+                self._hear(page, await socket.receive_text())
         except (WebSocketDisconnect, KeyError):  # it is gone, or sent bytes
             pass
         finally:
             self._pages.discard(page)
             presence.gone(page.secret)
             sender.cancel()
+
+    def _hear(self, page: OpenPage, text: str) -> None:
+        try:
+            self._obey(page, parse_message(text))
+        except (RefusedMessage, ValueError) as error:
+            is_note = text.startswith(_NOTE)
+            page.send(_refused(str(error)) if is_note else json.dumps({"say": str(error)}))
 
     def _obey(self, page: OpenPage, message: PageMessage) -> None:
         """Do what a page in control says; a page that looks is told so."""
@@ -190,8 +192,8 @@ class LiveSockets:
                 attached.notes.append(json_line(message.note).decode())
                 attached.post_notes()
                 score = message.note.get("score")
-                doubt = "" if score is None else off_scale(self._state.place, score)
-                page.send(json.dumps({"noted": True} | ({"say": doubt} if doubt else {})))
+                warning = "" if score is None else off_scale(self._state.place, score)
+                page.send(json.dumps({"noted": True} | ({"say": warning} if warning else {})))
             else:
                 page.send(_refused("the loop takes no notes now; send it again later"))
 

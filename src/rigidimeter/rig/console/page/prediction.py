@@ -41,8 +41,8 @@ def _stability(found: Mapping[str, Any], wanted: MarginsSettings) -> str:
             f"✗ Unstable with {', '.join(unstable)}: raise the controller's inertia or damping, or "
             f"shorten the delays ({asked})."
         )
-    gain_db = _least(found["conditions"], "gain_margin_db")
-    phase_deg = _least(found["conditions"], "phase_margin_deg")
+    gain_db = _smallest(found["conditions"], "gain_margin_db")
+    phase_deg = _smallest(found["conditions"], "phase_margin_deg")
     good = all(
         value is None or value >= limit
         for value, limit in (
@@ -62,7 +62,7 @@ def _stability(found: Mapping[str, Any], wanted: MarginsSettings) -> str:
     return f"{verdict}; smallest margins {' and '.join(margins)} ({asked})."
 
 
-def _least(conditions: Mapping[str, Any], key: str) -> float | None:
+def _smallest(conditions: Mapping[str, Any], key: str) -> float | None:
     values = [margins[key] for margins in conditions.values() if margins[key] is not None]
     return min(values, default=None)
 

@@ -107,8 +107,8 @@ def amplitude_densities(
         even = np.interp(grid_s, time_s[known], line[known]) if known.any() else 0.0 * grid_s
         frequency_hz, power = density(even, 1.0 / every_s)
         roots.append(np.sqrt(power))
-    least = MIN_PART * max(float(np.max(root[1:])) for root in roots)
-    drawn = [np.where(root > least, root, np.nan)[1:] for root in roots]
+    drawn_from = MIN_PART * max(float(np.max(root[1:])) for root in roots)
+    drawn = [np.where(root > drawn_from, root, np.nan)[1:] for root in roots]
     return [as_json(frequency_hz[1:]), *map(as_json, drawn)]
 
 

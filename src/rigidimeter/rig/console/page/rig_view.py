@@ -56,7 +56,7 @@ class RigView:
         self._question.classes("question").set_visibility(False)
         self._stop = ui.button("Stop the check", on_click=state.stop_check).mark("stop-check")
         self._stop.set_visibility(False)
-        self._said = ui.html("", sanitize=False).classes("answer")
+        self._output = ui.html("", sanitize=False).classes("answer")
 
     def show(self, steps: tuple[RigStep, ...]) -> None:
         """Show these steps."""
@@ -99,7 +99,7 @@ class RigView:
         if not self._state.begin_check(CHECKING[action]):
             return
         self._stop.set_visibility(True)
-        self._said.set_content(f"<p>{CHECKING[action]} …</p>")
+        self._output.set_content(f"<p>{CHECKING[action]} …</p>")
         try:
             with tempfile.TemporaryDirectory(prefix="rigidimeter-check-") as name:
                 path = Path(name) / "protocol.toml"
@@ -119,13 +119,13 @@ class RigView:
         if action == "zero":
             at = time.strftime("%Y-%m-%d %H:%M")
             self._jobs.zero_read = CommandResult(answer.good, f"{at}: {answer.last_lines}")
-            self._said.set_content("")
+            self._output.set_content("")
         else:
-            self._said.set_content(answer.html())
+            self._output.set_content(answer.html())
         self._checked()
 
     def _say(self, text: str) -> None:
-        self._said.set_content(CommandResult(True, text).html())
+        self._output.set_content(CommandResult(True, text).html())
 
     def _going_on(self) -> bool:
         lost = self._state.presence.lost(time.monotonic_ns())

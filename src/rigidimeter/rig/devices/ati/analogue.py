@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from rigidimeter.core.settings import Section, quantity
-from rigidimeter.rig.devices.ati.calibration import Calibration, read_calibration
+from rigidimeter.rig.devices.ati.calibration import read_calibration
 from rigidimeter.rig.devices.base import DeviceError, DeviceFacts, Now, TorqueSample
 from rigidimeter.rig.guard import Cause
 
@@ -145,7 +145,8 @@ class AtiAnalogue:
                 f"torque sensor: {s.calibration} is the calibration of "
                 f"{calibration.serial or 'no named sensor'}; expected that of {s.serial}"
             )
-        self._row = torque_row(calibration, s.weights, s.sign)
+        # The joint torque per volt of each gauge, in N·m/V.
+        self._row = np.asarray(s.sign * (np.array(s.weights) @ calibration.matrix))
         try:
             card = self._reader.start()
         except (ReaderError, OSError) as error:
@@ -222,11 +223,6 @@ class AtiAnalogue:
             self._moved_s = now_s
         first, self._last = self._last is None, volts[-1].copy()
         return int(same.sum()) - int(first)
-
-
-def torque_row(calibration: Calibration, weights: list[float], sign: int) -> NDArray[np.float64]:
-    """Return the joint torque per volt of each gauge, in N·m/V."""
-    return np.asarray(sign * (np.array(weights) @ calibration.matrix))
 
 
 class NiReader:

@@ -38,7 +38,7 @@ class SampleClock:
         """Begin with the next sample; NaN if the rate is unknown, samples then have no age."""
         self._interval_s = 1.0 / rate_hz
         self._count = 0
-        self._offset_s, self._least_s = math.inf, -math.inf
+        self._offset_s, self._min_s = math.inf, -math.inf
         self._arrived_s = -math.inf
 
     def taken_s(self, arrived_s: float, steps: int) -> float:
@@ -66,10 +66,10 @@ class SampleClock:
         counted_s = self._count * self._interval_s
         if math.isinf(self._offset_s):
             self._offset_s = arrived_s - counted_s
-            self._least_s, self._arrived_s = self._offset_s - LONGEST_DELAY_S, arrived_s
+            self._min_s, self._arrived_s = self._offset_s - LONGEST_DELAY_S, arrived_s
         drift_s = self._drift * max(arrived_s - self._arrived_s, 0.0)
-        self._least_s -= drift_s
+        self._min_s -= drift_s
         self._offset_s = min(arrived_s - counted_s, self._offset_s + drift_s)
-        self._offset_s = max(self._offset_s, self._least_s)
+        self._offset_s = max(self._offset_s, self._min_s)
         self._arrived_s = arrived_s
         return self._offset_s + counted_s

@@ -132,11 +132,6 @@ class NodeBus:
         """The state that the drive last reported."""
         return state_of(self.statusword)
 
-    @property
-    def in_operation(self) -> bool:
-        """Whether the drive last reported that it is enabled, and in the right mode."""
-        return self.state is Cia402State.OPERATION_ENABLED and self.mode == PROFILE_VELOCITY
-
     def open(self) -> None:
         """Open the bus.
 
@@ -249,7 +244,9 @@ class NodeBus:
             if report is None:
                 return False
             self.statusword, self.mode, position = report
-            self.left_operation = self.left_operation or not self.in_operation
+            enabled = self.state is Cia402State.OPERATION_ENABLED
+            if not (enabled and self.mode == PROFILE_VELOCITY):
+                self.left_operation = True
             if self._expected(self._position is None):
                 self._position = position
         elif identifier == ids.velocity:

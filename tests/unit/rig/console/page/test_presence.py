@@ -78,15 +78,15 @@ def test_a_page_that_is_lost_without_a_word_gives_control_to_the_next(presence):
     assert presence.arrive("other", "other tab", BEGAN + round(SILENT_S * S) + 1, session=True)
 
 
-@pytest.mark.parametrize(("state", "may"), [(State.PAUSED, True), (State.RUNNING, False)])
-def test_a_page_may_be_away_from_a_session_that_shows_that_it_is_paused(tmp_path, state, may):
+@pytest.mark.parametrize(("run", "may"), [(State.PAUSED, True), (State.RUNNING, False)])
+def test_a_page_may_be_away_from_a_session_that_shows_that_it_is_paused(tmp_path, run, may):
     now_ns = BEGAN + 2 * S
     state = ServerState(Place(tmp_path, None, ""), now_ns=lambda: now_ns)
     state.presence.arrive("page", "tab", BEGAN, session=False)
     assert state.operator_seen_ns() == BEGAN
     state.presence.leave("page", BEGAN + S)
     state.presence.gone("page")
-    loop = LoopStatus(tick=1, state=int(state))
+    loop = LoopStatus(tick=1, state=int(run))
     status = SimpleNamespace(loop=lambda: loop)
     state.console(None, tmp_path)(SimpleNamespace(status=status, names=()))
     assert state.operator_seen_ns() == (now_ns if may else BEGAN)
