@@ -4,8 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.core.files import json_text, text_bytes
-from rigidimeter.core.session import ZEROS, with_checksum
+from rigidimeter.core.files import ZEROS, json_text, text_bytes, with_checksum
 from rigidimeter.core.settings import RENAMED
 
 
