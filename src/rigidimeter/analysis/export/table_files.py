@@ -24,6 +24,7 @@ from rigidimeter.analysis.reading.formats.clocked_table import Stream
 from rigidimeter.core.files import csv_text, json_text, write_json, write_text
 
 DOCUMENT = "session.json"
+_SHOWN = ("software", "virtual", "subject", "day", "condition", "part", "source")
 
 
 def write_csv(session: ExportedSession, folder: Path) -> None:
@@ -68,9 +69,6 @@ def _stream_table(stream: Stream, about: Mapping[str, Any]) -> pa.Table:
         arrays.append(pa.array(texts, pa.string(), mask=texts == ""))
         fields.append(pa.field(name, pa.string()))
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
-
-
-_SHOWN = ("software", "virtual", "subject", "day", "condition", "part", "source")
 
 
 def write_mat(session: ExportedSession, path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What was estimated from an epoch: parameters and their uncertainty, scores, findings."""
+"""What was estimated: parameters and their uncertainty, in other bands too, scores, findings."""
 
 from __future__ import annotations
 
@@ -31,7 +31,6 @@ PARAMETERS = (
 PARAMETER_VECTORS = {"value": "", "se": "_se", "low": "_low", "high": "_high", "bound": "_bound"}
 """The vectors of a `Fit`, and what their entries are called after the parameter's name."""
 
-
 STATISTICS = ("r_squared", "vaf_percent", "condition_number", "residual_sd_nm")
 """How well a fit explains the torque, beside its parameters."""
 
@@ -43,6 +42,11 @@ FIT_NUMBERS = (
 
 SCORE_NUMBERS = ("impulse_nm_s", "work_j", "frequency_hz", "n_cycles")
 """The numbers of a score, as files and tables name them."""
+
+Three = tuple[float, float, float]
+
+BAND_VECTORS = {"value": "", "change": "_change", "change_se": "_change_se", "p": "_p"}
+"""What is known of each parameter, and how the names of it end in files and tables."""
 
 
 @dataclass(frozen=True)
@@ -236,12 +240,6 @@ def _named(result: Fit | Score) -> dict[str, Any]:
         "outcome": result.outcome.kind,
         "reason": result.outcome.reason,
     }
-
-
-Three = tuple[float, float, float]
-
-BAND_VECTORS = {"value": "", "change": "_change", "change_se": "_change_se", "p": "_p"}
-"""What is known of each parameter, and how the names of it end in files and tables."""
 
 
 @dataclass(frozen=True)

@@ -36,8 +36,18 @@ EVENT_TYPES: Mapping[str, Mapping[str, type | tuple[type, ...]]] = {
 }
 """What an event must hold to be read; others are kept and passed over."""
 
-
 _BEGIN = b"{" + FIELD
+
+_WORDS: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "session_started": ("session_start", ()),
+    "epoch_started": ("epoch_start", ("label", "task", "condition")),
+    "epoch_ended": ("epoch_end", ("epoch", "outcome")),
+    "session_ended": ("session_end", ("outcome",)),
+    "order": ("order", ("command",)),
+}
+"""By the kind of an event: the marker's first word, and the facts that follow it."""
+
+_LIMITS = ("none", "acceleration", "speed", "position", "latched")
 
 
 @dataclass(frozen=True)
@@ -122,18 +132,6 @@ def scan_events(content: bytes, source: Path) -> EventLog:
                 raise UserError(f"{source}: line {number}, {kind}: {key} is missing or damaged")
         events.append(event)
     return EventLog(events, last != b"", tuple(damaged), tuple(ids))
-
-
-_WORDS: Mapping[str, tuple[str, tuple[str, ...]]] = {
-    "session_started": ("session_start", ()),
-    "epoch_started": ("epoch_start", ("label", "task", "condition")),
-    "epoch_ended": ("epoch_end", ("epoch", "outcome")),
-    "session_ended": ("session_end", ("outcome",)),
-    "order": ("order", ("command",)),
-}
-"""By the kind of an event: the marker's first word, and the facts that follow it."""
-
-_LIMITS = ("none", "acceleration", "speed", "position", "latched")
 
 
 def marker_of(event: Mapping[str, Any]) -> str:
