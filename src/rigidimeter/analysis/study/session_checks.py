@@ -5,20 +5,29 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
-from rigidimeter.core.records import Notice
+from rigidimeter.analysis.study.results import SessionEntry
+from rigidimeter.core.records import Epoch, Notice
 from rigidimeter.core.settings import Settings, dump_settings
 from rigidimeter.core.study_files import TableRow
-
-if TYPE_CHECKING:
-    from rigidimeter.analysis.study.sessions import Session
 
 _COMMANDED: Mapping[str, tuple[str, ...]] = {
     "prbs": ("controller", "prbs"),
     "sinusoid": ("controller", "sinusoid"),
 }
 """By task, the tables of the settings that say what the rig was commanded."""
+
+
+@dataclass(frozen=True)
+class Session:
+    """One recording that was read: its row in the table, its epochs, its settings if it has any."""
+
+    row: TableRow
+    entry: SessionEntry
+    epochs: tuple[Epoch, ...]
+    settings: Settings | None
 
 
 def twice(sessions: Sequence[Session]) -> list[tuple[TableRow, str]]:

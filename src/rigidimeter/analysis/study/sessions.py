@@ -20,6 +20,7 @@ from rigidimeter.analysis.study.analysis import task_of
 from rigidimeter.analysis.study.blinding import Naming
 from rigidimeter.analysis.study.results import LeftOut, SessionEntry
 from rigidimeter.analysis.study.session_checks import (
+    Session,
     commanded_otherwise,
     line_of,
     other_settings,
@@ -31,16 +32,6 @@ from rigidimeter.core.records import Epoch, Notice
 from rigidimeter.core.session import EVENTS, MANIFEST, SAMPLES, is_session, read_events
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.study_files import StudyFolder, TableRow, is_outside
-
-
-@dataclass(frozen=True)
-class Session:
-    """One recording that was read: its row in the table, its epochs, its settings if it has any."""
-
-    row: TableRow
-    entry: SessionEntry
-    epochs: tuple[Epoch, ...]
-    settings: Settings | None
 
 
 @dataclass(frozen=True)

@@ -66,8 +66,8 @@ def test_the_command_line_warns_in_one_line(old_toml: Path) -> None:
     assert ran.returncode == 1
     assert ran.stderr.splitlines() == [
         f"warning: {old_toml}: {NAMES}",
-        f"rigidimeter: {old_toml}: diagnostics.min_r_squared = 60 is not allowed: it must be a "
-        "number at least -100 and at most 1",
+        f"rigidimeter: {old_toml}: diagnostics.min_r_squared = 60.0: Input should be less than or "
+        "equal to 1",
     ]
 
 
