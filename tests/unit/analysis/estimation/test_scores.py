@@ -12,7 +12,7 @@ from rigidimeter.analysis.estimation import (
     scoring_cycles,
     single_frequency_share,
 )
-from rigidimeter.analysis.estimation.scores import line_shares, loop_area_j
+from rigidimeter.analysis.estimation.scores import line_shares
 from rigidimeter.analysis.estimation.stretches import longest_part
 from rigidimeter.core.records import Channel, Epoch, LeftOut, Motion, Outcome
 from rigidimeter.core.settings import EstimationSettings, ScoreSettings
@@ -35,14 +35,6 @@ def sinusoid_epoch(joint, rate_hz=1000.0, duration_s=20.0, delay_s=0.0, known=Tr
     }
     said = Motion(F, 0.0, duration_s) if known else None
     return Epoch("file", "1", channels, task="sinusoid", motion=said)
-
-
-@pytest.mark.parametrize("stiffness", [0.0, 1.751, 25.0])
-def test_the_loop_area_is_pi_b_omega_a_squared_whatever_the_stiffness(stiffness):
-    t = np.linspace(0.0, 8.0, 8 * 4096 + 1)
-    torque = JointDynamics(0.0045, 0.1368, stiffness).torque_nm(*motion(t))
-    area = loop_area_j(torque, motion(t)[0]) / 8
-    assert area == pytest.approx(math.pi * 0.1368 * W * A**2, rel=1e-6)
 
 
 @pytest.mark.parametrize("rate_hz", [100.0, 1000.0])

@@ -3,7 +3,6 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from rigidimeter.analysis.estimation.signals import (
-    grid_rate_hz,
     kinematics,
     sampled,
     spline_slopes,
@@ -67,18 +66,6 @@ def test_samples_at_the_times_asked_for_need_no_spline():
     assert sampled(channel, t) is None
 
 
-def test_a_missing_angle_is_the_integral_of_the_velocity():
-    t, x, v, _ = sine(200.0)
-    angle, _, _ = kinematics(epoch(velocity_rad_s=(t, v)), t)
-    np.testing.assert_allclose(angle, x - x[0], atol=1e-6)
-
-
-def test_without_motion_there_is_nothing_to_do():
-    t = np.arange(10.0)
-    with pytest.raises(ValueError, match="neither velocity_rad_s nor angle_rad"):
-        kinematics(epoch(torque_nm=(t, t)), t)
-
-
 def test_the_grid_is_where_all_channels_are():
     early = Channel("torque_nm", np.arange(0.0, 10.0, 0.01), np.zeros(1000))
     late = Channel("angle_rad", np.arange(0.5, 12.0, 0.02), np.zeros(575))
@@ -88,9 +75,3 @@ def test_the_grid_is_where_all_channels_are():
     np.testing.assert_allclose(np.diff(grid), 0.01)
     apart = Channel("angle_rad", np.arange(20.0, 30.0), np.zeros(10))
     assert uniform_grid([early, apart], 100.0).size == 0
-
-
-def test_a_coarse_recording_gets_a_finer_grid():
-    slow = Channel("torque_nm", np.arange(0.0, 10.0, 0.02), np.zeros(500))
-    assert grid_rate_hz([slow], 10.0) == pytest.approx(200.0)
-    assert grid_rate_hz([slow], 1.0) == pytest.approx(50.0)

@@ -12,12 +12,9 @@ from rigidimeter.analysis.estimation.bad_stretches import (
     saturated_stretches,
     without_bad_stretches,
 )
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import epoch_grid
 from rigidimeter.analysis.estimation.diagnostics import checked
 from rigidimeter.analysis.estimation.methods import method_named
 from rigidimeter.analysis.estimation.prepared import prepare
-from rigidimeter.analysis.estimation.stretches import bridged, longest_part, sound, used_s
-from rigidimeter.analysis.estimation.window import repetition
 from rigidimeter.core.records import Channel, Epoch, LeftOut
 from rigidimeter.core.settings import Settings, parse_settings
 
@@ -66,17 +63,6 @@ def fitted(epoch, settings=SETTINGS):
 
 def finding(fit, name):
     return next(found for found in fit.findings if found.name == name)
-
-
-@pytest.mark.parametrize("name", ["torque_nm", "angle_rad", "velocity_rad_s"])
-def test_the_rest_of_an_epoch_whose_sensor_hung_gives_the_joint(name):
-    fit = fitted(hung(an_epoch(), name, 8.0, 9.0))
-    assert fit.outcome.included
-    assert fit.value == pytest.approx(TRUTH, rel=0.01)
-    found = finding(fit, "frozen")
-    assert found.level == "note"
-    assert f"{name} repeats one value for 1 s (at most 0.1 s), from 8 s" in found.text
-    assert "left out, from 8 to 9 s; 19 of 20 s are used" in found.text
 
 
 def test_a_torque_at_the_end_of_its_range_for_a_second_is_left_out():
@@ -178,56 +164,3 @@ def test_a_joint_that_rests_though_something_moves_it_is_one():
     epoch = held()
     nobody = {k: v for k, v in epoch.channels.items() if k != "velocity_command_rad_s"}
     assert found_in(replace(epoch, channels=nobody)) == (both, {"angle_rad"})
-
-
-def test_what_the_user_leaves_out_is_noted_with_the_reason():
-    fit = fitted(replace(an_epoch(), left_out=(LeftOut(12.3, 14.0, "cough"),)))
-    found = finding(fit, "left_out")
-    assert found.level == "note"
-    assert "1.7 s are left out by hand, from 12.3 to 14 s: cough; 18.3 of 20 s" in found.text
-
-
-def test_torque_and_motion_are_bridged_and_their_causes_are_not():
-    epoch = replace(an_epoch(perturbation_nm=np.ones(4000)), left_out=(LeftOut(8.0, 9.0),))
-    done = bridged(epoch)
-    torque = done.channels["torque_nm"]
-    rows = ~sound(epoch, torque.time_s)
-    assert rows.sum() == 201
-    assert np.ptp(np.diff(torque.values[rows])) == pytest.approx(0.0, abs=1e-15)
-    assert done.channels["perturbation_nm"] is epoch.channels["perturbation_nm"]
-
-
-def test_how_much_is_left_and_the_longest_part():
-    out = (LeftOut(12.0, 13.0), LeftOut(5.0, 6.0))
-    epoch = replace(an_epoch(20.005), left_out=out)  # 0 to 20 s
-    # 1 to 4, 7 to 11 and 14 to 19 s.
-    assert used_s(epoch, 1.0) == pytest.approx((12.0, 18.0))
-    part = longest_part(epoch)
-    time_s = part.channels["torque_nm"].time_s
-    assert (time_s[0], time_s[-1]) == pytest.approx((13.005, 20.0))
-    assert part.left_out == ()
-
-
-def test_lines_do_not_see_what_is_left_out():
-    """∫ w e^(−iωt) x' dt = iω ∫ w e^(−iωt) x dt − ∫ w' e^(−iωt) x dt, whatever x in the hole."""
-    epoch = replace(an_epoch(), left_out=(LeftOut(8.0, 8.5),))
-    grid = epoch_grid(epoch, (0.15, 20.0), 1.0)
-    acceleration, velocity, _ = motion(grid.time_s)
-    inside = ~sound(epoch, grid.time_s)
-    assert np.all(grid.window[inside] == 0)
-    assert np.all(grid.window_slope_per_s[inside] == 0)
-    velocity[inside] = 1e3
-    found = 1j * grid.omega_rad_s * grid.transform(velocity) - grid.transform_slope(velocity)
-    wanted = grid.transform(acceleration)
-    assert np.max(np.abs(found - wanted)) < 1e-3 * np.max(np.abs(wanted))
-
-
-def test_half_a_window_doubles_the_variance():
-    """As many independent samples as the window holds, however many lines they are spread over."""
-    window = np.ones(1000)
-    assert repetition(window) == pytest.approx(1.0)
-    window[::2] = 0.0
-    assert repetition(window) == pytest.approx(2.0)
-    assert epoch_grid(an_epoch(), (0.15, 20.0), 1.0).spread == 1.0
-    half = replace(an_epoch(), left_out=(LeftOut(5.0, 15.0),))
-    assert epoch_grid(half, (0.15, 20.0), 1.0).spread > 1.9

@@ -4,7 +4,7 @@ import csv
 import json
 import math
 import shutil
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ import pytest
 from numpy.testing import assert_equal
 from tests.small_study import DAYS, record, tiny
 
-from rigidimeter.analysis.statistics import day_difference, difference, fit_mixed, holm, ranksum
+from rigidimeter.analysis.statistics import difference, fit_mixed, holm, ranksum
 from rigidimeter.analysis.study import (
     RATING,
     StudyResult,
@@ -25,9 +25,7 @@ from rigidimeter.analysis.study import (
     result_table,
 )
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.records import Fit
 from rigidimeter.core.session import read_session
-from rigidimeter.core.settings import Settings
 from rigidimeter.virtual import run_virtual_session
 
 RESAMPLES = 200
@@ -56,23 +54,6 @@ def test_the_analysis_is_that_of_its_sessions(fitted_study: Path, whole: StudyRe
     assert not [notice for notice in whole.notices if notice.level == "error"]
 
 
-def test_days_are_tested_by_the_days_of_the_table(whole: StudyResult) -> None:
-    by_day = {condition: [d for d in DAYS[condition] for _ in range(2)] for condition in DAYS}
-    for comparison in whole.comparisons[:-1]:
-        test = comparison.days
-        assert test is not None
-        expected = day_difference(
-            comparison.values["OFF"], comparison.values["DBS"], by_day["OFF"], by_day["DBS"]
-        )
-        assert test.estimate == pytest.approx(expected.estimate)
-        assert (test.p, test.df, test.p_days) == (expected.p, expected.df, expected.p_days)
-        assert (test.n_days_x, test.n_days_y) == (3, 3)
-    third = whole.comparison("stiffness_nm_rad").day_medians[2]
-    fits = [f for f in whole.analysis.fixed_inertia if f.source == "sessions/3-OFF"]
-    assert (third.day, third.condition, third.n) == ("3", "OFF", 2)
-    assert third.median == pytest.approx(np.median([f.stiffness_nm_rad for f in fits]))
-
-
 def test_ratings_and_effects(fitted_study: Path, whole: StudyResult) -> None:
     assert whole.ratings is not None
     with (fitted_study / "ratings.csv").open() as file:
@@ -99,21 +80,6 @@ def test_ratings_and_effects(fitted_study: Path, whole: StudyResult) -> None:
     )
     assert whole.virtual
     assert not whole.blinded
-
-
-def test_every_method_stands_beside_the_chosen_one(whole: StudyResult) -> None:
-    rows = whole.sensitivity
-    methods = ["published", "bandlimited", "iv"]
-    twice = [method for method in methods for _ in range(2)]
-    assert [row.method for row in rows] == methods + twice + twice
-    chosen = {row.measure.name: row for row in rows if row.chosen}
-    assert {row.method for row in chosen.values()} == {"iv"}
-    for comparison in whole.comparisons[:-1]:
-        assert comparison.test is not None
-        assert chosen[comparison.measure.name].p == comparison.test.p
-        assert chosen[comparison.measure.name].shift == comparison.test.shift
-    assert chosen["inertia_kg_m2"].inertia == "free"
-    assert chosen["stiffness_nm_rad"].inertia == "fixed"
 
 
 def test_another_measure_moves_no_other_number(study: Path) -> None:
@@ -164,37 +130,6 @@ def test_the_operator_takes_an_epoch_out_with_name_and_reason(study: Path) -> No
     assert (exclusion.by, exclusion.reason, exclusion.who) == ("operator", "coughed", "NB")
     assert (exclusion.source, exclusion.epoch, exclusion.day) == ("sessions/2-OFF", "2", "2")
     assert found.comparisons[0].excluded == {"OFF": 1, "DBS": 0}
-
-
-def test_several_subjects_each_have_their_median_inertia(monkeypatch, fitted_study: Path) -> None:
-    """Epochs of two subjects, the second twice as heavy: J is held at each one's own."""
-    from rigidimeter.analysis.study import study_analysis as module
-
-    def fake(preparation, method, **_):
-        from rigidimeter.core.records import Analysis, Outcome
-
-        fits = tuple(
-            Fit(
-                e.source,
-                e.label,
-                e.condition,
-                method,
-                Outcome(),
-                np.full(3, 1.0 + len(preparation.epochs)),
-            )
-            for e in preparation.epochs
-        )
-        return Analysis(method, fits, fits, 1.0 + len(preparation.epochs), ())
-
-    monkeypatch.setattr(module, "analyse_prepared", fake)
-    read = read_study(fitted_study)
-    sessions = {s.entry.source: s.entry for s in read.gathered.sessions}
-    sessions["sessions/1-OFF"] = replace(sessions["sessions/1-OFF"], subject="M2")
-    found, notices = module._analysed(
-        module._by_subject(read.epochs, sessions, Settings()), "iv", lambda _: None
-    )
-    assert sorted({fit.inertia_kg_m2 for fit in found.fits}) == [3.0, 11.0]
-    assert "M2 3, M1 11" in notices[-1].text
 
 
 def test_parts_tell_two_sessions_of_one_day_apart(study: Path, edit) -> None:

@@ -7,8 +7,6 @@ from rigidimeter.analysis.estimation.bandlimited import zero_phase_band
 from rigidimeter.analysis.estimation.closedloop.as_sampled import moved_by_settings
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
     acceleration_by_settings,
-    phases_s,
-    step_kept_s,
 )
 from rigidimeter.analysis.estimation.closedloop.drive_motion import driven
 from rigidimeter.analysis.estimation.closedloop.drive_search import mean_sign, search
@@ -43,33 +41,10 @@ def test_a_move_along_the_axes_is_two_standard_errors_of_repeated_recordings():
     assert two_s == pytest.approx(2 * scatter_s, rel=0.25)
 
 
-def test_the_drives_moved_explain_the_velocity_as_well():
-    samples = noisy(0)
-    found = search(samples, PI, MODEL)
-    for drive in as_likely(samples, found):
-        left = driven(drive, samples.command, samples.time_s).velocity_rad_s - samples.measured
-        # Two standard errors along one axis cost four of 1500 samples' variances.
-        power = float(np.mean((left / samples.scale) ** 2))
-        assert found.power < power < found.power * (1 + 5 * 4 / 1500)
-
-
 def test_a_drive_of_second_order_hides_the_square_of_its_bandwidth_times_the_tick():
     rig = RigSettings(tick_rate_hz=1000.0, drive_bandwidth_hz=50.0)
     expected = 1 - (2 * math.pi * 50.0 / 1000.0) ** 2 / 12
     assert acceleration_by_settings(rig, None) == pytest.approx(expected, abs=2e-4)
-
-
-def test_stamps_that_scatter_about_a_time_after_the_ticks_are_told_from_even_ones():
-    ticks_s = 0.001 * np.arange(4000)
-    command = Channel("velocity_command_rad_s", ticks_s, np.zeros(4000))
-    rng = np.random.default_rng(0)
-    even_s = ticks_s[10:-10] + 0.0004
-    scattered_s = even_s + rng.uniform(-3e-4, 3e-4, even_s.size)
-    anywhere_s = even_s + rng.uniform(-5e-4, 5e-4, even_s.size)
-    assert step_kept_s(command, scattered_s) == pytest.approx(4e-4, abs=2e-5)
-    assert step_kept_s(command, even_s) is None
-    assert step_kept_s(command, anywhere_s) is None
-    np.testing.assert_allclose(phases_s(command, even_s), [4e-4], atol=1e-9)
 
 
 def test_least_squares_of_held_commands_is_moved_as_the_drive_of_the_settings_says():

@@ -9,9 +9,6 @@ import pytest
 
 from rigidimeter.analysis.estimation.closedloop.drive_fit import SETTLED_S, fit_drive
 from rigidimeter.analysis.estimation.closedloop.drive_motion import driven
-from rigidimeter.analysis.estimation.closedloop.linear_problems import instrumental
-from rigidimeter.analysis.estimation.closedloop.observation import observe, observe_periods
-from rigidimeter.analysis.estimation.closedloop.refine import fit_pooled, fit_single
 from rigidimeter.analysis.estimation.diagnostics import checked
 from rigidimeter.analysis.estimation.methods import method_named
 from rigidimeter.analysis.estimation.prepared import prepare
@@ -41,29 +38,6 @@ def test_the_rest_of_the_epoch_gives_the_joint(simulated, truth, method):
     assert [found.level for found in fit.findings if found.name == "frozen"] == ["note"]
     whole = len(epoch.channels["torque_nm"])
     assert 0.5 * whole < fit.n_samples < 0.98 * whole
-
-
-def test_a_window_with_a_hole_widens_the_intervals(simulated):
-    settings, (epoch,) = simulated(1)
-    (prepared,) = prepare([epoch], settings)
-    plain = observe(prepared)
-    spread = replace(plain.lines.grid, spread=4.0)
-    wider = replace(plain, lines=replace(plain.lines, grid=spread))
-    start = np.array([0.004, 0.1, 1.5])
-    one, two = (fit_single(each, instrumental, start) for each in (plain, wider))
-    assert two.covariance == pytest.approx(4 * one.covariance)
-    assert two.bound == pytest.approx(4 * one.bound)
-    assert two.degrees == pytest.approx(one.degrees / 4)
-    one, two = (fit_pooled([each], instrumental, start)[0] for each in (plain, wider))
-    assert two.covariance == pytest.approx(4 * one.covariance)
-
-
-def test_whole_periods_are_taken_from_the_longest_part(simulated):
-    settings, (epoch,) = simulated(1)
-    (prepared,) = prepare([hung(epoch, 1.5, 0.5)], settings)
-    grid = observe_periods(prepared).lines.grid
-    assert grid.time_s[0] > epoch.channels["torque_nm"].time_s[0] + 2.0
-    assert grid.spread == 1.0
 
 
 def without_samples(epoch, start_s, stop_s):
@@ -116,20 +90,6 @@ def test_periods_are_found_although_the_perturbation_is_not_known_throughout(sim
     (prepared,) = prepare([without_samples(epoch, start_s, start_s + 0.1)], settings)
     (fit,), _ = method_named("spectral").fit([prepared], None, lambda _: None, False)
     assert fit.value == pytest.approx(truth, rel=0.01)
-
-
-def test_lost_samples_are_bridged_in_step_with_the_others(simulated):
-    _, (epoch,) = simulated(1)
-    start_s = epoch.channels["torque_nm"].time_s[0] + 5.0
-    found = bridged(without_samples(epoch, start_s, start_s + 0.1))
-    for name, channel in found.channels.items():
-        whole = epoch.channels[name]
-        np.testing.assert_allclose(channel.time_s, whole.time_s, atol=1e-9)
-        there = (whole.time_s < start_s - 1e-4) | (whole.time_s > start_s + 0.1 + 1e-4)
-        np.testing.assert_array_equal(channel.values[there], whole.values[there])
-    level = found.channels["perturbation_nm"]
-    hole = (level.time_s > start_s) & (level.time_s < start_s + 0.1)
-    assert np.unique(level.values[hole]).size == 1
 
 
 @pytest.mark.parametrize("start_s", [0.7, 1.9])

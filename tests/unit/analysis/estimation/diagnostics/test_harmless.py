@@ -13,7 +13,6 @@ from rigidimeter.model import JointDynamics
 from rigidimeter.virtual.batch import simulate_epochs
 
 JOINT = JointDynamics(0.0045, 0.1368, 1.751)
-OF_THE_SUBJECT = {"voluntary_torque", "active_movement", "coherence", "residual_perturbation"}
 
 
 def found(method, subject, levels=None):
@@ -24,30 +23,6 @@ def found(method, subject, levels=None):
     (fit,), _ = fit_epochs(epochs, method, settings)
     (prepared,) = prepare(epochs, settings)
     return {f.name: f for f in checked(prepared, fit).findings}
-
-
-def test_what_the_subject_does_is_a_note_where_the_perturbation_is_the_instrument():
-    by_iv = found("iv", {"voluntary_sd_nm": 0.2})
-    assert by_iv.keys() >= {"voluntary_torque", "active_movement", "coherence"}
-    assert {finding.level for finding in by_iv.values()} == {"note"}
-    assert "does not bias J, B and K" in by_iv["voluntary_torque"].text
-
-
-def test_it_is_a_doubt_for_least_squares_where_the_bias_is_more_than_the_interval():
-    by_least_squares = found("bandlimited", {"voluntary_sd_nm": 0.2})
-    assert by_least_squares.keys() >= OF_THE_SUBJECT | {"loop_bias"}
-    assert {by_least_squares[name].level for name in OF_THE_SUBJECT} == {"doubt"}
-    bias = by_least_squares["loop_bias"]
-    assert bias.level == "doubt"
-    assert bias.value > bias.threshold == 50.0
-    assert "by iv" not in bias.text
-
-
-def test_a_tremor_above_the_voluntary_band_biases_too():
-    shaking = found("bandlimited", {"voluntary_sd_nm": 0.0, "tremor_amplitude_nm": 0.3})
-    assert shaking["loop_bias"].level == "doubt"
-    relaxed = found("bandlimited", {"voluntary_sd_nm": 0.0})
-    assert not any(finding.level == "doubt" for finding in relaxed.values())
 
 
 @pytest.mark.parametrize("level", ["note", "exclude"])

@@ -37,25 +37,6 @@ def joint(s):
     return J * s**2 + B * s + K
 
 
-@pytest.mark.parametrize("push_nm", [0.0, 0.5])
-def test_a_coupling_is_named_with_its_stiffness(push_nm):
-    found = linear_term(moved(lambda s: joint(s) / (1 + joint(s) / 50.0), push_nm=push_nm))
-    assert found is not None
-    assert found.name == "coupling"
-    assert found.value == pytest.approx(50.0, rel=0.03)
-    np.testing.assert_allclose(found.joint, [J, B, K], rtol=0.05)
-
-
-@pytest.mark.parametrize("push_nm", [0.0, 0.5])
-def test_a_reflex_of_both_directions_is_named_with_its_gain_and_delay(push_nm):
-    found = linear_term(moved(lambda s: joint(s) + 0.1 * s * np.exp(-0.06 * s), push_nm=push_nm))
-    assert found is not None
-    assert found.name == "reflex"
-    assert found.value == pytest.approx(0.1, rel=0.03)
-    assert found.delay_s == pytest.approx(0.06)
-    np.testing.assert_allclose(found.joint, [J, B, K], rtol=0.05)
-
-
 @pytest.mark.parametrize("push_nm", [0.0, 0.5, 2.0])
 def test_j_b_and_k_alone_leave_nothing(push_nm):
     assert [seed for seed in range(30) if linear_term(moved(joint, seed, push_nm))] == []
@@ -71,13 +52,3 @@ def test_j_b_and_k_alone_leave_nothing(push_nm):
 )
 def test_what_looks_like_neither_is_not_named(path):
     assert linear_term(moved(path)) is None
-
-
-def test_its_torque_is_what_the_joint_alone_does_not_give():
-    beyond = moved(lambda s: joint(s) / (1 + joint(s) / 50.0))
-    found = linear_term(beyond)
-    assert found is not None
-    omega = 2 * np.pi * beyond.frequency_hz
-    torque = beyond.linear @ np.array([J, B, K]) + found.torque(beyond.linear, omega)
-    # The taper spreads each line to its neighbours, where the path is another.
-    assert np.linalg.norm(torque - beyond.torque_lines) < 0.05 * np.linalg.norm(torque)

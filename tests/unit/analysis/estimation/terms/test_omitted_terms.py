@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from rigidimeter.analysis.estimation import Signals
 from rigidimeter.analysis.estimation.terms.beyond_linear import beyond_linear
@@ -43,26 +42,6 @@ TORQUES = {
     "reflex+": lambda x, v: 0.1 * np.maximum(np.roll(v, 10), 0),
     "reflex-": lambda x, v: 0.1 * np.minimum(np.roll(v, 10), 0),
 }
-VALUES = {"coulomb": 0.05, "cubic": 400.0, "quadratic": -30.0}
-
-
-@pytest.mark.parametrize("name", list(TORQUES))
-def test_a_term_is_named_with_its_size(name):
-    (found,) = omitted_terms(moved(1, TORQUES[name]))
-    assert found.name == name
-    assert found.value == pytest.approx(VALUES.get(name, 0.1), rel=0.1)
-    assert found.p < 1e-6
-    if "reflex" in name:
-        assert found.inner[0] == pytest.approx(0.05, abs=0.006)
-
-
-def test_two_terms_are_named_with_their_sizes():
-    both = moved(2, lambda x, v: TORQUES["coulomb"](x, v) + TORQUES["reflex+"](x, v))
-    found = {term.name: term.value for term in omitted_terms(both)}
-    assert found == {
-        "coulomb": pytest.approx(0.05, rel=0.1),
-        "reflex+": pytest.approx(0.1, rel=0.1),
-    }
 
 
 def test_nothing_is_found_where_nothing_is_though_the_push_comes_back():
@@ -72,16 +51,6 @@ def test_nothing_is_found_where_nothing_is_though_the_push_comes_back():
 def test_a_friction_that_pushes_is_not_named():
     names = [term.name for term in omitted_terms(moved(3, lambda x, v: -0.05 * np.sign(v)))]
     assert "coulomb" not in names
-
-
-def test_its_torque_has_its_linear_part():
-    beyond = moved(4, TORQUES["reflex-"])
-    (found,) = omitted_terms(beyond)
-    v = beyond.motion.velocity_rad_s
-    inner = slice(200, -200)
-    expected = 0.1 * np.minimum(np.roll(v, 10), 0)
-    error = found.torque(beyond)[inner] - expected[inner]
-    assert np.std(error) < 0.15 * np.std(expected)
 
 
 def test_a_direction_is_that_of_the_motion_and_not_of_the_name():
