@@ -9,11 +9,9 @@ from tests.matlab_exports import (
     acqknowledge,
     by_hand,
     labchart,
-    matrix,
     save,
     spike2,
     structures,
-    write_mat73,
 )
 
 from rigidimeter.analysis.reading.formats import ReadOptions, read_table
@@ -57,12 +55,6 @@ def test_the_times_of_a_channel_come_before_its_interval(tmp_path):
         table(tmp_path / "r.mat", values)
 
 
-def test_an_interval_in_another_unit(tmp_path):
-    found = table(tmp_path / "r.mat", acqknowledge() | {"isi": 5000.0, "isi_units": "us"})
-    np.testing.assert_allclose(found.columns["time_s"], T, atol=1e-9)
-    assert found.units["Elbow torque"] == "N-m"
-
-
 def test_columns_that_name_torque_and_motion_come_before_structures(tmp_path):
     values = {"torque_nm": M, "angle_deg": D, "fs": 200.0}
     found = table(tmp_path / "r.mat", {**values, "emg": {"data": M, "fs": 2000.0}})
@@ -79,17 +71,6 @@ def test_many_structures_without_samples_are_no_columns(tmp_path):
     events = structures(*({"kind": "a", "at": float(k)} for k in range(3000)))
     found = table(tmp_path / "r.mat", {"torque_nm": M, "angle_deg": D, "events": events})
     assert found.others["events"] == "an array of objects"
-
-
-@pytest.mark.parametrize("made", [labchart(blocks=2), acqknowledge(), by_hand(), spike2()])
-def test_version_7_3_gives_the_same_table(tmp_path, made):
-    old = table(tmp_path / "old.mat", made)
-    write_mat73(tmp_path / "new.mat", made)
-    new = read_table(tmp_path / "new.mat")
-    assert list(new.columns) == list(old.columns)
-    assert new.units == old.units
-    for name in old.columns:
-        np.testing.assert_array_equal(new.columns[name], old.columns[name])
 
 
 def two(torque, angle):
@@ -134,19 +115,6 @@ def test_clocks_that_cannot_be_are_refused(tmp_path, values, told):
     with pytest.raises(UserError) as caught:
         table(tmp_path / "r.mat", values)
     assert told in str(caught.value)
-
-
-def test_a_vector_beside_others_is_a_column(tmp_path):
-    found = table(tmp_path / "r.mat", {"data": M, "angle_deg": D, "fs": 200.0, "units": "Nm"})
-    assert set(found.columns) == {"angle_deg", "data"}
-    assert found.scalars["fs"] == 200.0
-
-
-def test_a_matrix_keeps_the_time_beside_it(tmp_path):
-    found = table(tmp_path / "r.mat", matrix(t=T, condition="OFF"))
-    assert set(found.columns) == {"t", "Torque", "Angle"}
-    assert found.scalars["condition"] == "OFF"
-    np.testing.assert_array_equal(found.columns["t"], T)
 
 
 def test_structures_with_a_time_each_are_clocks(tmp_path):
