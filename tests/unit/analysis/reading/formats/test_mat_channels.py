@@ -9,6 +9,7 @@ from tests.matlab_exports import (
     acqknowledge,
     by_hand,
     labchart,
+    matrix,
     save,
     spike2,
     structures,
@@ -53,6 +54,12 @@ def test_the_times_of_a_channel_come_before_its_interval(tmp_path):
     values["elbow_Ch1"]["interval"] = 0.0
     with pytest.raises(UserError, match="export of Spike2 that cannot be read"):
         table(tmp_path / "r.mat", values)
+
+
+def test_an_interval_in_another_unit(tmp_path):
+    found = table(tmp_path / "r.mat", acqknowledge() | {"isi": 5000.0, "isi_units": "us"})
+    np.testing.assert_allclose(found.columns["time_s"], T, atol=1e-9)
+    assert found.units["Elbow torque"] == "N-m"
 
 
 def test_columns_that_name_torque_and_motion_come_before_structures(tmp_path):
@@ -115,6 +122,13 @@ def test_clocks_that_cannot_be_are_refused(tmp_path, values, told):
     with pytest.raises(UserError) as caught:
         table(tmp_path / "r.mat", values)
     assert told in str(caught.value)
+
+
+def test_a_matrix_keeps_the_time_beside_it(tmp_path):
+    found = table(tmp_path / "r.mat", matrix(t=T, condition="OFF"))
+    assert set(found.columns) == {"t", "Torque", "Angle"}
+    assert found.scalars["condition"] == "OFF"
+    np.testing.assert_array_equal(found.columns["t"], T)
 
 
 def test_structures_with_a_time_each_are_clocks(tmp_path):

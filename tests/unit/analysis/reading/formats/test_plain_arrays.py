@@ -108,6 +108,15 @@ def test_a_type_that_is_not_read_has_a_way_on(tmp_path, suffix, told):
         read_table(path)
 
 
+def test_columns_whose_names_are_not_known_are_not_guessed(tmp_path):
+    path = tmp_path / "r.csv"
+    names = "Время [с],Момент [Н·м],Угол [град]\n"
+    path.write_text(names + TEXT.split("\n", 1)[1], encoding="utf-8")
+    with pytest.raises(UserError, match="--column torque=NAME --unit torque=Nm") as refused:
+        channels_of_table(read_table(path), ReadOptions())
+    assert "nearest" not in str(refused.value)
+
+
 def test_the_nearest_column_is_the_one_with_the_unit(tmp_path):
     path = tmp_path / "r.csv"
     path.write_text("時間[s],角度[deg],回転力[Nm]\n" + "0,1,2\n1,2,3\n", encoding="utf-8")
