@@ -26,6 +26,12 @@ def refusal(data, **options) -> list[str]:
     return list(caught.value.lines)
 
 
+def assert_si(found):
+    np.testing.assert_allclose(found.time_s, TIME_S, rtol=1e-12)
+    np.testing.assert_allclose(found.values["torque_nm"], TORQUE_NM, rtol=1e-12)
+    np.testing.assert_allclose(found.values["angle_rad"], ANGLE_RAD, rtol=1e-12)
+
+
 def test_units_stated_nowhere_are_shown_under_each_reading():
     first, *shown = refusal(table(time=TIME_S, torque=TORQUE_NM, angle=ANGLE_DEG / 3))
     assert "the unit of 'time', 'torque', 'angle' is stated nowhere" in first
@@ -88,6 +94,11 @@ def test_a_matrix_with_its_labels_is_refused_with_a_way_on():
     (missing,) = refusal(found)[:1]
     assert "save each column of data under a name of its own" in missing
     assert "--column" not in missing
+
+
+def test_a_time_is_no_candidate_for_the_torque():
+    columns = {"time_s": TIME_S, "t_torque [s]": TIME_S, "torque [Nm]": TORQUE_NM}
+    assert_si(channels_of_table(table(**columns, angle_rad=ANGLE_RAD), ReadOptions()))
 
 
 NOISE = np.random.default_rng(7)

@@ -124,6 +124,12 @@ def test_clocks_that_cannot_be_are_refused(tmp_path, values, told):
     assert told in str(caught.value)
 
 
+def test_a_vector_beside_others_is_a_column(tmp_path):
+    found = table(tmp_path / "r.mat", {"data": M, "angle_deg": D, "fs": 200.0, "units": "Nm"})
+    assert set(found.columns) == {"angle_deg", "data"}
+    assert found.scalars["fs"] == 200.0
+
+
 def test_a_matrix_keeps_the_time_beside_it(tmp_path):
     found = table(tmp_path / "r.mat", matrix(t=T, condition="OFF"))
     assert set(found.columns) == {"t", "Torque", "Angle"}

@@ -55,6 +55,16 @@ def test_stamps_rounded_to_milliseconds_agree_with_300_hz(tmp_path, columns):
     assert len(epochs) == 1
 
 
+def test_integers_and_float32_become_float64(tmp_path):
+    values = np.arange(50)
+    path = write_npz(
+        tmp_path / "r.npz",
+        {"time_s": values, "torque_nm": values.astype(np.int16), "angle_rad": np.zeros(50, "f4")},
+    )
+    (epoch,), _ = read_recording(path, ReadOptions())
+    assert {channel.values.dtype for channel in epoch.channels.values()} == {np.dtype("f8")}
+
+
 def test_matlab_cells_of_text_are_labels(tmp_path, columns):
     cells = np.empty((400, 1), dtype=object)
     cells[:200], cells[200:] = "first", "second"
