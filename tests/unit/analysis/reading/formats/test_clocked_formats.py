@@ -1,4 +1,4 @@
-"""NWB, Parquet and Arrow files of other programs: channels by their own clocks, with units."""
+"""Trials of NWB, what is not read beside a file, and stamps that go back."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Muscle activity is a column like the others, in volts, that an estimate can do without."""
+"""Muscle activity that is in microvolts."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The same recording in every format that is read; names, rate and sign."""
+"""Rates, types and labels of binary files, and what MATLAB 7.3 needs."""
 
 import sys
 from pathlib import Path

@@ -16,17 +16,14 @@ TIME_S = np.arange(2400) / 120.0
 TORQUE_NM, ANGLE_DEG = torque_nm(TIME_S, 1), np.degrees(angle_rad(TIME_S, 1))
 
 
-def excel(path, sheets, dates=False):
+def excel(path, sheets):
     with xlsxwriter.Workbook(path) as book:
-        stamp = book.add_format({"num_format": "yyyy-mm-dd hh:mm:ss.000"})
         for name, (head, columns) in sheets.items():
             sheet = book.add_worksheet(name)
             for row, line in enumerate(head):
                 sheet.write_row(row, 0, line)
             for row, values in enumerate(zip(*columns, strict=True), start=len(head)):
                 sheet.write_row(row, 0, values)
-                if dates:
-                    sheet.write_datetime(row, 0, values[0], stamp)
     return path
 
 

@@ -1,4 +1,4 @@
-"""The dialects of text files."""
+"""Marks of missing samples, labels and line numbers of text files."""
 
 import numpy as np
 import pytest
