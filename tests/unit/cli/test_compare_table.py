@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.statistics import holm, rank_biserial, ranksum
+from rigidimeter.analysis.statistics import holm, ranksum
 
 
 def table(path: Path, m: int = 20, n: int = 12) -> tuple[Path, dict[str, np.ndarray]]:
@@ -36,26 +36,6 @@ def compared(rigidimeter, tmp_path):
         return ran, json.loads(out.read_text("utf-8")) if out.exists() else None
 
     return run
-
-
-def test_one_column_is_the_rank_sum_test(compared, tmp_path) -> None:
-    path, columns = table(tmp_path / "t.csv")
-    ran, found = compared(path, "--value", "a", "--by", "condition")
-    assert ran.status == 0, ran.err
-    x, y = columns["a"][:20], columns["a"][20:]
-    test = ranksum(x, y)
-    assert found["schema"] == "rigidimeter.comparison/2"
-    assert (found["reference"], found["other"]) == ("OFF", "DBS")
-    (row,) = found["comparisons"]
-    for key in ("z", "p", "r", "shift", "shift_low", "shift_high"):
-        assert row[key] == getattr(test, key)
-    assert set(row["groups"]) == {"OFF", "DBS"}
-    assert set(row["groups"]["OFF"]) == {"n", "median", "q1", "q3", "sd_percent", "excluded"}
-    assert row["groups"]["DBS"]["median"] == np.median(y)
-    assert row["rank_biserial"] == pytest.approx(rank_biserial(x, y))
-    assert row["r_low"] < row["r"] < row["r_high"]
-    assert row["p_holm"] == row["p"]
-    assert "Effect sizes, 95 % intervals" in ran.out
 
 
 def test_several_columns_are_adjusted_and_compared(compared, tmp_path) -> None:

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from rigidimeter.cli.design import design
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings, load_settings
-from rigidimeter.planning import DESIGN_SCHEMA, PARAMETER_NAMES, multisine_nm, prbs_nm, sinusoid
+from rigidimeter.planning import DESIGN_SCHEMA, multisine_nm, prbs_nm, sinusoid
 
 app = typer.Typer()
 app.command()(design)
@@ -135,33 +135,6 @@ def test_the_subjects_own_torque_biases_least_squares(tmp_path: Path) -> None:
     settings.write_text("[subject.OFF]\nvoluntary_sd_nm = 0.2\n")
     words = " ".join(run("--settings", str(settings)).split())
     assert "would bias least squares: J by -43 %, B by -69 %, K by +3 %" in words
-
-
-def test_numbers_of_what_is_predicted(tmp_path: Path) -> None:
-    numbers = tmp_path / "numbers.json"
-    run("--json", str(numbers), "--detect", "damping=20%", "--detect", "stiffness=0.3")
-    document = json.loads(numbers.read_text())
-    off = document["stability"]["conditions"]["OFF"]
-    assert off["stable"] is True
-    assert off["gain_margin_db"] == pytest.approx(28.3, abs=0.1)
-    assert document["stability"]["worst"]["DBS"]["inertia_kg_m2"] == pytest.approx(0.018)
-    precision = document["precision"]["OFF"]
-    assert precision["iv_band_hz"] == pytest.approx([0.1016, 29.97], rel=1e-3)
-    assert precision["least_squares_band_hz"] == [0.15, 10.0]
-    for which in ("bound", "iv", "least_squares"):
-        assert list(precision[which]["free"]) == list(PARAMETER_NAMES)
-        assert list(precision[which]["fixed_inertia"]) == list(PARAMETER_NAMES[1:])
-    assert precision["planned_epochs"] == 4
-    for name in PARAMETER_NAMES:
-        assert precision["iv_pooled"][name] == precision["iv"]["free"][name] / 2
-    assert document["precision"]["DBS"]["iv_pooled"] is None
-    assert document["optimised"] is document["multisine"] is None
-    damping, stiffness = document["detection"]
-    assert damping["parameter"] == "damping"
-    assert damping["epochs_needed"] == 4
-    assert damping["planned_power"] is None
-    assert stiffness["difference"] == 0.3
-    assert document["remarks"] == []
 
 
 def test_searches_and_compares(tmp_path: Path) -> None:

@@ -38,18 +38,6 @@ def test_terms_are_fitted_and_written(rigidimeter, joint, tmp_path):
     assert "N·m/rad³" in ran.out
 
 
-def test_models_are_compared_and_one_is_recommended(rigidimeter, joint, tmp_path):
-    ran = rigidimeter(
-        "model", joint, "--terms", "inertia,damping,stiffness,cubic,coulomb", "--compare",
-        "--band-hz", 0.15, 15, "--json", tmp_path / "m.json",
-    )  # fmt: skip
-    assert ran.status == 0, ran.err
-    (epoch,) = json.loads((tmp_path / "m.json").read_text())["epochs"]
-    assert epoch["recommended"] == ["inertia", "damping", "stiffness", "cubic"]
-    assert len(epoch["models"]) == 4
-    assert "recommended: inertia+damping+stiffness+cubic: predicts" in ran.out
-
-
 def test_own_candidates_are_compared(rigidimeter, joint, tmp_path):
     ran = rigidimeter(
         "model", joint, "--terms", "inertia,damping,stiffness", "--terms", "damping,stiffness",
@@ -88,13 +76,6 @@ def test_what_is_wrong_is_one_sentence(rigidimeter, joint, options, words):
     ran = rigidimeter("model", joint, *options)
     assert ran.status == 1
     assert words in ran.err
-
-
-def test_an_unknown_term_is_named_once(rigidimeter, joint):
-    ran = rigidimeter("model", joint, "--terms", "foo")
-    assert ran.status == 1
-    assert ran.err.count("foo") == 1
-    assert "there is no term 'foo'; known: inertia," in ran.err
 
 
 def _unrelated(angle, rng):

@@ -10,7 +10,7 @@ from tests.unit.analysis.report.parsed_page import ParsedPage
 
 from rigidimeter.analysis.report import SECTIONS
 from rigidimeter.analysis.report import page as page_module
-from rigidimeter.analysis.report.numbers import interval, number, p_value
+from rigidimeter.analysis.report.numbers import number, p_value
 from rigidimeter.analysis.report.page import contents, render_page, write_report
 from rigidimeter.analysis.study import Condition, StudyResult
 
@@ -33,33 +33,6 @@ def page(study: StudyResult) -> ParsedPage:
     return shown(study)
 
 
-def test_the_comparison_has_epochs_and_days_of_every_measure(
-    study: StudyResult, page: ParsedPage
-) -> None:
-    epochs = page.table("OFF against DBS: each epoch counted")[2:]
-    days = page.table("OFF against DBS: days counted")[1:]
-    assert len(epochs) == len(days) == 6
-    for c, row, by_days in zip(study.comparisons, epochs, days, strict=True):
-        test, summary, day = c.test, c.summaries["OFF"], c.days
-        assert test is not None
-        assert day is not None
-        assert row[0] == by_days[0] == f"{c.measure.title} ({c.measure.unit})"
-        assert row[1] == f"{summary.n} ({c.excluded['OFF']})"
-        quartiles = interval(summary.q1, summary.q3, 3)
-        assert row[2] == f"{number(summary.median, 3)} {quartiles}"
-        shift = interval(test.shift_low, test.shift_high, 3)
-        assert row[3] == number(summary.sd_percent, 2)
-        assert row[7] == f"{number(test.shift, 3)} {shift}"
-        assert row[8:10] == [number(test.z, 3), number(test.r, 2)]
-        assert row[10] == f"{p_value(test.p)} ({p_value(c.p_holm)})"
-        assert by_days[1] == f"{number(day.estimate)} {interval(day.low, day.high)}"
-        assert by_days[2:5] == [str(day.n_days_x), str(day.n_days_y), number(day.df)]
-        assert by_days[5] == f"{p_value(day.p)} ({p_value(c.days_p_holm)})"
-        assert by_days[6] == p_value(day.p_days)
-        if c.measure.name != "rating":
-            assert by_days[7] == f"{100 * day.day_share:.0f} %"
-
-
 def test_ratings_are_compared_by_their_own_model(study: StudyResult, page: ParsedPage) -> None:
     found = study.ratings
     assert found is not None
@@ -76,14 +49,6 @@ def test_ratings_are_compared_by_their_own_model(study: StudyResult, page: Parse
     ]
     offsets = {row[1]: row[3] for row in page.table("Predicted offsets")[1:]}
     assert offsets == {name: number(b) for name, b in found.fit.offsets["examiner"].items()}
-
-
-def test_differences_between_effects_are_all_shown(study: StudyResult, page: ParsedPage) -> None:
-    rows = page.table("Differences between effect sizes")[1:]
-    assert len(rows) == len(study.differences) == 15
-    for row, pair in zip(rows, study.differences, strict=True):
-        assert row[2].startswith(number(pair.difference.estimate))
-        assert row[3:5] == [p_value(pair.difference.p), p_value(pair.p_holm)]
 
 
 def test_the_overview_has_days_conditions_and_stimulation(page: ParsedPage) -> None:

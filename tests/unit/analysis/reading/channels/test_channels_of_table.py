@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from tests.known_joint import TRUTH, angle_rad, torque_nm
+from tests.known_joint import angle_rad, torque_nm
 
 from rigidimeter.analysis.reading.channels.channels_of_table import channels_of_table
-from rigidimeter.analysis.reading.channels.looks import look
 from rigidimeter.analysis.reading.channels.readings import BELIEVED_SPEED_RAD_S, BELIEVED_TORQUE_NM
 from rigidimeter.analysis.reading.formats.read_options import ReadOptions
 from rigidimeter.analysis.reading.formats.table import Table
@@ -33,39 +32,6 @@ def assert_si(found):
     np.testing.assert_allclose(found.values["angle_rad"], ANGLE_RAD, rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("columns", "options"),
-    [
-        ({"Zeit [ms]": 1e3 * TIME_S, "Drehmoment [Nm]": TORQUE_NM, "Winkel [°]": ANGLE_DEG}, {}),
-        ({"t (s)": TIME_S, "F (N)": TORQUE_NM / 0.25, "angle_deg": ANGLE_DEG},
-         {"scales": {"torque": "0.25 m"}}),
-        ({"t (s)": TIME_S, "Torque (V)": TORQUE_NM / 2.5 + 0.1, "angle_deg": ANGLE_DEG},
-         {"scales": {"torque": "2.5 Nm/V"}, "offsets": {"torque": "0.1 V"}}),
-        ({"time": TIME_S, "torque": TORQUE_NM, "angle": ANGLE_DEG},
-         {"units": {"time": "s", "torque": "Nm", "angle_rad": "deg"}}),
-        ({"time_s": TIME_S, "torque_nm": TORQUE_NM, "theta": ANGLE_RAD, "Angle": ANGLE_DEG},
-         {"columns": {"angle_rad": "theta"}}),
-    ],
-)  # fmt: skip
-def test_units_are_converted(columns, options):
-    assert_si(channels_of_table(table(**columns), ReadOptions(**options)))
-
-
-def test_a_row_of_units():
-    units = {"Time": "s", "Torque": "N·mm", "Angle": "deg"}
-    data = table(units, Time=TIME_S, Torque=1e3 * TORQUE_NM, Angle=ANGLE_DEG)
-    assert_si(channels_of_table(data, ReadOptions()))
-
-
-def test_our_own_names_are_not_touched():
-    found = channels_of_table(
-        table(time_s=TIME_S, torque_nm=TORQUE_NM, angle_rad=ANGLE_RAD, Angle=ANGLE_DEG),
-        ReadOptions(),
-    )
-    assert found.values["angle_rad"] is ANGLE_RAD
-    assert found.notices == ()
-
-
 def test_units_stated_nowhere_are_shown_under_each_reading():
     first, *shown = refusal(table(time=TIME_S, torque=TORQUE_NM, angle=ANGLE_DEG / 3))
     assert "the unit of 'time', 'torque', 'angle' is stated nowhere" in first
@@ -86,12 +52,6 @@ def test_every_fault_is_said_at_once():
     assert "--unit angle=furlong: is not a unit that is known" in text
 
 
-def test_two_candidates_are_not_chosen_from():
-    data = table(time_s=TIME_S, angle_rad=ANGLE_RAD, **{"M1 [Nm]": TORQUE_NM, "M2 [Nm]": TORQUE_NM})
-    (line,) = refusal(data)
-    assert "--column 'torque=M1 [Nm]' or --column 'torque=M2 [Nm]'" in line
-
-
 def test_what_is_optional_and_in_doubt_is_not_used_and_said():
     data = table(
         time_s=TIME_S, torque_nm=TORQUE_NM, angle_rad=ANGLE_RAD, velocity=ANGLE_RAD,
@@ -100,53 +60,6 @@ def test_what_is_optional_and_in_doubt_is_not_used_and_said():
     found = channels_of_table(data, ReadOptions())
     assert set(found.values) == {"torque_nm", "angle_rad"}
     assert [notice.level for notice in found.notices] == ["warning"] * 2
-
-
-@pytest.mark.parametrize(
-    ("columns", "told"),
-    [
-        ({"angle_rad": 10 * ANGLE_DEG}, "'angle_rad' is in rad, but an angle of"),
-        ({"angle_rad": ANGLE_DEG * 2 + 40}, "is more than one turn; say --unit angle=rad or"),
-        ({"time_s": 1e3 * TIME_S}, "'time_s' is in s, but 0.2 samples/s and a motion of 0.00"),
-        ({"time_s": TIME_S * 100}, "are too slow"),
-        ({"torque_nm": -TORQUE_NM}, "has the sign of the joint's reaction, or the angle is rev"),
-        ({"angle_rad": -ANGLE_RAD}, "has the sign of the joint's reaction"),
-        ({"torque_nm": ANGLE_RAD, "angle_rad": TORQUE_NM}, "'torque_nm' and 'angle_rad' are "
-         "exchanged"),
-        ({"torque_nm": 1e4 * TORQUE_NM}, "is too large"),
-    ],
-)  # fmt: skip
-def test_a_stated_unit_sign_or_name_that_cannot_be_is_found(columns, told):
-    whole = {"time_s": TIME_S, "torque_nm": TORQUE_NM, "angle_rad": ANGLE_RAD} | columns
-    assert told in refusal(table(**whole))[0]
-
-
-@pytest.mark.parametrize(
-    ("column", "other", "to_si"),
-    [
-        ("angle [deg]", "rad", 1.0),
-        ("angle [rad]", "deg", np.pi / 180),
-        ("Torque (N·mm)", "Nm", 1.0),
-        ("Torque (Nm)", "Nmm", 1e-3),
-    ],
-)
-@pytest.mark.parametrize("size", [0.3, 1.0, 3.0])
-def test_a_unit_that_is_confused_with_another_is_refused_unless_the_user_insists(
-    column, other, to_si, size
-):
-    """Whatever the motion and the joint: J, B and K alone are those of one joint or another."""
-    right = {"torque_nm": TORQUE_NM, "angle_rad": ANGLE_RAD}
-    standard = "angle_rad" if "angle" in column else "torque_nm"
-    si = size * right.pop(standard)
-    data = table(time_s=TIME_S, **right, **{column: si / to_si})
-    lines = refusal(data)
-    name, stated = standard.split("_")[0], column.split("[")[-1].split("(")[-1][:-1]
-    assert f"is in {stated}, but" in lines[0]
-    assert f"--unit {name}={other}" in lines[0]
-    assert len(lines) == 3  # and a line for each reading
-    found = channels_of_table(data, ReadOptions(units={name: other}))
-    np.testing.assert_allclose(found.values[standard], si, rtol=1e-12)
-    channels_of_table(data, ReadOptions(units={name: stated}))
 
 
 def test_no_recording_is_believed_in_two_units_that_are_confused():
@@ -172,11 +85,6 @@ def test_the_user_is_believed_with_a_warning():
 def test_an_axis_that_turns_on_is_no_limb():
     whole = {"time_s": TIME_S, "torque_nm": 0.1 * TORQUE_NM, "angle_rad": 2 * TIME_S + ANGLE_RAD}
     assert channels_of_table(table(**whole), ReadOptions()).notices == ()
-
-
-def test_the_rough_fit_is_the_joint():
-    fit = look((TIME_S, TORQUE_NM), (TIME_S, ANGLE_RAD), is_angle=True).fit
-    np.testing.assert_allclose(fit.value, TRUTH, rtol=0.05)
 
 
 def test_a_matrix_with_its_labels_is_refused_with_a_way_on():

@@ -24,54 +24,11 @@ def inspected(options=None, **columns):
     return inspect_table(Table("r.csv", columns), options or ReadOptions())
 
 
-def test_what_the_numbers_decide_is_proposed_and_reads_the_file():
-    # 400 samples/s: milliseconds that are not whole, so no ticks
-    time_s = np.arange(18000) / 400.0
-    found = inspected(
-        time=1e3 * time_s, torque_nm=-torque_nm(time_s), angle=np.degrees(angle_rad(time_s)) * 2
-    )
-    assert found.proposal.unsaid == ()
-    assert option_words(found) == [
-        "--unit", "time=ms", "--unit", "angle=deg", "--reaction", "--epoch-length-s", "20",
-    ]  # fmt: skip
-    read = channels_of_table(found.table, found.options)
-    np.testing.assert_allclose(read.values["angle_rad"], 2 * angle_rad(time_s), rtol=1e-12)
-
-
 def test_a_time_that_runs_backwards_is_told_so_and_has_no_trials():
     columns = {"time_s": TIME_S, "torque_nm": TORQUE_NM, "angle_rad": ANGLE_RAD}
     found = inspected(**{name: values[::-1].copy() for name, values in columns.items()})
     assert "time_s goes back" in found.proposal.unsaid[0]
     assert "epoch" not in found.options.columns
-
-
-def test_a_table_without_a_torque_is_told_so():
-    found = inspected(time=TIME_S, angle=ANGLE_RAD)
-    assert "has no column torque_nm" in found.proposal.unsaid[0]
-
-
-@pytest.mark.parametrize(
-    ("columns", "told"),
-    [
-        ({"time_s": TIME_S, "torque": TORQUE_NM, "angle_rad": ANGLE_RAD}, "--unit torque=Nm"),
-        ({"time_s": TIME_S, "torque_nm": TORQUE_NM, "angle": ANGLE_RAD}, "--unit angle=rad or"),
-        ({"time_s": TIME_S, "F (N)": TORQUE_NM, "angle_rad": ANGLE_RAD}, "lever arm"),
-    ],
-)
-def test_what_only_a_person_can_know_is_not_decided(columns, told):
-    found = inspected(**columns)
-    assert told in found.proposal.unsaid[0]
-
-
-def test_the_one_torque_that_belongs_to_the_motion_is_found():
-    rng = np.random.default_rng(2)
-    other = {f"M{axis} [Nm]": rng.normal(size=TIME_S.size) for axis in "xy"}
-    columns = {"t [s]": TIME_S, **other, "Mz [Nm]": TORQUE_NM, "angle_deg": ANGLE_DEG}
-    found = inspected(**columns)
-    assert found.options.columns == {"torque": "Mz [Nm]"}
-    assert "the motion explains is 1.00 with 'Mz [Nm]'" in found.proposal.reasons[0]
-    both = inspected(**columns | {"Mx [Nm]": TORQUE_NM})
-    assert "3 columns may be the torque" in both.proposal.unsaid[0]
 
 
 def test_the_screen_has_rate_gaps_and_role_of_each_column():

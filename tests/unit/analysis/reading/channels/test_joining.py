@@ -7,7 +7,6 @@ from tests.known_joint import (
     torque_nm,
 )
 
-from rigidimeter.analysis.reading.channels.clock_offset import find_offset
 from rigidimeter.analysis.reading.channels.joining import join_tables, offset_notice
 from rigidimeter.analysis.reading.formats.read_options import ReadOptions
 from rigidimeter.analysis.reading.formats.table import Table
@@ -22,29 +21,6 @@ def tables(offset_s=0.0):
     torque = Table("m.csv", {"t [ms]": 1e3 * TORQUE_S, "M [Nm]": torque_nm(TORQUE_S)})
     angle = np.degrees(angle_rad(MOTION_S))
     return [torque, Table("a.csv", {"t [s]": MOTION_S - offset_s, "phi [deg]": angle})]
-
-
-def test_every_sample_keeps_its_own_time():
-    joined, offset = join_tables(tables(), ReadOptions(), None)
-    (epoch,), said = epochs_from_table(joined, ReadOptions())
-    assert offset is None
-    assert said == []
-    torque, angle = epoch.channels["torque_nm"], epoch.channels["angle_rad"]
-    both = MOTION_S[-1] >= TORQUE_S
-    np.testing.assert_allclose(torque.time_s, TORQUE_S[both], rtol=1e-14)
-    np.testing.assert_array_equal(torque.values, torque_nm(TORQUE_S)[both])
-    np.testing.assert_array_equal(angle.time_s, MOTION_S[1:])
-
-
-@pytest.mark.parametrize("offset_s", [0.3712, -2.25, 0.0])
-@pytest.mark.parametrize("seed", [0, 3])
-def test_the_offset_is_found_within_its_error(offset_s, seed):
-    torque = TORQUE_S, torque_nm(TORQUE_S, seed, noise_nm=0.02)
-    motion = MOTION_S - offset_s, angle_rad(MOTION_S, seed)
-    found = find_offset(torque, motion, is_angle=True)
-    assert found.error_s < 1e-4
-    assert abs(found.value_s - offset_s) < 3 * found.error_s
-    assert found.r_squared > 0.9
 
 
 def test_it_is_added_to_the_second_clock_and_said():

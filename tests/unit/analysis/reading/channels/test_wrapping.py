@@ -12,14 +12,6 @@ from rigidimeter.core.errors import UserError
 TURN = 2 * np.pi
 
 
-@pytest.mark.parametrize("low", [0.0, -np.pi])
-def test_an_angle_that_begins_anew_goes_on(low):
-    angle = 7.0 * np.sin(np.linspace(0, 40, 4000))
-    found, count = unwrapped((angle - low) % TURN + low)
-    assert count > 10
-    np.testing.assert_allclose(np.diff(found), np.diff(angle), atol=1e-12)
-
-
 def test_samples_that_are_missing_stay_missing():
     angle = np.repeat(np.radians(np.arange(340.0, 400.0)), 2)
     wrapped = angle % TURN

@@ -1,4 +1,4 @@
-"""NWB, Parquet and Arrow files of other programs: channels by their own clocks, with units."""
+"""Trials of NWB, what is not read beside a file, and stamps that go back."""
 
 from __future__ import annotations
 
@@ -6,9 +6,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet
 import pytest
 from tests.known_joint import angle_rad, torque_nm
 
@@ -61,13 +58,6 @@ def test_nwb_of_another_program(tmp_path: Path, intervals: str) -> None:
     np.testing.assert_allclose(channels["angle_rad"].values, expected, rtol=1e-12, atol=1e-15)
 
 
-def test_nwb_that_breaks_off_is_a_sentence(tmp_path: Path) -> None:
-    path = write_nwb(tmp_path / "joint.nwb")
-    path.write_bytes(path.read_bytes()[:3000])
-    with pytest.raises(UserError, match="is not a complete NWB file"):
-        read(path)
-
-
 def test_nwb_reads_nothing_beside_the_file(tmp_path: Path) -> None:
     """Data that a file keeps elsewhere, or that a link takes from elsewhere, are not its own."""
     h5py = pytest.importorskip("h5py")
@@ -78,53 +68,6 @@ def test_nwb_reads_nothing_beside_the_file(tmp_path: Path) -> None:
         file["acquisition/Torque"] = h5py.ExternalLink(str(other), "/acquisition/Torque")
     with pytest.raises(UserError, match=r"(?i)torque"):
         read(path)
-
-
-@pytest.mark.parametrize("kind", ["parquet", "feather", "arrows"])
-def test_columns_of_parquet_and_arrow(tmp_path: Path, kind: str) -> None:
-    """The unit of a field is in its metadata."""
-    time_s = np.arange(2000) / 200.0
-    fields = [
-        pa.field("time", pa.float64(), metadata={"unit": "s"}),
-        pa.field("torque", pa.float64(), metadata={"unit": "N m"}),
-        pa.field("angle", pa.float64(), metadata={"unit": "deg"}),
-        pa.field("condition", pa.string()),
-    ]
-    values = [time_s, torque_nm(time_s), np.degrees(angle_rad(time_s)), ["OFF"] * time_s.size]
-    table = pa.Table.from_arrays(list(map(pa.array, values)), schema=pa.schema(fields))
-    path = tmp_path / f"joint.{kind}"
-    if kind == "parquet":
-        pa.parquet.write_table(table, path)
-    else:
-        new = pa.ipc.new_file if kind == "feather" else pa.ipc.new_stream
-        with pa.OSFile(str(path), "wb") as file, new(file, table.schema) as writer:
-            writer.write_table(table)
-    (epoch,) = read(path).epochs
-    assert epoch.condition == "OFF"
-    np.testing.assert_array_equal(epoch.channels["torque_nm"].values, values[1])
-    expected = angle_rad(time_s)
-    np.testing.assert_allclose(epoch.channels["angle_rad"].values, expected, atol=1e-15)
-
-
-def test_parquet_of_pandas_without_units_is_not_guessed(tmp_path: Path) -> None:
-    time_s = np.arange(2000) / 200.0
-    frame = pd.DataFrame(
-        {"time": time_s, "torque": torque_nm(time_s), "angle": np.degrees(angle_rad(time_s))}
-    )
-    frame.to_parquet(tmp_path / "joint.parquet")
-    with pytest.raises(UserError, match="unit"):
-        read(tmp_path / "joint.parquet")
-
-
-def test_clocks_keep_their_rows() -> None:
-    one = Stream("a", np.array([0.0, 1.0, 2.0]), {"x": np.array([1.0, 2.0, 3.0])})
-    two = Stream("b", np.array([0.5, 1.0]), {"x": np.array([4.0, 5.0]), "y": np.array([6.0, 7.0])})
-    table = table_of_streams("file", [one, two], [{"x": "N"}, {"x": "Nm", "y": "deg"}])
-    assert table.columns["time_s"].tolist() == [0.0, 0.5, 1.0, 2.0]
-    np.testing.assert_array_equal(table.columns["a.x"], [1.0, np.nan, 2.0, 3.0])
-    np.testing.assert_array_equal(table.columns["b.x"], [np.nan, 4.0, 5.0, np.nan])
-    np.testing.assert_array_equal(table.columns["y"], [np.nan, 6.0, 7.0, np.nan])
-    assert table.units == {"time_s": "s", "a.x": "N", "b.x": "Nm", "y": "deg"}
 
 
 def test_stamps_that_go_back_are_refused() -> None:

@@ -10,20 +10,6 @@ from rigidimeter.core.errors import UserError
 
 
 @pytest.mark.parametrize(
-    ("rows", "delimiter", "wanted"),
-    [
-        ("1,234.5\t995\n1,005\t2", "\t", "1234.5\t995\n1005\t2"),
-        ("995;0,512\n1.005;0,6", ";", "995;0,512\n1005;0,6"),
-        ("-1 234 567,5;x\n2'000;1", ";", "-1234567,5;x\n2000;1"),
-        ('"1,234,567",0.5', ",", '"1234567",0.5'),
-        ("1.234.567;2,5", ";", "1234567;2,5"),
-    ],
-)
-def test_marks_between_thousands_are_taken_off(rows, delimiter, wanted):
-    assert ungrouped(rows.encode(), delimiter).decode() == wanted
-
-
-@pytest.mark.parametrize(
     ("rows", "delimiter"),
     [
         ("1,234;2,345\n5,678;9,012", ";"),
@@ -44,20 +30,6 @@ def test_what_may_be_a_decimal_mark_stays(rows, delimiter):
 def table(path, text):
     path.write_text(text, "utf-8")
     return read_table(path)
-
-
-def test_the_sections_of_vicon_have_one_clock(tmp_path):
-    found = table(tmp_path / "r.csv", vicon())
-    names = [
-        "Elbow cell - Moment Mz", "Elbow cell - Voltage 1",
-        "S01:RElbowAngles X", "S01:RElbowAngles Y", "S01:RElbowAngles Z",
-    ]  # fmt: skip
-    assert list(found.columns) == ["time_s", *names]
-    assert [found.units[name] for name in names] == ["N.mm", "V", "deg", "deg", "deg"]
-    torque, angle = (np.isfinite(found.columns[name]) for name in (names[0], names[2]))
-    np.testing.assert_allclose(found.columns["time_s"][torque][:3], [0.0, 0.005, 0.01])
-    np.testing.assert_allclose(found.columns["time_s"][angle][:3], [0.25, 0.26, 0.27])
-    np.testing.assert_allclose(found.columns[names[0]][torque], 1e3 * M, rtol=1e-8)
 
 
 @pytest.mark.parametrize(

@@ -61,15 +61,6 @@ def test_the_limit_is_the_larger_of_three_intervals_and_50_ms(lost, pieces):
     assert len(epochs) == pieces
 
 
-def test_a_gap_in_the_stamps_is_a_warning():
-    time_s = np.arange(1000) / 100
-    time_s[400:] += 0.5
-    epochs, (notice,) = read(table(time_s=time_s))
-    assert lengths(epochs) == [("1a", 400), ("1b", 600)]
-    assert notice.level == "warning"
-    assert "gap of 0.51 s from 3.99 s to 4.5 s in all channels" in notice.text
-
-
 def test_gaps_are_looked_for_in_each_epoch_by_itself():
     time_s = np.arange(1000) / 100
     time_s[500:] += 15  # the rest between two epochs was not recorded

@@ -12,7 +12,6 @@ from tests.instrument_files import (
     WRITERS,
     Signal,
     write_acq,
-    write_c3d,
     write_smr,
     write_tdms,
     write_tdms_columns,
@@ -29,20 +28,8 @@ TORQUE = Signal("Torque", "N m", torque_nm(TORQUE_S))
 ANGLE = Signal("Angle", "deg", np.degrees(angle_rad(TORQUE_S)))
 SLOW_ANGLE = Signal("Angle", "deg", np.degrees(angle_rad(ANGLE_S)), 100.0)
 LATE_ANGLE = Signal("Angle", "deg", np.degrees(angle_rad(ANGLE_S + 0.25)), 100.0, 0.25)
-EXACT = {".tdms": 0.0, ".acq": 0.0, ".c3d": 1e-7, ".abf": 1e-7, ".smr": 1e-7, ".ns2": 3e-4}
 """Largest rounding by the format: 32-bit floats, or 16-bit numbers over the range (here ±11°)."""
 EXTRAS = {".tdms": "tdms", ".c3d": "c3d", ".acq": "biopac", ".smr": "neo"}
-
-
-@pytest.mark.parametrize("suffix", EXACT)
-def test_torque_and_angle_are_read_without_any_option(tmp_path: Path, suffix: str) -> None:
-    path = tmp_path / f"joint{suffix}"
-    WRITERS[suffix](path, [TORQUE, ANGLE])
-    (epoch,) = read(path).epochs
-    torque, angle = epoch.channels["torque_nm"], epoch.channels["angle_rad"]
-    np.testing.assert_allclose(torque.time_s, TORQUE_S, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(torque.values, TORQUE.values, rtol=0, atol=EXACT[suffix])
-    np.testing.assert_allclose(angle.values, angle_rad(TORQUE_S), rtol=1e-14, atol=EXACT[suffix])
 
 
 @pytest.mark.parametrize(
@@ -79,22 +66,6 @@ def test_a_64_bit_file_of_spike2_has_a_way_on_without_sonpy(tmp_path: Path, monk
         read(path)
 
 
-def test_analogue_channels_in_volts_ask_for_the_calibration(tmp_path: Path) -> None:
-    """A Plexon file has 12-bit numbers of millivolts and no other unit."""
-    path = tmp_path / "joint.plx"
-    volts = [
-        Signal("Torque", "mV", 2000 * TORQUE.values),
-        Signal("Angle", "mV", 100 * ANGLE.values),
-    ]
-    WRITERS[".plx"](path, volts)
-    with pytest.raises(UserError, match="is in mV, and torque is needed in Nm: say --scale"):
-        read(path)
-    (epoch,) = read(path, scale={"torque": "0.5 Nm/V", "angle": "10 deg/V"}).epochs
-    step_nm = 5.0 / 2048 * 0.5
-    found = epoch.channels["torque_nm"].values
-    np.testing.assert_allclose(found, TORQUE.values[:-1], rtol=0, atol=0.51 * step_nm)
-
-
 def test_a_pause_of_a_plexon_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "joint.plx"
     WRITERS[".plx"](path, [TORQUE])
@@ -103,13 +74,6 @@ def test_a_pause_of_a_plexon_file_is_refused(tmp_path: Path) -> None:
     path.write_bytes(data[:at] + struct.pack("<HHI", 5, 0, 240_000) + data[at + 8 :])
     with pytest.raises(UserError, match="channel Torque was paused"):
         read(path)
-
-
-def test_compressed_channels_of_acqknowledge(tmp_path: Path) -> None:
-    write_acq(tmp_path / "joint.acq", [TORQUE, SLOW_ANGLE], compressed=True)
-    (epoch,) = read(tmp_path / "joint.acq").epochs
-    np.testing.assert_array_equal(epoch.channels["torque_nm"].values, TORQUE.values)
-    assert len(epoch.channels["angle_rad"]) == 1000
 
 
 def test_a_compressed_channel_does_not_fill_the_memory(tmp_path: Path) -> None:
@@ -216,8 +180,3 @@ def test_spike2_that_claims_more_blocks_than_it_has_is_refused_at_once(tmp_path:
     path.write_bytes(data)
     with pytest.raises(UserError, match="32767 blocks of data are not in it"):
         read(path)
-
-
-def test_c3d_writer_of_the_tests_has_a_marker(tmp_path: Path) -> None:
-    write_c3d(tmp_path / "joint.c3d", [TORQUE, ANGLE])
-    assert list(read_table(tmp_path / "joint.c3d").columns) == ["time_s", "Torque", "Angle"]

@@ -13,7 +13,6 @@ from tests.matlab_exports import (
     save,
     spike2,
     structures,
-    write_mat73,
 )
 
 from rigidimeter.analysis.reading.formats import ReadOptions, read_table
@@ -79,17 +78,6 @@ def test_many_structures_without_samples_are_no_columns(tmp_path):
     events = structures(*({"kind": "a", "at": float(k)} for k in range(3000)))
     found = table(tmp_path / "r.mat", {"torque_nm": M, "angle_deg": D, "events": events})
     assert found.others["events"] == "an array of objects"
-
-
-@pytest.mark.parametrize("made", [labchart(blocks=2), acqknowledge(), by_hand(), spike2()])
-def test_version_7_3_gives_the_same_table(tmp_path, made):
-    old = table(tmp_path / "old.mat", made)
-    write_mat73(tmp_path / "new.mat", made)
-    new = read_table(tmp_path / "new.mat")
-    assert list(new.columns) == list(old.columns)
-    assert new.units == old.units
-    for name in old.columns:
-        np.testing.assert_array_equal(new.columns[name], old.columns[name])
 
 
 def two(torque, angle):

@@ -20,8 +20,6 @@ MATLAB = Path(__file__).with_name("matlab")
 VERSIONS = ("v7", "v7.3")
 COLUMNS = {"torque": np.array([0.5, 1.0, 1.5]), "angle": np.array([2.0, 4.0, 6.0])}
 UNITS = ("N*m", "deg")
-MILLIS = np.arange(3).astype("timedelta64[ms]")
-MIDNIGHT = np.datetime64("2024-05-01T00:00:00", "ns")
 
 
 @pytest.fixture(autouse=True)
@@ -68,40 +66,6 @@ def test_dates_and_durations_are_no_common_clock() -> None:
         read_mat(MATLAB / "timetable.mat")
     with pytest.raises(UserError, match=r"no variable 'TT'; it has tt1,"):
         read_mat(MATLAB / "timetable.mat", Layout(table="TT"))
-
-
-@pytest.mark.parametrize("version", VERSIONS)
-def test_a_table_beside_plain_columns(tmp_path: Path, version: str) -> None:
-    save(tmp_path / "r.mat", version, T=table(COLUMNS, UNITS), fs=200.0, more=np.arange(3.0))
-    found = read_mat(tmp_path / "r.mat")
-    assert {name: list(found.columns[name]) for name in ("torque", "angle", "more")} == {
-        "torque": [0.5, 1.0, 1.5], "angle": [2.0, 4.0, 6.0], "more": [0.0, 1.0, 2.0],
-    }  # fmt: skip
-    assert found.units == {"torque": "N*m", "angle": "deg"}
-    assert found.scalars == {"fs": 200.0}
-
-
-@pytest.mark.parametrize("version", VERSIONS)
-@pytest.mark.parametrize("times", [MILLIS, MIDNIGHT + MILLIS, 1000.0])
-def test_a_timetable_is_a_clock(tmp_path: Path, version: str, times: np.ndarray | float) -> None:
-    save(tmp_path / "r.mat", version, TT=timetable(COLUMNS, UNITS, times))
-    found = read_mat(tmp_path / "r.mat")
-    # mat-io's writer keeps a date as one number of ms, MATLAB as two
-    np.testing.assert_allclose(found.columns["time_s"], [0.0, 0.001, 0.002], atol=3e-7)
-    assert found.units == {"time_s": "s", "torque": "N*m", "angle": "deg"}
-
-
-def test_two_timetables_keep_their_clocks(tmp_path: Path) -> None:
-    first, second = ({name: COLUMNS[name]} for name in COLUMNS)
-    late = MIDNIGHT + MILLIS + np.timedelta64(500, "us")
-    save(tmp_path / "r.mat", M=timetable(first, ["N*m"], MIDNIGHT + MILLIS),
-         P=timetable(second, ["deg"], late))  # fmt: skip
-    found = read_mat(tmp_path / "r.mat")
-    here = np.isfinite(found.columns["angle"])
-    np.testing.assert_allclose(
-        found.columns["time_s"][here], [0.0005, 0.0015, 0.0025], rtol=0, atol=1e-6
-    )
-    assert list(found.columns["torque"][~here]) == [0.5, 1.0, 1.5]
 
 
 @pytest.mark.parametrize("version", VERSIONS)

@@ -1,4 +1,4 @@
-"""The same recording in every format that is read; names, rate and sign."""
+"""Rates, types and labels of binary files, and what MATLAB 7.3 needs."""
 
 import sys
 from pathlib import Path
@@ -12,24 +12,12 @@ from rigidimeter.analysis.reading.formats.read_options import ReadOptions
 from rigidimeter.analysis.reading.formats.readers import read_recording, read_table
 from rigidimeter.core.errors import UserError
 
-NAMES = ("time_s", "torque_nm", "angle_rad")
-
 
 @pytest.fixture
 def columns():
     rng = np.random.default_rng(3)
     time_s = np.arange(400) / 100 + rng.uniform(-1e-4, 1e-4, 400)
     return {"time_s": time_s, "torque_nm": rng.normal(size=400), "angle_rad": rng.normal(size=400)}
-
-
-def write_csv(path: Path, columns, delimiter=",") -> Path:
-    rows = [delimiter.join(columns)]
-    rows += [
-        delimiter.join(map(repr, row))
-        for row in zip(*map(np.ndarray.tolist, columns.values()), strict=True)
-    ]
-    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
-    return path
 
 
 def write_mat73(path: Path, columns) -> Path:
@@ -45,74 +33,12 @@ def write_npz(path: Path, columns) -> Path:
     return path
 
 
-def write_mat(path: Path, columns) -> Path:
-    scipy.io.savemat(path, columns, oned_as="column")
-    return path
-
-
-WRITERS = {
-    "r.csv": write_csv,
-    "r.TSV": lambda path, columns: write_csv(path, columns, "\t"),
-    "r.txt": lambda path, columns: write_csv(path, columns, ";"),
-    "r.npz": write_npz,
-    "r.mat": write_mat,
-    "r73.mat": write_mat73,
-}
-
-
-@pytest.mark.parametrize("file", WRITERS)
-def test_every_format_gives_the_same_samples_to_the_bit(tmp_path, columns, file):
-    path = WRITERS[file](tmp_path / file, columns)
-    epochs, notices = read_recording(path, ReadOptions(condition="OFF", task="prbs"))
-    assert notices == []
-    (epoch,) = epochs
-    assert (epoch.source, epoch.label, epoch.condition, epoch.task) == (
-        str(path), "1", "OFF", "prbs",
-    )  # fmt: skip
-    assert set(epoch.channels) == {"torque_nm", "angle_rad"}
-    for name, channel in epoch.channels.items():
-        np.testing.assert_array_equal(channel.values, columns[name])
-        np.testing.assert_array_equal(channel.time_s, columns["time_s"])
-
-
-def test_columns_by_another_name(tmp_path, columns):
-    columns = {
-        "t": columns["time_s"],
-        "Fz": columns["torque_nm"],
-        "angle_rad": columns["angle_rad"],
-    }
-    path = write_npz(tmp_path / "r.npz", columns)
-    options = ReadOptions(columns={"torque_nm": "Fz", "time_s": "t"})
-    epochs, _ = read_recording(path, options)
-    np.testing.assert_array_equal(epochs[0].channels["torque_nm"].values, columns["Fz"])
-
-
-def test_a_mapped_column_wins_over_one_of_the_standard_name(tmp_path, columns):
-    path = write_npz(tmp_path / "r.npz", columns | {"other": 2 * columns["torque_nm"]})
-    epochs, _ = read_recording(path, ReadOptions(columns={"torque_nm": "other"}))
-    np.testing.assert_array_equal(epochs[0].channels["torque_nm"].values, 2 * columns["torque_nm"])
-
-
-def test_reaction_turns_the_torque_and_nothing_else(tmp_path, columns):
-    path = write_npz(tmp_path / "r.npz", columns)
-    (epoch,), _ = read_recording(path, ReadOptions(reaction=True))
-    np.testing.assert_array_equal(epoch.channels["torque_nm"].values, -columns["torque_nm"])
-    np.testing.assert_array_equal(epoch.channels["angle_rad"].values, columns["angle_rad"])
-
-
 @pytest.mark.parametrize("name", ["rate_hz", "fs_hz", "fs", "sampling_rate_hz"])
 def test_the_files_own_rate(tmp_path, columns, name):
     del columns["time_s"]
     path = write_npz(tmp_path / "r.npz", columns | {name: 250.0})
     (epoch,), _ = read_recording(path, ReadOptions())
     np.testing.assert_array_equal(epoch.channels["torque_nm"].time_s, np.arange(400) / 250)
-
-
-def test_a_stated_rate_overrules_the_files_own(tmp_path, columns):
-    del columns["time_s"]
-    path = write_npz(tmp_path / "r.npz", columns | {"fs": 250.0})
-    (epoch,), _ = read_recording(path, ReadOptions(rate_hz=500.0))
-    assert epoch.channels["torque_nm"].rate_hz == pytest.approx(500.0)
 
 
 def test_a_rate_that_agrees_leaves_the_time_column_in_charge(tmp_path, columns):
@@ -129,13 +55,6 @@ def test_stamps_rounded_to_milliseconds_agree_with_300_hz(tmp_path, columns):
     assert len(epochs) == 1
 
 
-@pytest.mark.parametrize("shape", [(-1, 1), (1, -1)])
-def test_rows_and_columns_of_a_matrix_are_columns(tmp_path, columns, shape):
-    path = write_npz(tmp_path / "r.npz", {n: v.reshape(shape) for n, v in columns.items()})
-    (epoch,), _ = read_recording(path, ReadOptions())
-    np.testing.assert_array_equal(epoch.channels["torque_nm"].values, columns["torque_nm"])
-
-
 def test_integers_and_float32_become_float64(tmp_path):
     values = np.arange(50)
     path = write_npz(
@@ -144,16 +63,6 @@ def test_integers_and_float32_become_float64(tmp_path):
     )
     (epoch,), _ = read_recording(path, ReadOptions())
     assert {channel.values.dtype for channel in epoch.channels.values()} == {np.dtype("f8")}
-
-
-def test_fields_of_matlab_structures_have_dotted_names(tmp_path, columns):
-    path = tmp_path / "r.mat"
-    data = {"torque": columns["torque_nm"], "joint": {"angle": columns["angle_rad"]}, "fs": 100.0}
-    scipy.io.savemat(path, {"data": data, "condition": "DBS"})
-    options = ReadOptions(columns={"torque_nm": "data.torque", "angle_rad": "data.joint.angle"})
-    (epoch,), _ = read_recording(path, options)
-    assert epoch.condition == "DBS"
-    np.testing.assert_array_equal(epoch.channels["angle_rad"].values, columns["angle_rad"])
 
 
 def test_matlab_cells_of_text_are_labels(tmp_path, columns):

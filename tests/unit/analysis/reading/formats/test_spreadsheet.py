@@ -1,51 +1,33 @@
-"""Excel files of XlsxWriter, and an OpenDocument sheet."""
+"""What is refused of a spreadsheet, and a head above its table."""
 
-import datetime as dt
 import sys
 import zipfile
 
 import numpy as np
 import pytest
 import xlsxwriter
-from tests.known_joint import TRUTH, angle_rad, torque_nm
+from tests.known_joint import angle_rad, torque_nm
 
-from rigidimeter.analysis.estimation import identify
 from rigidimeter.analysis.reading.channels.inspection import inspect_table, option_words
-from rigidimeter.analysis.reading.formats import ReadOptions, read_recording, read_table
+from rigidimeter.analysis.reading.formats import ReadOptions, read_table
 from rigidimeter.core.errors import UserError
 
 TIME_S = np.arange(2400) / 120.0
 TORQUE_NM, ANGLE_DEG = torque_nm(TIME_S, 1), np.degrees(angle_rad(TIME_S, 1))
-START = dt.datetime(2024, 3, 1, 10, 0, 0)
 
 
-def excel(path, sheets, dates=False):
+def excel(path, sheets):
     with xlsxwriter.Workbook(path) as book:
-        stamp = book.add_format({"num_format": "yyyy-mm-dd hh:mm:ss.000"})
         for name, (head, columns) in sheets.items():
             sheet = book.add_worksheet(name)
             for row, line in enumerate(head):
                 sheet.write_row(row, 0, line)
             for row, values in enumerate(zip(*columns, strict=True), start=len(head)):
                 sheet.write_row(row, 0, values)
-                if dates:
-                    sheet.write_datetime(row, 0, values[0], stamp)
     return path
 
 
 JOINT = ([["Zeit [ms]", "Drehmoment [Nm]", "Winkel [°]"]], [1e3 * TIME_S, TORQUE_NM, ANGLE_DEG])
-
-
-def test_an_excel_file_gives_the_truth_at_the_proposed_command(tmp_path):
-    path = excel(tmp_path / "r.xlsx", {"Trial": JOINT})
-    found = inspect_table(read_table(path), ReadOptions())
-    assert found.proposal.unsaid == ()
-    (epoch,), notices = read_recording(path, found.options)
-    assert notices == []
-    np.testing.assert_allclose(epoch.channels["torque_nm"].values, TORQUE_NM, rtol=1e-14)
-    values = {name: channel.values for name, channel in epoch.channels.items()}
-    fit = identify(**values, time_s=epoch.channels["torque_nm"].time_s)
-    assert np.all((fit.low <= TRUTH) & (fit.high >= TRUTH))
 
 
 def test_a_head_a_row_of_units_and_a_remark_below(tmp_path):
@@ -54,15 +36,6 @@ def test_a_head_a_row_of_units_and_a_remark_below(tmp_path):
     table = read_table(path)
     assert table.units == {"Time": "s", "Torque": "Nm", "Angle": "deg"}
     assert table.lines[0] == 5
-
-
-def test_dates_are_seconds(tmp_path):
-    stamps = [START + dt.timedelta(milliseconds=250 * k) for k in range(40)]
-    head = [["Timestamp", "M [Nm]", "phi [deg]"]]
-    columns = [stamps, TORQUE_NM[:40], ANGLE_DEG[:40]]
-    table = read_table(excel(tmp_path / "r.xlsx", {"a": (head, columns)}, dates=True))
-    assert table.units["Timestamp"] == "s"
-    np.testing.assert_allclose(table.columns["Timestamp"], 0.25 * np.arange(40), atol=1e-3)
 
 
 def test_one_of_several_sheets_is_named(tmp_path):
@@ -105,11 +78,6 @@ def opendocument(path, after=""):
         archive.writestr("META-INF/manifest.xml", MANIFEST)
         archive.writestr("content.xml", content)
     return path
-
-
-def test_an_opendocument_sheet(tmp_path):
-    table = read_table(opendocument(tmp_path / "r.ods"))
-    np.testing.assert_array_equal(table.columns["M_Nm"], TORQUE_NM[:50])
 
 
 FAR = (

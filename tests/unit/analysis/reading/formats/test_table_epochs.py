@@ -91,16 +91,6 @@ def test_no_label_anywhere_is_refused():
         epochs_from_table(table(epoch=np.full(300, np.nan)), ReadOptions())
 
 
-def test_without_labels_the_whole_file_is_epoch_1():
-    assert spans(epochs_from_table(table(), ReadOptions())[0]) == [("1", 0.0, 300)]
-
-
-def test_cut_by_length():
-    epochs, notices = epochs_from_table(table(), ReadOptions(epoch_length_s=1.0))
-    assert spans(epochs) == [("1", 0.0, 100), ("2", 1.0, 100), ("3", 2.0, 100)]
-    assert notices == []
-
-
 @pytest.mark.parametrize(
     ("rows", "labels", "left_s"), [(294, "12", "0.94"), (295, "123", ""), (301, "123", "0.01")]
 )
@@ -118,14 +108,6 @@ def test_rounding_of_stamps_moves_no_sample_across_a_cut(start_s, rate_hz):
     data = table(int(3 * rate_hz), rate_hz=rate_hz, start_s=start_s)
     epochs, _ = epochs_from_table(data, ReadOptions(epoch_length_s=1.0))
     assert [len(epoch.channels["angle_rad"]) for epoch in epochs] == [rate_hz] * 3
-
-
-def test_jitter_moves_no_sample_across_a_cut():
-    rng = np.random.default_rng(4)
-    data = table(3000, rate_hz=1000.0)
-    data.columns["time_s"][:] += rng.uniform(-1e-4, 1e-4, 3000)
-    epochs, _ = epochs_from_table(data, ReadOptions(epoch_length_s=0.1))
-    assert [len(epoch.channels["angle_rad"]) for epoch in epochs] == [100] * 30
 
 
 def test_labels_win_over_a_length_aloud():
