@@ -56,6 +56,16 @@ def test_white_scores_have_no_correlation_and_a_moving_sum_has_its_length():
     assert correlation_samples(sums[20:] - sums[:-20])[0] == pytest.approx(20.0, rel=0.15)
 
 
+def test_the_sampling_rate_does_not_change_the_answer():
+    rng = np.random.default_rng(4)
+    A, e = motion(rng), voluntary(rng)
+    coarse = hac_covariance(*(fitted(A, e)[k] for k in (0, 2)))
+    A10, e10 = (signal.resample(values, 10 * N, axis=0) for values in (A, e))
+    fine = hac_covariance(*(fitted(A10, e10)[k] for k in (0, 2)))
+    np.testing.assert_allclose(fine.standard_errors, coarse.standard_errors, rtol=0.05)
+    assert fine.degrees_of_freedom == pytest.approx(coarse.degrees_of_freedom, abs=2)
+
+
 def coverage(noise, seeds, covers):
     held = []
     for seed in seeds:
@@ -96,6 +106,19 @@ def test_intervals_of_95_percent_hold_in_many_trials(noise):
     held = coverage(noise, range(3000), by_hac)
     print(f"hac, {noise.__name__}: {held.round(1)}")
     assert np.all((held > 92.5) & (held < 97.0)), held
+
+
+def test_the_cosines_and_the_small_sample_factor_are_those_of_the_formula():
+    rng = np.random.default_rng(15)
+    bread, _, scores = fitted(motion(rng), voluntary(rng))
+    found = hac_covariance(bread, scores)
+    independent = N / np.max(correlation_samples(scores))
+    assert found.degrees_of_freedom == round(0.8 * independent ** (2 / 3))
+    t, j = np.arange(N), np.arange(1, round(found.degrees_of_freedom) + 1)
+    sums = np.sqrt(2) * np.cos(np.pi * np.outer(j, t + 0.5) / N) @ scores
+    middle = sums.T @ sums / j.size * independent / (independent - 3)
+    np.testing.assert_allclose(found.covariance, bread @ middle @ bread.T, rtol=1e-9)
+    np.testing.assert_allclose(found.standard_errors**2, np.diag(found.covariance), rtol=1e-12)
 
 
 def test_too_few_samples_and_wrong_shapes_are_refused():

@@ -9,7 +9,65 @@ from rigidimeter.analysis.estimation.closedloop.drive_motion import driven, sinc
 from rigidimeter.analysis.estimation.closedloop.drive_search import _slopes, explainable
 from rigidimeter.analysis.estimation.closedloop.drive_terms import Fitted, Samples
 from rigidimeter.core.records import Channel, Epoch, Ticks
-from rigidimeter.model import DriveModel
+from rigidimeter.model import DriveModel, DriveState, drive, drive_step
+
+
+def stepped(commands, bandwidth_hz=40.0, ratio=0.8, interval_s=1e-3):
+    """Return the state at each tick by the steps of the virtual rig."""
+    one, state, states = drive(bandwidth_hz, ratio, interval_s), DriveState(), []
+    for command in commands:
+        states.append(state)
+        state = drive_step(one, state, command)
+    return np.array(states)
+
+
+def test_driven_motion_is_the_rigs_to_rounding():
+    commands = np.random.default_rng(0).standard_normal(300)
+    command = Channel("velocity_command_rad_s", np.arange(300) / 1000.0, commands)
+    found = driven(DriveModel.second_order(40.0, 0.8), command, command.time_s)
+    expected = stepped(commands)
+    np.testing.assert_allclose(found.angle_rad, expected[:, 0], atol=1e-12)
+    np.testing.assert_allclose(found.velocity_rad_s, expected[:, 1], atol=1e-11)
+    np.testing.assert_allclose(found.acceleration_rad_s2, expected[:, 2], atol=1e-9)
+
+
+def test_between_ticks_it_is_exact_too():
+    # One held command from rest: v = c (1 − e^(−σt)(cos ω_d t + σ/ω_d sin ω_d t)).
+    command = Channel("velocity_command_rad_s", np.arange(100) / 1000.0, np.full(100, 0.3))
+    t = np.random.default_rng(1).uniform(0.0, 0.099, 50)
+    omega, ratio = 2 * math.pi * 40.0, 0.8
+    sigma, omega_d = ratio * omega, omega * math.sqrt(1 - ratio**2)
+    closed = 0.3 * (
+        1 - np.exp(-sigma * t) * (np.cos(omega_d * t) + sigma / omega_d * np.sin(omega_d * t))
+    )
+    found = driven(DriveModel.second_order(40.0, 0.8), command, t)
+    np.testing.assert_allclose(found.velocity_rad_s, closed, atol=1e-12)
+
+
+def test_a_delay_moves_everything():
+    commands = np.random.default_rng(2).standard_normal(200)
+    command = Channel("velocity_command_rad_s", np.arange(200) / 1000.0, commands)
+    late = driven(DriveModel.second_order(40.0, 0.8, 0.0035), command, command.time_s[50:])
+    there = driven(DriveModel.second_order(40.0, 0.8), command, command.time_s[50:] - 0.0035)
+    np.testing.assert_array_equal(late.velocity_rad_s, there.velocity_rad_s)
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.0042])
+def test_the_drive_is_found_from_command_and_velocity(delay_s):
+    commands = np.cumsum(np.random.default_rng(3).standard_normal(4000)) * 0.01
+    command = Channel("velocity_command_rad_s", np.arange(4000) / 1000.0, commands)
+    stamps = np.arange(0.1, 3.9, 0.0201)
+    velocity = driven(DriveModel.second_order(23.0, 0.6, delay_s), command, stamps).velocity_rad_s
+    channels = {
+        "velocity_command_rad_s": command,
+        "velocity_rad_s": Channel("velocity_rad_s", stamps, velocity),
+    }
+    found = fit_drive(Epoch("file", "1", channels), DriveModel.second_order(50.0, 0.7071))
+    assert found.structure == "second order"
+    (pole,) = found.model.poles_rad_s
+    assert abs(pole) == pytest.approx(2 * math.pi * 23.0, rel=1e-3)
+    assert -pole.real / abs(pole) == pytest.approx(0.6, rel=1e-3)
+    assert found.model.delay_s == pytest.approx(delay_s, abs=1e-5)
 
 
 def test_a_velocity_that_the_command_does_not_explain_gives_no_drive():
@@ -20,6 +78,22 @@ def test_a_velocity_that_the_command_does_not_explain_gives_no_drive():
         "velocity_rad_s": Channel("velocity_rad_s", t, rng.standard_normal(2000)),
     }
     assert fit_drive(Epoch("file", "1", channels), DriveModel.second_order(50.0, 0.7071)) is None
+
+
+def test_ticks_that_do_not_come_evenly_are_exact_too():
+    rng = np.random.default_rng(5)
+    ticks_s = np.arange(400) / 1000.0 + rng.uniform(0.0, 4e-4, 400)
+    commands = rng.standard_normal(400)
+    command = Channel("velocity_command_rad_s", ticks_s, commands)
+    state, states = DriveState(), []
+    for one, length_s in zip(commands, np.diff(ticks_s, append=ticks_s[-1] + 1e-3), strict=True):
+        states.append(state)
+        state = drive_step(drive(40.0, 0.8, length_s), state, one)
+    found = driven(DriveModel.second_order(40.0, 0.8), command, ticks_s)
+    expected = np.array(states)
+    np.testing.assert_allclose(found.angle_rad, expected[:, 0], atol=1e-12)
+    np.testing.assert_allclose(found.velocity_rad_s, expected[:, 1], atol=1e-11)
+    np.testing.assert_allclose(found.acceleration_rad_s2, expected[:, 2], atol=1e-8)
 
 
 def recorded(commands, velocity, interval_s):
@@ -33,6 +107,20 @@ def recorded(commands, velocity, interval_s):
 
 def smooth_commands(n, seed=6):
     return np.cumsum(np.random.default_rng(seed).standard_normal(n)) * 0.01
+
+
+def test_a_pi_drive_is_told_from_one_of_second_order():
+    # H = ((p + q) s + p q) / ((s + p)(s + q)), whose acceleration jumps by p + q per command.
+    model = DriveModel((complex(-220.0), complex(-90.0)), (complex(372.3), complex(-62.3)), 2e-4)
+    assert model.gain == pytest.approx(1.0, rel=1e-3)
+    commands = smooth_commands(3000)
+    command = Channel("velocity_command_rad_s", np.arange(3000) / 500.0, commands)
+    noise = 1e-5 * np.random.default_rng(7).standard_normal(3000)
+    velocity = driven(model, command, command.time_s).velocity_rad_s + noise
+    found = fit_drive(recorded(commands, velocity, 0.002), DriveModel.second_order(50.0, 0.7071))
+    assert found.structure == "velocity PI"
+    assert found.model.jump == pytest.approx(310.0, rel=0.01)
+    assert found.model.delay_s == pytest.approx(2e-4, abs=1e-5)
 
 
 def test_a_command_that_was_logged_more_slowly_than_it_was_sent_gives_no_drive():

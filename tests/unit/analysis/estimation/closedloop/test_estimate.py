@@ -7,6 +7,8 @@ from rigidimeter.analysis.estimation import choose_method, fit_epochs
 from rigidimeter.analysis.estimation.methods import method_named
 from rigidimeter.analysis.estimation.prepared import prepare
 from rigidimeter.core.records import Channel, Outcome
+from rigidimeter.core.settings import ControllerSettings
+from rigidimeter.virtual import PAPER_RATES
 
 NAMES = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
 
@@ -58,6 +60,23 @@ def test_a_subject_who_pushes_does_not_bias_the_pooled_estimate(pushed, truth, m
     squares = np.mean([values(f) for f in fitted(prepared, "bandlimited")[0]], axis=0)
     assert squares[1] / truth[1] < 0.7
     assert all(fit.outcome.included for fit in fits)
+
+
+def test_a_wrong_controller_costs_precision_and_not_truth(pushed, truth):
+    settings, epochs, prepared = pushed
+    right = fitted(prepared, "iv")[1][0]
+    wrong_controller = ControllerSettings(inertia_kg_m2=0.01, damping_nm_s_rad=0.5)
+    wrong = fit_epochs(epochs, "iv", settings.model_copy(update={"controller": wrong_controller}))[
+        1
+    ][0]
+    assert np.all(np.abs(values(wrong) - truth) < 4 * values(wrong, "_se"))
+    assert np.all(values(wrong, "_se") >= 0.95 * values(right, "_se"))
+
+
+def test_the_papers_rates_with_jitter(simulated, truth):
+    settings, epochs = simulated(6, seed=3, **PAPER_RATES)
+    (pooled,) = fit_epochs(epochs, "iv", settings)[1]
+    assert np.all(np.abs(values(pooled) / truth - 1) < [0.004, 0.004, 0.002])
 
 
 def test_without_command_the_motion_is_interpolated(simulated, truth):

@@ -59,6 +59,18 @@ def test_of_noise_the_probability_is_evenly_distributed(test, slope):
     assert stats.kstest(p, "uniform").pvalue > 1e-3
 
 
+def test_what_answers_in_proportion_is_measured():
+    parts = proportional(answers(np.random.default_rng(1), 2, factor=0.2j))
+    assert [part.share for part in parts] == pytest.approx([0.2] * 3, rel=0.15)
+    assert max(part.p for part in parts) < 1e-6
+
+
+def test_what_comes_again_without_proportion_needs_the_sequence_again():
+    made = answers(np.random.default_rng(1), 4, own=2.0)
+    assert [part.share for part in repeated(made)] == pytest.approx([0.2] * 3, rel=0.2)
+    assert max(part.p for part in repeated(made)) < 1e-6
+
+
 def with_hum(answer, rng):
     """A hum of one frequency between two lines, at a phase of its own in each epoch."""
     own = answer.residual_nm.copy()
@@ -83,6 +95,17 @@ def test_a_hum_or_a_drift_does_not_come_again(with_it):
     assert (
         max(part.p for part in repeated([with_it(a, rng) for a in answers(rng, 4, own=1.0)])) < 1e-6
     )
+
+
+def test_the_share_is_that_where_it_can_be_seen():
+    rng = np.random.default_rng(6)
+    tremor = np.ones(grid().line.size)
+    tremor[80:95] = 1e4
+    made = [
+        one._replace(residual_nm=0.05 * one.response_nm + tremor * noise(rng, tremor.size))
+        for one in answers(rng, 4)
+    ]
+    assert [part.share for part in proportional(made)] == pytest.approx([0.05] * 3, rel=0.15)
 
 
 def test_a_sequence_that_begins_a_moment_later_is_the_same():
@@ -128,6 +151,25 @@ def test_a_joint_of_three_parameters_leaves_noise(simulated, voluntary_sd_nm, me
         assert {f.name for fit in fits for f in fit.findings} <= {"loop_bias"}
 
 
+@pytest.fixture(scope="module")
+def softened_epochs(simulated):
+    """Return epochs whose drive and delay the methods find once for all of them."""
+    settings, epochs = simulated(3, voluntary_sd_nm=0.1, seed=4)
+    return prepare([softened(epoch) for epoch in epochs], settings)
+
+
+@pytest.mark.parametrize("method", ["iv", "spectral", "bandlimited"])
+def test_what_is_not_the_joint_is_told_in_each_epoch_and_of_all(softened_epochs, method):
+    fits, pooled = found(softened_epochs, method)
+    for fit in (*fits, *pooled):
+        (finding,) = (f for f in fit.findings if f.name == "lack_of_fit")
+        assert finding.level == "doubt"
+        assert finding.value > finding.threshold
+        assert "is not J, B and K" in finding.text
+        assert "the lower half of the band gives J" in finding.text
+        assert "band_sensitivity" in fit.doubts
+
+
 @pytest.mark.parametrize("count", [1, 4])
 def test_stamps_of_real_time_change_nothing(simulated, count):
     settings, epochs = simulated(count, seed=4)
@@ -139,6 +181,17 @@ def test_stamps_of_real_time_change_nothing(simulated, count):
         values.append([f.value for f in found_in])
         assert len(values[-1]) == count
     assert values[1] == pytest.approx(values[0], rel=0.05)
+
+
+def test_an_epoch_that_does_not_count_is_neither_looked_at_nor_doubted(simulated):
+    settings, epochs = simulated(2, seed=4)
+    prepared = prepare([softened(epoch) for epoch in epochs], settings)
+    fits, _ = fit_epochs([p.epoch for p in prepared], "iv", settings)
+    out = replace(fits[0].outcome, kind="excluded", reason="by hand")
+    iv = method_named("iv")
+    first, second = checked_together(prepared, [replace(fits[0], outcome=out), fits[1]], [], iv)[0]
+    assert first.findings == ()
+    assert [f.name for f in second.findings] == ["lack_of_fit", "band_sensitivity"]
 
 
 def test_without_a_perturbation_there_is_nothing_to_test(simulated):

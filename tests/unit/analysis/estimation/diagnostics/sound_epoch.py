@@ -1,4 +1,6 @@
-"""An epoch that is sound, with its signals and fit."""
+"""An epoch that is sound and one of a subject who pushes, with their signals and fits."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,11 +28,17 @@ def judged(function):
     return found
 
 
-def perturbed():
+def perturbed(seed=0, noise_nm=0.005, voluntary_nm=0.0):
     """Return the joint of the paper in its loop, driven by random binary torque, as an epoch."""
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(seed)
     chips = np.repeat(rng.choice([-1.0, 1.0], N // 10), 10)
+    own = np.zeros(N)
+    if voluntary_nm:
+        band = signal.butter(2, [0.3, 4.0], "bandpass", fs=RATE_HZ, output="sos")
+        own = signal.sosfilt(band, rng.standard_normal(N + 2000))[2000:]
+        own *= voluntary_nm / np.std(own)
     J, B, K = 0.0458 + TRUTH[0], 1.604 + TRUTH[1], TRUTH[2]
+    drive = chips + own
     loop = signal.cont2discrete(
         (
             np.array([[0.0, 1.0], [-K / J, -B / J]]),
@@ -43,13 +51,13 @@ def perturbed():
     state, motion = np.zeros(2), np.empty((N, 2))
     for k in range(N):
         motion[k] = state
-        state = loop[0] @ state + loop[1][:, 0] * chips[k]
+        state = loop[0] @ state + loop[1][:, 0] * drive[k]
     x, v = motion.T
     # Between the edges of the chips the acceleration jumps; its mean over them is the fair one.
-    acceleration = (chips - B * v - K * x) / J
-    torque = JointDynamics(*TRUTH).torque_nm(x, v, acceleration)
+    acceleration = (drive - B * v - K * x) / J
+    torque = JointDynamics(*TRUTH).torque_nm(x, v, acceleration) - own
     channels = {
-        "torque_nm": torque + 0.005 * rng.standard_normal(N),
+        "torque_nm": torque + noise_nm * rng.standard_normal(N),
         "angle_rad": x,
         "velocity_rad_s": v + 1e-4 * rng.standard_normal(N),
         "perturbation_nm": chips,
@@ -67,6 +75,16 @@ def fitted(epoch):
 def sound():
     epoch = perturbed()
     return epoch, *fitted(epoch)
+
+
+@pytest.fixture(scope="module")
+def pushed():
+    epoch = perturbed(voluntary_nm=0.3)
+    return epoch, *fitted(epoch)
+
+
+def with_channel(epoch, name, values):
+    return replace(epoch, channels={**epoch.channels, name: Channel(name, T, values)})
 
 
 def passed(finding):

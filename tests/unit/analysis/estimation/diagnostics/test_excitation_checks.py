@@ -14,7 +14,10 @@ from tests.unit.analysis.estimation.diagnostics.sound_epoch import (
     assert_failed,
     judged,
     passed,
+    perturbed,
+    pushed,
     sound,
+    with_channel,
 )
 
 from rigidimeter.analysis.estimation import Signals
@@ -24,11 +27,13 @@ from rigidimeter.core.records import Channel
 from rigidimeter.core.settings import EstimationSettings
 from rigidimeter.model import JointDynamics
 
-__all__ = ["sound"]
+__all__ = ["pushed", "sound"]
 
 
 band_share = judged(excitation_checks.band_share)
+coherence = judged(excitation_checks.coherence)
 conditioning = judged(excitation_checks.conditioning)
+imposed_sinusoid = judged(excitation_checks.imposed_sinusoid)
 
 
 def narrow(low_hz, high_hz):
@@ -62,6 +67,24 @@ def test_a_joint_that_did_not_move_is_told(sound):
     assert math.isinf(finding.value)
 
 
+def test_coherence_is_the_share_that_follows(sound, pushed):
+    assert coherence(*sound[:2], SETTINGS).value > 0.9
+    assert coherence(*pushed[:2], SETTINGS).value < coherence(*sound[:2], SETTINGS).value
+    epoch, signals, _ = sound
+    other = perturbed(seed=5).channels["perturbation_nm"].values
+    finding = coherence(with_channel(epoch, "perturbation_nm", other), signals, SETTINGS)
+    assert_failed(finding, "follows the perturbation")
+    assert finding.value < 0.35
+
+
+def test_drift_below_the_band_is_told(sound):
+    epoch, signals, _ = sound
+    drifting = epoch.channels["torque_nm"].values + 3.0 * np.sin(2 * np.pi * 0.05 * T)
+    assert_failed(band_share(with_channel(epoch, "torque_nm", drifting), signals, SETTINGS),
+                  "the torque's power lies in the band")  # fmt: skip
+    assert passed(band_share(epoch, signals, SETTINGS))
+
+
 @pytest.mark.parametrize("duration_s", [8.0, 10.0, 12.0, 15.0, 20.0])
 @pytest.mark.parametrize("phase", [0.0, 1.0, 2.0])
 def test_the_slowest_line_of_a_perturbation_is_no_drift(sound, duration_s, phase):
@@ -74,3 +97,12 @@ def test_the_slowest_line_of_a_perturbation_is_no_drift(sound, duration_s, phase
     finding = band_share(epoch, signals, SETTINGS)
     assert passed(finding)
     assert finding.value > 70.0
+
+
+def test_an_imposed_sinusoid_is_no_prbs(sound):
+    epoch = sound[0]
+    x = 0.3 * np.sin(2 * np.pi * T)
+    sine = replace(epoch, channels={"torque_nm": Channel("torque_nm", T, x),
+                                    "angle_rad": Channel("angle_rad", T, x)})  # fmt: skip
+    assert_failed(imposed_sinusoid(sine, SETTINGS), "the motion is a sinusoid")
+    assert passed(imposed_sinusoid(epoch, SETTINGS))

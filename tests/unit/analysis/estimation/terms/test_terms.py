@@ -118,6 +118,20 @@ def test_a_bent_term_is_bent_before_it_is_filtered(exact):
     assert fit["cubic"].value == pytest.approx(900.0, rel=1e-6)
 
 
+@pytest.mark.parametrize("sign", ["+", "-"])
+def test_a_reflex_passes_late_and_rectified(sign):
+    """A velocity step of 2 rad/s: the pure path is the step itself, a delay later."""
+    velocity = np.where(np.arange(4000) >= 2000, 2.0, -2.0)
+    motion = wide(velocity, velocity, velocity, velocity)
+    stretch = stretch_velocity(motion, f"reflex{sign}")
+    (passed,) = pass_through(stretch, RATE_HZ, kernel("reflex"), np.array([0.3]))
+    late = round(0.3 * RATE_HZ)
+    np.testing.assert_allclose(passed[2000 + late + 50 : 3500], stretch[3000], atol=0.05)
+    np.testing.assert_allclose(passed[1000 : 2000 + late - 50], stretch[1000], atol=0.05)
+    assert stretch[3000] == (2.0 if sign == "+" else 0.0)
+    assert stretch[1000] == (0.0 if sign == "+" else -2.0)
+
+
 @pytest.mark.parametrize("name", ["reflex+", "reflex-second-order-"])
 def test_a_known_reflex_is_recovered(exact, name):
     rng = np.random.default_rng(5)
