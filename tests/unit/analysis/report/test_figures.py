@@ -164,6 +164,14 @@ def draw() -> Figure:
     return distribution("x (1)", {"OFF": [1.0, 2.0]}, {"OFF": "black"}, "p = 0.04")
 
 
+def test_svg_needs_nothing_from_elsewhere() -> None:
+    root = ET.fromstring(svg_text(draw()))
+    for element in root.iter():
+        for name, value in element.attrib.items():
+            if name.endswith("href"):
+                assert value.startswith("#")
+
+
 def test_the_users_matplotlib_style_is_neither_used_nor_changed() -> None:
     plain = svg_text(draw())
     with mpl.rc_context({"font.size": 30.0, "axes.facecolor": "black", "text.usetex": True}):
