@@ -173,3 +173,14 @@ def test_a_column_of_trials_that_is_not_used_is_named(tmp_path, rigidimeter):
     assert [one["epoch"] for one in json.loads(out.read_text())["epochs"]] == ["1", "2", "3"]
     once = _written(tmp_path / "once.csv", head, *columns, np.ones(TIME_S.size))
     assert "is not used" not in rigidimeter("estimate", once).err
+
+
+def test_a_step_back_that_is_too_large_to_be_squared_is_no_jitter(rigidimeter, tmp_path):
+    times = [f"{k / 100:.2f}" for k in range(400)]
+    times[200] = "-1e200"
+    path = tmp_path / "r.csv"
+    rows = "".join(f"{t},{k % 7},{k % 5}\n" for k, t in enumerate(times))
+    path.write_text("time_s,torque_nm,angle_rad\n" + rows)
+    ran = rigidimeter("inspect", path)
+    assert "Warning" not in ran.err
+    assert "0.0 %" in ran.out

@@ -114,3 +114,12 @@ def test_digests_are_of_what_was_read(tmp_path):
     assert provenance([path], recording.digests, recording.settings)[str(path)] == (
         f"SHA-256 {digest}"
     )
+
+
+def test_a_time_of_which_some_is_infinite_is_refused_in_one_sentence(tmp_path: Path) -> None:
+    time_s = np.arange(2000) / 100.0
+    time_s[[5, 6]] = np.inf
+    path = tmp_path / "r.npz"
+    np.savez(path, time_s=time_s, torque_nm=np.zeros(2000), angle_rad=np.ones(2000))
+    with pytest.raises(UserError, match="time_s"):
+        read(path)

@@ -71,7 +71,8 @@ def _facts(table: Table, name: str, time_s: NDArray[np.float64] | None) -> Colum
         if typical > 0:
             rate_hz = 1.0 / typical
             gaps = int(np.count_nonzero(steps > longest_s(typical)))
-            jitter = 100.0 * float(np.std(steps[steps < 1.9 * typical])) / typical
+            # A step back is no jitter, and may be too large to be squared.
+            jitter = 100.0 * float(np.std(steps[np.abs(steps) < 1.9 * typical] / typical))
     lowest, highest = (float(here.min()), float(here.max())) if here.size else (nothing, nothing)
     n_missing = int(values.size - here.size)
     return ColumnFacts(

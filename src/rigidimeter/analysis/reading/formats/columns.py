@@ -106,7 +106,7 @@ def time_stamps(
 
 def restarts(values: NDArray[np.float64]) -> NDArray[np.intp]:
     """Return the rows in which a time goes back."""
-    return np.flatnonzero(np.diff(values) < 0) + 1
+    return np.flatnonzero(values[1:] < values[:-1]) + 1
 
 
 def one_after_another(time_s: NDArray[np.float64]) -> NDArray[np.float64]:
