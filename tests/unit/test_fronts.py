@@ -1,6 +1,7 @@
 """A room is imported through its front: what stands in its `__init__`, or the module it is."""
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -48,6 +49,11 @@ def module_of(path: Path) -> str:
 
 
 def imports(path: Path) -> Iterator[tuple[int, str]]:
+    if path.suffix == ".md":
+        for number, line in enumerate(path.read_text("utf-8").splitlines(), start=1):
+            if found := re.match(r"\s*from (rigidimeter[.\w]*) import", line):
+                yield number, found[1]
+        return
     for node in ast.walk(ast.parse(path.read_text("utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.module and not node.level:
             yield node.lineno, node.module
@@ -64,8 +70,8 @@ def test_every_room_is_imported_through_its_front() -> None:
         )
 
     past = []
-    for folder in ("src", "tests", "benchmarks", "examples"):
-        for path in sorted((ROOT / folder).rglob("*.py")):
+    for folder in ("src", "tests", "benchmarks", "examples", "docs"):
+        for path in sorted([*(ROOT / folder).rglob("*.py"), *(ROOT / folder).rglob("*.md")]):
             own = front_of(module_of(path))
             for line, module in imports(path):
                 front = front_of(module)

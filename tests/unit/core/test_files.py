@@ -5,6 +5,8 @@ import hashlib
 import io
 import json
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -114,3 +116,17 @@ def test_a_file_that_changes_between_two_readings_is_refused(tmp_path):
         path.write_bytes(b"new")
         with pytest.raises(UserError, match="was changed while it was read"):
             read_bytes(path, 10)
+
+
+SCHEMAS = {
+    *("batch/1", "check/1", "commissioning/1", "comparison/2", "design/1", "estimates/1"),
+    *("export/1", "mapping/1", "model/1", "ratings/1", "session/1", "session/2"),
+    *("study-inputs/1", "study/1"),
+}
+
+
+def test_files_on_disk_are_named_as_they_were_wherever_their_modules_are() -> None:
+    """A module that moves must not take the name of a schema with it: older files have it."""
+    source = Path(__file__).parents[3] / "src" / "rigidimeter"
+    text = "".join(path.read_text("utf-8") for path in source.rglob("*.py"))
+    assert set(re.findall(r"[\"\']rigidimeter\.([\w.-]+/\d+)[\"\']", text)) == SCHEMAS

@@ -29,7 +29,7 @@ from rigidimeter.core.files import json_text, read_json, text_bytes, write_text
 from rigidimeter.core.settings import dump_settings, with_new_names
 from rigidimeter.core.version import __version__
 
-INPUTS_SCHEMA = "rigidimeter.analysis.study-inputs/1"
+INPUTS_SCHEMA = "rigidimeter.study-inputs/1"
 ANALYSIS = "analysis"
 UNCHANGED = "nothing has changed since the last analysis"
 INPUTS, COMPARISON = "inputs.json", "comparison.json"

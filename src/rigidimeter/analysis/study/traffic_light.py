@@ -65,8 +65,8 @@ def traffic_light(result: StudyResult) -> TrafficLight | None:
         (fit.source, fit.epoch) for fit in analysis.fits if fit.outcome.included and fit.doubts
     }
     found = [one for one in doubts(analysis) if not _harmless(one, result)]
-    gravest = found[0] if found else None
-    finding = None if gravest is None else _first(gravest.check, result)
+    most_serious = found[0] if found else None
+    finding = None if most_serious is None else _first(most_serious.check, result)
     concluded = conclude(result)
     unsupported = () if concluded is None else concluded.of("not supported")
     text = finding.text if finding else unsupported[0].reason if unsupported else ""
@@ -77,7 +77,7 @@ def traffic_light(result: StudyResult) -> TrafficLight | None:
     if impossible:
         text = "J is not greater than zero in some epochs, which is impossible"
     share = len(counting - doubted) / len(recorded)
-    together = gravest is not None and not gravest.epochs
+    together = most_serious is not None and not most_serious.epochs
     level: Level = "good"
     if share < POOR_SHARE or impossible:
         level = "poor"
@@ -89,8 +89,8 @@ def traffic_light(result: StudyResult) -> TrafficLight | None:
         len(counting - doubted),
         len(recorded - counting),
         len(doubted),
-        "" if gravest is None or impossible else gravest.check,
-        0 if gravest is None else gravest.epochs,
+        "" if most_serious is None or impossible else most_serious.check,
+        0 if most_serious is None else most_serious.epochs,
         text,
         finding.remedy if finding else "",
     )

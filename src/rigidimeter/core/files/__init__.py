@@ -17,6 +17,7 @@ from rigidimeter.core.files.label_table import (
     first_line_names,
     read_text_table,
     refuse_duplicates,
+    wrong_count,
 )
 from rigidimeter.core.files.reading import (
     noted_digests,

@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import itertools
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,8 @@ from rigidimeter.core.files.size_limits import MAX_COLUMNS, TABLE_BYTES, TABLE_C
 from rigidimeter.core.files.text_lines import content, is_missing, read_utf8
 
 _EXAMPLE = "condition,examiner,score"
+_THOUSANDS = re.compile(r"(?<![\d.])\d{1,3}(?:,\d{3})+\.\d")
+"""What looks like a number with commas between thousands and a decimal point."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +113,8 @@ def read_text_table(path: Path, *, may_be_empty: bool = False) -> TextTable:
     lines: list[int] = []
     for cells, line in _rows(source, body.decode("utf-8"), delimiter):
         if len(cells) != len(names):
-            raise wrong_count(source, int(numbers[1 + line]), len(cells), len(names), delimiter)
+            where, row = f"{source}, line {numbers[1 + line]}", ",".join(cells)
+            raise wrong_count(where, row, len(cells), len(names), delimiter)
         if any(cells):
             rows.append(cells)
             lines.append(int(numbers[1 + line]))
@@ -199,12 +203,16 @@ def cells_of(line: str, delimiter: str) -> list[str]:
         return line.split(delimiter)
 
 
-def wrong_count(source: str, line: int, count: int, n_names: int, delimiter: str) -> UserError:
-    """Return the refusal of a row that has another number of cells than the first line names."""
+def wrong_count(
+    where: str, row: str, count: int, n_names: int, delimiter: str, namer: str = "first line"
+) -> UserError:
+    """Return the refusal of a row that has another number of cells than there are names."""
     hint = ""
     if delimiter == "," and count > n_names:
         hint = "; where numbers have a decimal comma, separate the columns by semicolons"
+        if _THOUSANDS.search(row):
+            hint = "; write numbers without a comma between thousands, or in quotes"
     return UserError(
-        f"{source}, line {line} has {count} value{'' if count == 1 else 's'}, but the first line "
-        f"names {n_names} columns{hint}"
+        f"{where} has {count} value{'' if count == 1 else 's'}, but the {namer} names {n_names} "
+        f"columns{hint}"
     )

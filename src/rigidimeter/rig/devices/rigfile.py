@@ -227,7 +227,7 @@ def _driver(path: Path, role: str, name: str) -> Any:
     if not (isinstance(settings, type) and issubclass(settings, BaseModel)):
         raise UserError(
             f"{path}, [{role}]: {name!r} is no driver: its Settings must be a class derived from "
-            "rigidimeter.core.settings.section.Section"
+            "rigidimeter.core.settings.Section"
         )
     lacking = [method for method in METHODS[role] if not hasattr(driver, method)]
     if lacking:

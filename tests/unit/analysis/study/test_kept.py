@@ -12,7 +12,7 @@ import rigidimeter.analysis.study.archive
 from rigidimeter.analysis.study import UNCHANGED, analyse_study, keep, read_study
 
 RESAMPLES = 100
-_DAMAGED = """{"schema": "rigidimeter.analysis.study-inputs/1", "settings": [2], "files": {},
+_DAMAGED = """{"schema": "rigidimeter.study-inputs/1", "settings": [2], "files": {},
  "results": {"..": "x", "": "y"}}"""
 
 
@@ -63,7 +63,7 @@ def test_another_place_gives_the_same_bytes(study: Path, tmp_path: Path) -> None
 
 def test_inputs_hold_a_digest_of_every_file(study: Path) -> None:
     inputs = json.loads((study / "analysis/inputs.json").read_text())
-    assert inputs["schema"] == "rigidimeter.analysis.study-inputs/1"
+    assert inputs["schema"] == "rigidimeter.study-inputs/1"
     sessions = [p for p in (study / "sessions").rglob("*") if p.is_file()]
     names = {str(p.relative_to(study)) for p in sessions}
     assert set(inputs["files"]) == names | {"study.toml", "sessions.csv", "ratings.csv"}

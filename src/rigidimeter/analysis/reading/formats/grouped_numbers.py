@@ -15,8 +15,6 @@ GROUPED = re.compile(
     rf"{_LEAD}(?:(?:,\d{{3}})+(?:\.\d*)?|(?:\.\d{{3}})+(?:,\d*)?|(?:{_BLANKS}\d{{3}})+(?:[.,]\d*)?)"
 )
 """A number that may have marks between thousands."""
-THOUSANDS = re.compile(rb"(?<![\d.])\d{1,3}(?:,\d{3})+\.\d")
-"""What looks like a number with commas between thousands and a decimal point."""
 
 
 def ungrouped(body: bytes, delimiter: str) -> bytes:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rigidimeter.analysis.reading.channels.headers import read_header
 from rigidimeter.analysis.reading.channels.lever_arm import states_lever_arm
 from rigidimeter.analysis.reading.formats.clocked_table import table_of_pairs
-from rigidimeter.analysis.reading.formats.grouped_numbers import THOUSANDS, ungrouped
+from rigidimeter.analysis.reading.formats.grouped_numbers import ungrouped
 from rigidimeter.analysis.reading.formats.spike2_text import FIRST as SPIKE2
 from rigidimeter.analysis.reading.formats.spike2_text import spike2_table
 from rigidimeter.analysis.reading.formats.table import CALIBRATION, Table
@@ -45,6 +45,7 @@ from rigidimeter.core.files import (
     read_utf8,
     records,
     trimmed,
+    wrong_count,
 )
 
 _DECIMAL_COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")
@@ -195,17 +196,11 @@ def _open(source: str, whole: bytes, example: str, layout: Layout) -> _Text:
     rest = lines[head.n_before :]
     wrong = np.flatnonzero(counts != len(head.names))
     if wrong.size:
-        count, line = int(counts[wrong[0]]), int(rest[starts[wrong[0]]])
-        hint = ""
-        if delimiter == "," and count > len(head.names):
-            hint = "; where numbers have a decimal comma, separate the columns by semicolons"
-            if THOUSANDS.search(body.split(b"\n", starts[wrong[0]] + 1)[starts[wrong[0]]]):
-                hint = "; write numbers without a comma between thousands, or in quotes"
-        named = "first line names" if head.n_before == 1 else "head of the file names"
-        raise UserError(
-            f"{source}, line {line} has {count} value{'' if count == 1 else 's'}, but the {named} "
-            f"{len(head.names)} columns{hint}"
-        )
+        start = starts[wrong[0]]
+        row = body.split(b"\n", start + 1)[start].decode("utf-8")
+        where = f"{source}, line {rest[start]}"
+        namer = "first line" if head.n_before == 1 else "head of the file"
+        raise wrong_count(where, row, int(counts[wrong[0]]), len(head.names), delimiter, namer)
     return _Text(source, delimiter, head, int(lines[0]), body, rest[starts])
 
 

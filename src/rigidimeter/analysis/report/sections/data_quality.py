@@ -90,7 +90,7 @@ def _of_fits(result: StudyResult) -> list[tuple[Fit, Finding]]:
 
 
 def _kinds(result: StudyResult, found: list[tuple[Fit, Finding]]) -> Iterator[dict[str, Any]]:
-    """Yield each kind of finding: the gravest first, then the most frequent."""
+    """Yield each kind of finding: the most serious first, then the most frequent."""
     kinds: dict[tuple[str, str], list[tuple[Fit, Finding]]] = {}
     for fit, finding in found:
         kinds.setdefault((finding.level, finding.name), []).append((fit, finding))
