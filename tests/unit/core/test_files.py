@@ -22,6 +22,7 @@ from rigidimeter.core.files import (
     parse_toml,
     read_bytes,
     read_json,
+    read_text_table,
     read_toml,
     replace_file,
     toml_text,
@@ -130,3 +131,10 @@ def test_files_on_disk_are_named_as_they_were_wherever_their_modules_are() -> No
     source = Path(__file__).parents[3] / "src" / "rigidimeter"
     text = "".join(path.read_text("utf-8") for path in source.rglob("*.py"))
     assert set(re.findall(r"[\"\']rigidimeter\.([\w.-]+/\d+)[\"\']", text)) == SCHEMAS
+
+
+def test_a_row_with_commas_between_thousands_is_told_what_to_write(tmp_path: Path) -> None:
+    path = tmp_path / "ratings.csv"
+    path.write_text("subject,score\nA,1,234.5\n")
+    with pytest.raises(UserError, match=r"line 2 has 3 values.* without a comma between thousands"):
+        read_text_table(path)
