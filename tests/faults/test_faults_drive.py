@@ -290,9 +290,21 @@ def test_fault_15_not_as_commanded(rig, case, tmp_path, measured):
 
 
 def test_a_port_that_vanishes_as_the_session_ends_leaves_the_power_unconfirmed(tmp_path):
-    """In its last tick, when all epochs are done: nobody may believe that the drive is off."""
+    """When all epochs are done: nobody may believe that the drive is off."""
     with bench(ASCII) as made:
-        trial = run(made, tmp_path / "s", made.drive_emulator.close, at_s=1.5 - 1 / made.rate_hz)
+
+        def sink(writer):
+            note = writer.event
+
+            def event(kind, **details):
+                note(kind, **details)
+                if kind == "epoch_ended":
+                    made.drive_emulator.close()
+
+            writer.event = event
+            return writer
+
+        trial = run(made, tmp_path / "s", sink=sink)
         assert [event["outcome"] for event in trial.of("epoch_ended")] == ["success"]
         assert trial.result.outcome == "fail"
         assert "the drive has not said so: keep hands off the joint" in trial.result.reason
