@@ -107,7 +107,7 @@ The second form measures the rows again whose names hold one of the words.
 
 Three numbers in a cell are J, B and K. Bias and scatter (SD) of the single epochs are in % of the
 truth: the intrinsic J, B and K that were simulated, their mean where they changed. Coverage is the
-share of 95 % intervals that hold it. A doubt is a finding of level doubt or exclude. `blind` is
+share of 95 % intervals that hold it. A doubt is a finding of level caution or exclude. `blind` is
 `bandlimited` on a file of torque and motion alone, without perturbation and command.
 
 The rule: an answer is wrong if the mean error of J, B or K exceeds 10 % or an interval covers less

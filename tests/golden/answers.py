@@ -27,16 +27,16 @@ LABELS = (
 )
 """What an item of a list is called by, as far as it has them."""
 
+FINDING = ("level", "value")
+"""What of a finding is an answer."""
+
 NOT_KEPT = re.compile(r"\w+_(bound|change|change_se)")
 SKIPPED = ("provenance", "settings", "band_hz", "rows", "sessions", "corners", "optimised")
 """Parts that repeat the input, or what stands elsewhere."""
 
 
 def rows_of(document: Mapping[str, Any], left_out: Sequence[str] = ()) -> dict[str, Row]:
-    """Return the answers of a document by where they stand in it.
-
-    Of the findings those count that failed: a check that passed is no answer.
-    """
+    """Return the answers of a document by where they stand in it."""
     found: dict[str, Row] = {}
     for what, row in _walk("", document, (*SKIPPED, *left_out)):
         found[what if what not in found else f"{what} again"] = row
@@ -53,7 +53,9 @@ def _walk(path: str, value: Any, skipped: Sequence[str]) -> Iterator[tuple[str, 
                 yield from _walk(f"{path}/{key}" if path else key, one, skipped)
     elif isinstance(value, list):
         for number, one in enumerate(value):
-            if isinstance(one, Mapping) and one.get("remedy") != "":
+            if isinstance(one, Mapping) and "headline" in one:
+                yield f"{path} {one['name']}", {k: one[k] for k in FINDING if one[k] is not None}
+            elif isinstance(one, Mapping):
                 yield from _walk(f"{path} {_label(one) or number}", one, skipped)
 
 

@@ -184,22 +184,14 @@ def _pooled(result: StudyResult) -> list[Block]:
 
 
 def _findings(analysis: Analysis) -> list[Block]:
-    """Return each kind of finding once: in which epochs, the first in full, and what to do."""
-    lines: list[Block] = []
-    for first, found_in in analysis.findings:
-        fits = [fit for fit in found_in if fit.epoch != "pooled"]
-        where = "all epochs together"
-        if fits:
-            count = "1 epoch" if len(fits) == 1 else f"{len(fits)} epochs"
-            where = f"{count} of {len(analysis.fits)}, first epoch {fits[0].epoch}"
-        lines.append(
-            f"  {first.level}, {first.name}: {where}: {first.text}. Remedy: {first.remedy}."
-        )
-    return [Heading("What the checks found (the JSON file has all of it)"), *lines] if lines else []
+    """Return each kind of finding once, in one line with its epochs."""
+    lines: list[Block] = [f"  {group.line}" for group in analysis.findings]
+    heading = "What the checks found (rigidimeter explain NAME explains one)"
+    return [Heading(heading), *lines] if lines else []
 
 
 def _fit_table(fits: Sequence[Fit], checked: Sequence[Fit], first: int = 0) -> Table:
-    """Return a table with a row for each fit, and what casts doubt on its epoch.
+    """Return a table with a row for each fit, and which findings of its epoch ask for caution.
 
     `first` is the first of J, B and K that is shown.
     """
@@ -225,10 +217,10 @@ def _fit_table(fits: Sequence[Fit], checked: Sequence[Fit], first: int = 0) -> T
         )
         for fit in fits
     ]
-    doubts = [f"doubt: {', '.join(fit.doubts)}" if fit.doubts else "" for fit in checked]
+    cautions = [f"caution: {', '.join(fit.cautions)}" if fit.cautions else "" for fit in checked]
     return Table(
         ("epoch", "condition", *headings, "R²", "VAF\n%"),
-        _by_source(fits, rows, doubts),
+        _by_source(fits, rows, cautions),
         "<<" + ">" * (len(shown) + 2),
     )
 
@@ -259,16 +251,16 @@ def _scores(scores: Sequence[Score], wanted: ScoreSettings) -> list[Block]:
 
 
 def _by_source(
-    results: Sequence[Fit | Score], rows: Sequence[tuple[str, ...]], doubts: Sequence[str]
+    results: Sequence[Fit | Score], rows: Sequence[tuple[str, ...]], cautions: Sequence[str]
 ) -> list[Sequence[str] | str]:
     """Return rows below the name of their source, and below a row what is wrong with it."""
     shown: list[Sequence[str] | str] = []
     for source, of_source in groupby(
-        zip(results, rows, doubts, strict=True), key=lambda each: each[0].source
+        zip(results, rows, cautions, strict=True), key=lambda each: each[0].source
     ):
         shown.append(source)
-        for result, row, doubt in of_source:
+        for result, row, caution in of_source:
             outcome = result.outcome
-            remark = doubt if outcome.included else f"{outcome.kind}: {outcome.reason}"
+            remark = caution if outcome.included else f"{outcome.kind}: {outcome.reason}"
             shown += [row, f"    {remark}"] if remark else [row]
     return shown

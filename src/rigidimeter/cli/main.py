@@ -26,6 +26,7 @@ from rigidimeter.cli.console import console
 from rigidimeter.cli.design import design
 from rigidimeter.cli.emulate import emulate
 from rigidimeter.cli.estimate import estimate
+from rigidimeter.cli.explain import explain
 from rigidimeter.cli.export import export
 from rigidimeter.cli.inspect import inspect
 from rigidimeter.cli.model import model
@@ -105,6 +106,7 @@ for command in (
     estimate,
     batch,
     inspect,
+    explain,
     model,
     compare,
     ratings,

@@ -106,10 +106,7 @@ def _blocks(found: ModelledEpoch) -> list[Block]:
     heading: list[Block] = [Heading(f"{found.epoch.name}, {low:.4g} to {high:.4g} Hz")]
     if found.clock:
         heading.append(f"  {found.clock}")
-    findings = [
-        f"  {finding.level}: {finding.text}. Remedy: {finding.remedy}."
-        for finding in found.models.findings
-    ]
+    findings = [f"  {one.level}  {one.name}  {one.headline}" for one in found.models.findings]
     if not found.compared:
         fits = (block for row in compared.rows for block in _fit_blocks(row))
         return [*heading, *fits, *findings]

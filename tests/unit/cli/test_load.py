@@ -14,6 +14,7 @@ import pytest
 from rigidimeter.analysis.estimation import METHODS
 from rigidimeter.analysis.estimation.diagnostics import CHECKS
 from rigidimeter.analysis.estimation.terms import TERMS
+from rigidimeter.core.findings import KINDS
 
 ROOT = Path(__file__).parents[3]
 HOW_TO = ROOT / "docs" / "how-to" / "add-an-estimator.md"
@@ -25,10 +26,13 @@ ESTIMATOR, CHECK, HARMLESS, TERM = EXAMPLES
 def _forget() -> Iterator[None]:
     """Take out of the lists what a test has loaded."""
     lists: tuple[list[Any], ...] = (METHODS, CHECKS, TERMS)
+    kinds = dict(KINDS)
     known = [each[:] for each in lists]
     yield
     for each, before in zip(lists, known, strict=True):
         each[:] = before
+    KINDS.clear()
+    KINDS.update(kinds)
 
 
 @pytest.fixture
@@ -87,19 +91,20 @@ def test_a_check_is_one_entry(rigidimeter, recording, tmp_path):
     assert ran.status == 0, ran.err
     (epoch,) = json.loads((tmp_path / "e.json").read_text())["epochs"]
     (found,) = (found for found in epoch["findings"] if found["name"] == "near_range")
-    assert found["level"] == "doubt"
-    assert found["text"].endswith("the sensor may have been at the end of its range")
-    assert "Remedy: use a smaller perturbation" in " ".join(ran.out.split())
+    assert (found["level"], found["unit"]) == ("caution", "N·m")
+    assert found["headline"] == f"The torque reaches {found['value']:.3g} N·m"
+    assert f"caution near_range {found['headline']}" in " ".join(ran.out.split())
+    ran = rigidimeter("--load", tmp_path / "near_range.py", "explain", "near_range")
+    assert "The torque reaches 9.7 N·m." in ran.out
+    assert "Use a smaller perturbation." in ran.out
 
 
-@pytest.mark.parametrize(("where", "level"), [("if case", "doubt"), ("if not case", "note")])
+@pytest.mark.parametrize(("where", "level"), [("if case", "caution"), ("if not case", "note")])
 def test_a_check_may_say_where_its_failure_is_harmless(
     rigidimeter, recording, tmp_path, where, level
 ):
     """The recording has no perturbation, so that only the second of the two says a reason."""
-    check = CHECK.replace("9.0", "0.001").replace(
-        "meaning=", "harmless=harmless,\n        meaning="
-    )
+    check = CHECK.replace("9.0", "0.001").replace("near_range))", "near_range, harmless=harmless))")
     (tmp_path / "near_range.py").write_text(HARMLESS.replace("if case", where) + check)
     out = tmp_path / "e.json"
     ran = rigidimeter("--load", tmp_path / "near_range.py", "estimate", recording, "--json", out)

@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 from rigidimeter.analysis.reading import write_estimates_csv
+from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import (
     PARAMETER_VECTORS,
     PARAMETERS,
     Analysis,
     Channel,
-    Finding,
     Fit,
     Outcome,
     Score,
+    grouped,
 )
 
 FIT = Fit(
@@ -50,7 +51,9 @@ def test_fits_are_equal_when_every_number_is():
 
 def analysis(**changes):
     left_out = replace(FIT, epoch="2", outcome=Outcome("excluded", "R² < 0 & worse"))
-    found = Finding("frozen", "exclude", 2.0, 1.0, "angle <hung>", "check the cable")
+    found = Finding(
+        "frozen", "exclude", 2.0, 1.0, facts={"channel": "angle <hung>", "start_s": 3.0}
+    )
     fits = (replace(FIT, findings=(found,)), replace(left_out, findings=(found,)))
     return Analysis(
         **{
@@ -76,9 +79,20 @@ def test_the_table_has_the_columns_of_the_csv(tmp_path):
 
 
 def test_findings_of_one_check_are_told_once():
-    ((first, fits),) = analysis().findings
-    assert first.name == "frozen"
+    ((found, fits, where),) = analysis().findings
+    assert found.name == "frozen"
     assert [fit.epoch for fit in fits] == ["1", "2"]
+    assert where == "all 2 epochs"
+
+
+def test_a_group_names_its_epochs_and_the_one_that_shows_it_most():
+    fits = [
+        replace(FIT, epoch=str(i), findings=(Finding("gravity", "note", v, 1.0),) if v else ())
+        for i, v in enumerate((2.0, 2.0, 9.0, 0.0, 2.0), 1)
+    ]
+    (group,) = grouped(fits, ())
+    assert (group.finding.value, group.where) == (9.0, "epochs 1–3, 5, most in epoch 3")
+    assert group.line == f"note  gravity  {group.finding.headline}; {group.where}"
 
 
 def test_a_notebook_shows_estimates_with_intervals_and_what_was_found():
@@ -86,7 +100,7 @@ def test_a_notebook_shows_estimates_with_intervals_and_what_was_found():
     assert "K (N·m/rad)" in page
     assert "3 [2.4, 3.6]" in page
     assert "all epochs" in page
-    assert "check the cable" in page
+    assert "Check the sensor&#x27;s cable" in page
     assert "angle &lt;hung&gt;" in page
     assert "R² &lt; 0 &amp; worse" in page
     assert "<hung>" not in page

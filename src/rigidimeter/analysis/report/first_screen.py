@@ -289,5 +289,5 @@ def advice(result: StudyResult, light: TrafficLight | None) -> list[str]:
         found.append(f"Record several epochs: one gives no interval of {series(unknown)}.")
     if light is not None and light.remedy:
         name = light.doubt.replace("_", " ")
-        found.append(f"Because of {name}: {light.remedy}.")
+        found.append(f"Because of {name}: {light.remedy}")
     return found

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from rigidimeter.analysis.study.compared import Comparison
-from rigidimeter.core.records import Analysis, Finding, Fit
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import Analysis, Fit
 
 OF_SUBJECT = ("tremor", "voluntary_torque", "active_movement", "emg_activity", "loop_bias")
 """Checks of the subject's own torque."""
@@ -47,8 +48,8 @@ class Doubt:
 def doubts(analysis: Analysis) -> tuple[Doubt, ...]:
     """Return which checks cast doubt on epochs that count, those of most epochs first."""
     counting = [fit for fit in analysis.fits if fit.outcome.included]
-    of_epochs = Counter(name for fit in counting for name in fit.doubts)
-    of_pool = {name for fit in analysis.pooled for name in fit.doubts}
+    of_epochs = Counter(name for fit in counting for name in fit.cautions)
+    of_pool = {name for fit in analysis.pooled for name in fit.cautions}
     names = [name for name, _ in of_epochs.most_common()]
     names += sorted(of_pool - of_epochs.keys())
     return tuple(Doubt(name, of_epochs[name], len(counting)) for name in names)
@@ -108,5 +109,5 @@ def in_words(check: str) -> str:
 
 def _counts(finding: Finding, *, of_score: bool) -> bool:
     if of_score:
-        return finding.name in OF_SUBJECT and bool(finding.remedy)
+        return finding.name in OF_SUBJECT
     return finding.level != "note" and finding.name not in ALIKE_IN_BOTH

@@ -24,7 +24,8 @@ from rigidimeter.analysis.study.ratings_found import RatingsFound
 from rigidimeter.analysis.study.ratings_model import rated_one_condition, without_examiners
 from rigidimeter.analysis.study.results import StudyResult
 from rigidimeter.analysis.study.tested import LEVEL, Basis, Test, by_days, tested_again
-from rigidimeter.core.records import Finding, Fit
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import Fit
 
 SHARE_OF_INERTIA = 0.5
 """Of a measure's relative difference: if that of the inertia is larger, the joint or the contact

@@ -180,14 +180,14 @@ def _estimates(result: StudyResult) -> Iterator[dict[str, Any]]:
         low_hz, high_hz = one.pop("band_hz") or (None, None)
         findings = one.pop("findings")
         found = [finding["name"] for finding in findings]
-        doubts = dict.fromkeys(f["name"] for f in findings if f["level"] != "note")
+        cautions = dict.fromkeys(f["name"] for f in findings if f["level"] != "note")
         beside = {name: two[name] for name in ("outcome", "reason", *_numbers(two))}
         yield (
             whose.get(one["source"], {})
             | one
             | {"band_low_hz": low_hz, "band_high_hz": high_hz}
             | {"n_findings": len(found), "findings": ", ".join(found)}
-            | {"doubts": ", ".join(doubts)}
+            | {"cautions": ", ".join(cautions)}
             | {f"fixed_inertia_{name}": value for name, value in beside.items()}
         )
 

@@ -20,7 +20,7 @@ def analysis_warnings(analysis: Analysis) -> tuple[Notice, ...]:
 
 def _misfit(analysis: Analysis) -> tuple[Notice, ...]:
     return tuple(
-        Notice("warning", f"{fit.condition or 'all epochs'}: {finding.text}; {finding.remedy}")
+        Notice("warning", f"{fit.condition or 'all epochs'}: {finding.headline}. {finding.remedy}")
         for fit in analysis.pooled
         for finding in fit.findings
         if finding.level != "note"

@@ -6,14 +6,15 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rigidimeter.core.findings import SERIOUS_FIRST, Finding, epochs_text
 from rigidimeter.core.records.estimates import (
     FIT_NUMBERS,
     PARAMETERS,
     BandEstimate,
     Delay,
-    Finding,
     Fit,
     Score,
 )
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 _MAX_SHOWN = 20
 """Epochs shown one by one; of more only the first are."""
 
+MOST_SOURCES = 3
+"""The epochs of a finding are named where they are of at most so many recordings."""
+
 
 WEIGHT_IN_STIFFNESS = (
     "K is the slope of all torque against the angle. Unless the axis is vertical it includes that "
@@ -32,10 +36,82 @@ WEIGHT_IN_STIFFNESS = (
 
 
 class FindingGroup(NamedTuple):
-    """What one check found, in one or more epochs: the first finding, and the fits of all."""
+    """What one check found, with one level, in one or more epochs.
 
-    first: Finding
+    Attributes
+    ----------
+    finding : Finding
+        The one that is furthest from its limit.
+    fits : tuple of Fit
+        All that carry it, in the order of reading: of epochs, and to all epochs together.
+    where : str
+        The epochs in words.
+    """
+
+    finding: Finding
     fits: tuple[Fit, ...]
+    where: str
+
+    @property
+    def line(self) -> str:
+        """Level, name, headline and epochs in one line."""
+        one = self.finding
+        return f"{one.level}  {one.name}  {one.headline}; {self.where}"
+
+
+def grouped(fits: Sequence[Fit], pooled: Sequence[Fit]) -> tuple[FindingGroup, ...]:
+    """Return what fits carry, once for each check and level, the most serious first.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+        Of epochs.
+    pooled : sequence of Fit
+        To all epochs of a condition, and of all of them.
+    """
+    carried: dict[tuple[str, str], list[tuple[Fit, Finding]]] = {}
+    for fit in (*fits, *pooled):
+        for finding in fit.findings:
+            carried.setdefault((finding.name, finding.level), []).append((fit, finding))
+    groups = []
+    for members in carried.values():
+        _, worst = max(members, key=lambda each: _beyond(each[1]))
+        where = _where(members, worst, fits)
+        groups.append(FindingGroup(worst, tuple(fit for fit, _ in members), where))
+    return tuple(sorted(groups, key=lambda group: SERIOUS_FIRST.index(group.finding.level)))
+
+
+def _beyond(finding: Finding) -> float:
+    beyond = abs(finding.value - finding.limit)
+    return beyond if math.isfinite(beyond) else -1.0
+
+
+def _where(members: Sequence[tuple[Fit, Finding]], worst: Finding, fits: Sequence[Fit]) -> str:
+    """Return which epochs show it, and which one most where they differ."""
+    own = [(fit, finding) for fit, finding in members if fit.epoch != "pooled"]
+    if not own:
+        conditions = dict.fromkeys(fit.condition for fit, _ in members if fit.condition)
+        return "all epochs together" + (f" in {' and '.join(conditions)}" if conditions else "")
+    sources = list(dict.fromkeys(fit.source for fit in fits))
+
+    def of(found: Iterable[Fit]) -> str:
+        by_source: dict[str, list[str]] = {}
+        for fit in found:
+            by_source.setdefault(fit.source, []).append(fit.epoch)
+        return "; ".join(
+            epochs_text(labels) + (f" of {PurePath(source).name}" if len(sources) > 1 else "")
+            for source, labels in by_source.items()
+        )
+
+    where = of(fit for fit, _ in own)
+    if len(own) == len(fits) > 1:
+        where = f"all {len(fits)} epochs"
+    elif len({fit.source for fit, _ in own}) > MOST_SOURCES:
+        where = f"{len(own)} of {len(fits)} epochs"
+    if len({finding.headline for _, finding in own}) > 1:
+        most = [fit for fit, finding in own if finding == worst]
+        where += f", most in {of(most[:1])}" if most else ""
+    return where
 
 
 @dataclass(frozen=True)
@@ -62,20 +138,15 @@ class Analysis:
 
     @property
     def findings(self) -> tuple[FindingGroup, ...]:
-        """What the checks found: for each check and level the epochs, in the order of reading."""
-        groups: dict[tuple[str, str], tuple[Finding, list[Fit]]] = {}
-        for fit in (*self.fits, *self.pooled):
-            for finding in fit.findings:
-                _, fits = groups.setdefault((finding.name, finding.level), (finding, []))
-                fits.append(fit)
-        return tuple(FindingGroup(first, tuple(fits)) for first, fits in groups.values())
+        """What the checks found: for each check and level the epochs, the most serious first."""
+        return grouped(self.fits, self.pooled)
 
     @property
     def weight_in_stiffness(self) -> str:
         """What K holds of the limb's weight, as a sentence without its stop; empty without fits."""
         if not self.fits:
             return ""
-        if any(group.first.name == "gravity" for group in self.findings):
+        if any(group.finding.name == "gravity" for group in self.findings):
             return f"{WEIGHT_IN_STIFFNESS}; the note `gravity` of each epoch gives K without it"
         return f"{WEIGHT_IN_STIFFNESS}; set diagnostics.gravity_nm to have K without it too"
 
@@ -116,21 +187,18 @@ class Analysis:
             heading = ["epoch", "condition"]
             heading += [f"{p.symbol} ({p.unit}) [95\xa0% interval]" for p in PARAMETERS]
             shown = [*self.fits[:_MAX_SHOWN], *self.pooled]
-            heading += ["R²", "outcome", "doubted by"]
+            heading += ["R²", "outcome", "caution"]
             parts.append(_table(heading, [_fit_row(fit) for fit in shown]))
         if len(self.fits) > _MAX_SHOWN:
             parts.append(f"<p>The first {_MAX_SHOWN} of {len(self.fits)} epochs.</p>")
         if self.findings:
-            rows = []
-            for first, fits in self.findings:
-                where = "all together"
-                if fits[0].epoch != "pooled":
-                    where = f"{fits[0].source}, {fits[0].epoch}"
-                if len(fits) > 1:
-                    where = f"{len(fits)}, first {where}"
-                rows.append([first.level, where, first.text, first.remedy])
+            rows = [
+                [one.level, one.name, one.headline, where, one.details, one.remedy]
+                for one, _, where in self.findings
+            ]
+            heading = ["level", "finding", "", "epochs", "details", "remedy"]
             parts.append("<p>What the checks found:</p>")
-            parts.append(_table(["level", "epochs", "finding in the first", "remedy"], rows))
+            parts.append(_table(heading, rows))
         if self.scores:
             rows = [
                 [
@@ -148,7 +216,7 @@ class Analysis:
 
 
 def _in_a_cell(finding: Finding) -> str:
-    return f"{finding.level}, {finding.name}: {finding.text}"
+    return f"{finding.level}, {finding.name}: {finding.headline}"
 
 
 def _fit_row(fit: Fit) -> list[str]:
@@ -158,8 +226,8 @@ def _fit_row(fit: Fit) -> list[str]:
     ]
     name = "all epochs" if fit.epoch == "pooled" else f"{fit.source}, {fit.epoch}"
     outcome = f"{fit.outcome.kind} {fit.outcome.reason}"
-    doubts = ", ".join(fit.doubts)
-    return [name, fit.condition, *intervals, _number(fit.r_squared), outcome, doubts]
+    cautions = ", ".join(fit.cautions)
+    return [name, fit.condition, *intervals, _number(fit.r_squared), outcome, cautions]
 
 
 def _number(value: float) -> str:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.core.findings import Finding, Three
 from rigidimeter.core.records.epochs import Outcome, readonly
 
 
@@ -43,37 +44,8 @@ FIT_NUMBERS = (
 SCORE_NUMBERS = ("impulse_nm_s", "work_j", "frequency_hz", "n_cycles")
 """The numbers of a score, as files and tables name them."""
 
-Three = tuple[float, float, float]
-
 BAND_VECTORS = {"value": "", "change": "_change", "change_se": "_change_se", "p": "_p"}
 """What is known of each parameter, and how the names of it end in files and tables."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What one check found in an epoch.
-
-    Parameters
-    ----------
-    name : str
-        The check, as the settings name it.
-    level : {"note", "doubt", "exclude"}
-        `note` says what is; `doubt` asks for a look before the numbers are used; `exclude` says
-        that they mean nothing.
-    value, threshold : float
-        What was found and where it would change sides, in the unit that the text states.
-    text : str
-        Value, threshold and meaning in words.
-    remedy : str
-        What to do about it; empty where nothing is wrong.
-    """
-
-    name: str
-    level: Literal["note", "doubt", "exclude"]
-    value: float
-    threshold: float
-    text: str
-    remedy: str
 
 
 class _Entry:
@@ -189,8 +161,8 @@ class Fit:
         return tuple(parameter.name for parameter in PARAMETERS)
 
     @property
-    def doubts(self) -> tuple[str, ...]:
-        """The names of the checks that cast doubt on it, or exclude it."""
+    def cautions(self) -> tuple[str, ...]:
+        """The names of the findings that are more than a note."""
         return tuple(dict.fromkeys(one.name for one in self.findings if one.level != "note"))
 
     def row(self) -> dict[str, Any]:

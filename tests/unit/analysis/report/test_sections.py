@@ -95,7 +95,7 @@ def test_estimates_hold_what_the_analysis_holds(study: StudyResult) -> None:
         assert (row["band_low_hz"], row["band_high_hz"]) == fit.band_hz
         assert row["findings"] == ", ".join(finding.name for finding in fit.findings)
         assert row["n_findings"] == len(fit.findings)
-        assert row["doubts"] == ", ".join(fit.doubts)
+        assert row["cautions"] == ", ".join(fit.cautions)
 
 
 def test_the_band_is_a_column_where_it_differs(make_study, make_analysis) -> None:

@@ -21,7 +21,8 @@ from rigidimeter.analysis.study import (
     StudyResult,
     method_caveats,
 )
-from rigidimeter.core.records import Finding, Outcome
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import Outcome
 
 SMALL = Design(days=(5, 4), epochs=(5, 5), scores=(4, 4))
 
@@ -144,7 +145,7 @@ def test_that_few_days_show_only_large_differences_is_said_once() -> None:
 
 
 def test_what_was_found_and_is_not_supported(study: StudyResult) -> None:
-    finding = Finding("tremor", "doubt", 2.0, 1.0, "a tremor", "repeat it at rest")
+    finding = Finding("tremor", "caution", 2.0, 1.0)
     fits = tuple(
         dataclasses.replace(fit, findings=(finding,)) if fit.condition == "DBS" else fit
         for fit in study.analysis.fits

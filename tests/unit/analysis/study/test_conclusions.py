@@ -18,7 +18,8 @@ from rigidimeter.analysis.study import (
 from rigidimeter.analysis.study.comparison import day_tests, gathered
 from rigidimeter.analysis.study.conclusions import Conclusion
 from rigidimeter.analysis.study.ratings_model import ratings_comparison, ratings_days
-from rigidimeter.core.records import Finding, Fit
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import Fit
 
 SMALL = Design(days=(5, 4), epochs=(5, 5), scores=(4, 4))
 
@@ -35,9 +36,9 @@ def of(result: StudyResult, measure: str) -> Conclusion:
     return found
 
 
-def doubted(study: StudyResult, name: str, where, level: str = "doubt") -> StudyResult:
+def doubted(study: StudyResult, name: str, where, level: str = "caution") -> StudyResult:
     """Return the study with a finding on those fits for which `where` is true."""
-    finding = Finding(name, level, 2.0, 1.0, "something is wrong", "mend it")  # type: ignore[arg-type]
+    finding = Finding(name, level, 2.0, 1.0)  # type: ignore[arg-type]
     fits = tuple(
         replace(fit, findings=(finding,)) if where(fit) else fit for fit in study.analysis.fits
     )
@@ -121,7 +122,7 @@ def test_a_method_that_the_subject_does_not_bias_clears_its_torque_alone(study):
 
 
 def test_a_doubt_on_all_epochs_of_a_condition_together(study):
-    finding = Finding("missing_term", "doubt", 2.0, 1.0, "friction", "include it")
+    finding = Finding("missing_term", "caution", 2.0, 1.0)
     pooled = replace(study.analysis.fits[0], condition="OFF", findings=(finding,))
     together = replace(study, analysis=replace(study.analysis, pooled=(pooled,)))
     found = of(together, "stiffness_nm_rad")
@@ -181,7 +182,7 @@ def test_a_difference_smaller_than_the_error_between_samples_is_none(study):
 @pytest.mark.parametrize(("half_width", "verdict"), [(0.02, "lower"), (0.5, "not supported")])
 def test_a_bias_counts_as_far_as_it_could_make_the_difference(study, half_width, verdict):
     """60 % of half the interval of all epochs together."""
-    finding = Finding("loop_bias", "doubt", 60.0, 50.0, "torque comes back", "record it")
+    finding = Finding("loop_bias", "caution", 60.0, 50.0)
     value = study.analysis.fits[0].value
     pooled = replace(
         study.analysis.fits[0],

@@ -24,7 +24,8 @@ from rigidimeter.analysis.study import (
     traffic_light,
 )
 from rigidimeter.analysis.study.comparison import no_days
-from rigidimeter.core.records import Epoch, Finding, Outcome
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import Epoch, Outcome
 
 SMALL = Design(days=(5, 4), epochs=(5, 5), scores=(4, 4))
 
@@ -107,8 +108,11 @@ class TestDifference:
         assert (found.estimate, found.side) == (-20.0, "higher")
 
 
+TREMOR = {"frequency_hz": 5.0, "amplitude_nm": 0.2, "stands_out": 9.0}
+
+
 def doubted(study: StudyResult, epochs: int, condition: str = "DBS") -> StudyResult:
-    finding = Finding("tremor", "doubt", 2.0, 1.0, "a tremor at 5 Hz", "repeat it at rest")
+    finding = Finding("tremor", "caution", 2.0, 1.0, facts=TREMOR)
     left = iter([True] * epochs)
     fits = tuple(
         replace(fit, findings=(finding,))
@@ -130,7 +134,8 @@ class TestTrafficLight:
         light = traffic_light(doubted(study, 19))
         assert (light.level, light.sound, light.doubted) == ("caution", 59, 19)
         assert (light.doubt, light.doubt_epochs) == ("tremor", 19)
-        assert (light.text, light.remedy) == ("a tremor at 5 Hz", "repeat it at rest")
+        assert light.text == "Torque oscillates at 5 Hz with 0.2 N·m"
+        assert light.remedy.startswith("Record the perturbation")
 
     def test_a_recording_that_could_not_be_used_is_no_good_quality(self, study):
         refused = LeftOut("b.csv", "M1", "1", "DBS", "its angle is in degrees")
@@ -162,7 +167,7 @@ class TestTrafficLight:
         assert traffic_light(compare(table, value="k", resamples=0)) is None
 
     def test_scatter_between_epochs_is_no_caution_where_conditions_are_compared(self, study):
-        finding = Finding("varying_between_epochs", "doubt", 2.0, 1.0, "K varies", "look")
+        finding = Finding("varying_between_epochs", "caution", 2.0, 1.0)
         pooled = replace(study.analysis.fits[-1], condition="OFF", findings=(finding,))
         made = replace(study, analysis=replace(study.analysis, pooled=(pooled,)))
         light = traffic_light(made)

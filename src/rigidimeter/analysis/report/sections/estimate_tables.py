@@ -144,16 +144,16 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
     )
     band, in_which = _band(analysis.fits)
     found: tuple[Column, ...] = ()
-    doubts: tuple[Column, ...] = ()
+    cautions: tuple[Column, ...] = ()
     if any(fit.findings for fit in analysis.fits):
         found = (Column("n_findings", "Findings", "count"),)
-    if any(fit.doubts for fit in analysis.fits):
-        doubts = (Column("doubts", "Doubted by", "reason"),)
+    if any(fit.cautions for fit in analysis.fits):
+        cautions = (Column("cautions", "Caution", "reason"),)
     estimates = result_table(result, "estimates")
     yield Table(
         "estimates",
         f"Inertia, damping and stiffness, epoch by epoch{in_which}",
-        (*WHO, *HOW, *_parameters(), *_quality(), *band, *found, *doubts),
+        (*WHO, *HOW, *_parameters(), *_quality(), *band, *found, *cautions),
         estimates,
         empty="No epoch was fitted.",
         folding=True,
@@ -171,7 +171,7 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
             Column(f"{prefix}reason", "Reason", "reason"),
             *_parameters(prefix),
             *_quality(prefix),
-            *doubts,
+            *cautions,
         ),
         estimates,
         empty="No epoch was fitted with the inertia fixed.",

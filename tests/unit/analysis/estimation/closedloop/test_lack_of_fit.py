@@ -1,5 +1,6 @@
 """The tests of the lack of fit: Fisher's distribution for noise, and what was put in is found."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -163,11 +164,12 @@ def test_what_is_not_the_joint_is_told_in_each_epoch_and_of_all(softened_epochs,
     fits, pooled = found(softened_epochs, method)
     for fit in (*fits, *pooled):
         (finding,) = (f for f in fit.findings if f.name == "lack_of_fit")
-        assert finding.level == "doubt"
-        assert finding.value > finding.threshold
-        assert "is not J, B and K" in finding.text
-        assert "the lower half of the band gives J" in finding.text
-        assert "band_sensitivity" in fit.doubts
+        assert finding.level == "caution"
+        assert finding.value > finding.limit
+        assert finding.p < 1e-4
+        assert all(math.isfinite(finding.facts[f"half_{name}"]) for name in "JBK")
+        assert (finding.condition, len(finding.epochs)) == (fit.condition, len(fits))
+        assert "band_sensitivity" in fit.cautions
 
 
 @pytest.mark.parametrize("count", [1, 4])

@@ -38,7 +38,7 @@ def test_a_small_r_squared_is_a_doubt_for_least_squares(push_nm, r_squared, doub
     settings = parse_settings({"subject": {"OFF": {"voluntary_sd_nm": push_nm}}})
     epochs = [simulate_epochs(settings, 1, joints=[JOINT], conditions="OFF", seed=3).epoch(0)]
     (prepared,) = prepare(epochs, settings)
-    for method, level in (("bandlimited", "doubt"), ("iv", "note")):
+    for method, level in (("bandlimited", "caution"), ("iv", "note")):
         (fit,), _ = fit_epochs(epochs, method, settings)
         findings = checked(prepared, replace(fit, r_squared=r_squared)).findings
         assert [f.level for f in findings if f.name == "r_squared"] == [level] * doubted
