@@ -94,7 +94,7 @@ def missing_term(case: Case) -> Look | None:
         return _linear(case, found.beyond, found.linear)
     if not found.terms:
         return Look(0.0, MOST_PERCENT, False)
-    (added,) = moved(case, found.beyond, [found.terms])
+    *alone, added = moved(case, found.beyond, [*((term,) for term in found.terms), found.terms])
     asked = ",".join(["inertia", "damping", "stiffness", *(WORDS[t.name][1] for t in found.terms)])
     # The whole damping and its two halves are one too many.
     asked = asked.replace("damping,", "", 1) if "directional-damping" in asked else asked
@@ -103,7 +103,13 @@ def missing_term(case: Case) -> Look | None:
         "sizes": _and(map(_size, found.terms)),
         "asked": asked,
     }
-    variants = "several" if len(found.terms) > 1 else ""
+    variants = ""
+    if len(found.terms) > 1:
+        variants = "several"
+        for term, (by_fit, *_) in zip(found.terms, alone, strict=True):
+            percent = 100 * by_fit / np.abs(case.parameters)
+            for symbol, one in zip("JBK", percent.tolist(), strict=True):
+                facts[f"{symbol}_percent_of_{term.name}"] = one
     if _little_friction(case, found.terms):
         variants = "of_drive"
     return _look(case, added, max(term.p for term in found.terms), facts, variants)
@@ -142,9 +148,9 @@ def _linear(case: Case, beyond: BeyondLinear, term: LinearTerm) -> Look:
 def _look(case: Case, added: Array, p: float, facts: Mapping[str, Fact], variant: str) -> Look:
     """Return a look for what terms add to J, B and K while left out, shape (1 or 2, 3)."""
     value = _share_percent(case, added)
-    # The fit with the terms, which the test below holds to the truth, is the first.
-    largest = added[np.argmax(np.abs(added), axis=0), np.arange(3)]
-    effect = Effect.of(largest, case.parameters, case.half_widths)
+    by_fit, *beside = (Effect.of(row, case.parameters, case.half_widths) for row in added)
+    # In a loop the fit with the terms may be biased: it is not enough to call them harmless.
+    effect = beside[0] if by_fit.negligible and beside else by_fit
     return Look(value, MOST_PERCENT, True, facts, variant, effect, p)
 
 
