@@ -44,8 +44,8 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
     own = found[0]
     yield paragraph(
         "The estimates change with the band by no more than chance where the joint is inertia, "
-        "damping and stiffness alone. A check doubts them where they change by more "
-        "(band_sensitivity)."
+        "damping and stiffness alone. Where they change by more, they carry a "
+        "finding (band_sensitivity)."
     )
     yield Figure(
         "band_sensitivity",
