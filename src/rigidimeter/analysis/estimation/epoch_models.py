@@ -24,8 +24,8 @@ from rigidimeter.core.records import Fit
 from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE
 
 REFUSING = ("conditioning",)
-"""Checks that forbid a choice of terms though an estimate only is in doubt: where J, B and K cannot
-be told apart, further terms cannot either."""
+"""Checks that forbid a choice of terms though an estimate only needs caution: where J, B
+and K cannot be told apart, further terms cannot either."""
 
 
 class EpochModels(NamedTuple):

@@ -36,18 +36,18 @@ from rigidimeter.core.settings import RigSettings
 from rigidimeter.model import DriveModel
 
 
-class InertiaDoubt(NamedTuple):
+class InertiaUncertainty(NamedTuple):
     """How far J, B and K may be elsewhere, either way, for each unit of J; what is said of it."""
 
     away: Array
     findings: tuple[Finding, ...] = ()
 
 
-NONE = InertiaDoubt(np.zeros(3))
+NONE = InertiaUncertainty(np.zeros(3))
 
 
-def inertia_doubt(prepared: PreparedEpoch, signals: Signals) -> InertiaDoubt:
-    """Return the doubt where the drive was followed as far as it is known."""
+def inertia_uncertainty(prepared: PreparedEpoch, signals: Signals) -> InertiaUncertainty:
+    """Return the uncertainty where the drive was followed as far as it is known."""
     drive, epoch = prepared.source.drive, prepared.epoch
     command = epoch.channels.get("velocity_command_rad_s")
     torque_filter = torque_filter_of(prepared.settings.estimation)
@@ -72,7 +72,7 @@ def inertia_doubt(prepared: PreparedEpoch, signals: Signals) -> InertiaDoubt:
     values = np.abs(signals.solution.values)
     percent = 100.0 * away * values[0] / np.maximum(values, 1e-300)
     settings = prepared.settings.diagnostics
-    return InertiaDoubt(away, between_finding(epoch, percent, 0, known, settings))
+    return InertiaUncertainty(away, between_finding(epoch, percent, 0, known, settings))
 
 
 def moved_by_settings(
@@ -118,7 +118,7 @@ def delay_of_drive_s(prepared: PreparedEpoch) -> float:
     return abs(acceleration_late_s(drive, 1.0 / rig.tick_rate_hz))
 
 
-def as_they_are(prepared: PreparedEpoch, signals: Signals) -> InertiaDoubt:
+def as_they_are(prepared: PreparedEpoch, signals: Signals) -> InertiaUncertainty:
     """Return the finding if the drive shows that J comes out wrong from the samples as they are."""
     del signals
     drive, epoch = prepared.source.drive, prepared.epoch
@@ -140,4 +140,4 @@ def as_they_are(prepared: PreparedEpoch, signals: Signals) -> InertiaDoubt:
         facts={"seen": 100.0 * float(seen), "side": "small" if seen < 1 else "large"},
         variant="as_sampled",
     )
-    return InertiaDoubt(NONE.away, (finding,))
+    return InertiaUncertainty(NONE.away, (finding,))

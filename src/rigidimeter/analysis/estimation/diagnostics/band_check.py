@@ -1,9 +1,9 @@
 """Whether the band decides what J, B and K are: neighbouring bands that contradict the interval.
 
 The epochs of a condition are fitted again in bands with other edges
-(`closedloop.band_sensitivity`). An estimate is doubted where another band moves a parameter by more
-than chance, over all bands and parameters together, by more than a share of the parameter, and by
-more than half of half the interval of that estimate: then the interval does not hold what other
+(`closedloop.band_sensitivity`). An estimate has the finding where another band moves a parameter by
+more than chance, over all bands and parameters together, by more than a share of the parameter, and
+by more than half of half the interval of that estimate: then the interval does not hold what other
 frequencies say.
 """
 

@@ -185,7 +185,7 @@ def test_stamps_of_real_time_change_nothing(simulated, count):
     assert values[1] == pytest.approx(values[0], rel=0.05)
 
 
-def test_an_epoch_that_does_not_count_is_neither_looked_at_nor_doubted(simulated):
+def test_an_epoch_that_does_not_count_has_no_findings_of_the_others(simulated):
     settings, epochs = simulated(2, seed=4)
     prepared = prepare([softened(epoch) for epoch in epochs], settings)
     fits, _ = fit_epochs([p.epoch for p in prepared], "iv", settings)

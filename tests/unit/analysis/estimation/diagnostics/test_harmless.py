@@ -38,7 +38,7 @@ def test_a_level_that_was_set_is_used_in_any_case(level):
 @pytest.mark.parametrize(
     ("push_nm", "r_squared", "doubted"), [(0.5, 0.29, True), (0.5, 0.31, False), (0.0, 0.29, True)]
 )
-def test_a_small_r_squared_is_a_doubt_for_least_squares(push_nm, r_squared, doubted):
+def test_a_small_r_squared_asks_for_caution_with_least_squares(push_nm, r_squared, doubted):
     settings = parse_settings({"subject": {"OFF": {"voluntary_sd_nm": push_nm}}})
     epochs = [simulate_epochs(settings, 1, joints=[JOINT], conditions="OFF", seed=3).epoch(0)]
     (prepared,) = prepare(epochs, settings)

@@ -113,7 +113,7 @@ def test_so_little_friction_may_be_the_drives(coulomb_nm, said):
     ("name", "doubted"),
     [("friction in the drive 3 N·m", True), ("friction in the joint 0.02 N·m", False)],
 )
-def test_without_the_command_friction_of_the_drive_leaves_the_inertia_in_doubt(name, doubted):
+def test_without_the_command_friction_of_the_drive_leaves_the_inertia_uncertain(name, doubted):
     """J is 6 % too small with that drive, and its interval does not say so."""
     (epoch,), _ = SCENARIOS[name].simulated(0, 1)
     settings = SCENARIOS[name].analysed_with()

@@ -2,13 +2,13 @@
 
 The drive is known by how it explains the velocity at its samples. Drives that explain it as well
 give other parameters where the samples are too few to tell them apart. The largest change is δ;
-where it is more than a tenth of the parameter, what the drive tells is itself in doubt, its sign
+where it is more than a tenth of the parameter, what the drive tells is itself uncertain, its sign
 included, and δ is at least twice what it changes. δ is added to both ends of the interval,
 
     low = p̂ − t s − δ        high = p̂ + t s + δ
 
 with s the standard error and t Student's quantile; pooled epochs share the drive, so δ does not
-fall with their number. Where δ is more than a share of the parameter, the estimate is doubted.
+fall with their number. Where δ is more than a share of the parameter, it has the finding.
 """
 
 from __future__ import annotations
