@@ -82,7 +82,7 @@ def test_findings_of_one_check_are_told_once():
     ((found, fits, where),) = analysis().findings
     assert found.name == "frozen"
     assert [fit.epoch for fit in fits] == ["1", "2"]
-    assert where == "all 2 epochs"
+    assert where == "both epochs"
 
 
 def test_a_group_names_its_epochs_and_the_one_that_shows_it_most():

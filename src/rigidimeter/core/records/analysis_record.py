@@ -105,7 +105,7 @@ def _where(members: Sequence[tuple[Fit, Finding]], worst: Finding, fits: Sequenc
 
     where = of(fit for fit, _ in own)
     if len(own) == len(fits) > 1:
-        where = f"all {len(fits)} epochs"
+        where = "both epochs" if len(fits) == 2 else f"all {len(fits)} epochs"
     elif len({fit.source for fit, _ in own}) > MOST_SOURCES:
         where = f"{len(own)} of {len(fits)} epochs"
     if len({finding.headline for _, finding in own}) > 1:
