@@ -152,13 +152,7 @@ FIT_KINDS = (
                 "shows as much by chance; lack_of_fit tests all epochs together."
             }
         },
-        example={
-            "value": 14.0,
-            "limit": 10.0,
-            "correlation": 0.21,
-            "lag_s": 0.06,
-            "chance": 0.14,
-        },
+        example={"value": 14.0, "limit": 10.0, "correlation": 0.21, "lag_s": 0.06, "chance": 0.14},
     ),
     Kind(
         "held_out_vaf",

@@ -143,7 +143,7 @@ MODEL_KINDS = (
                 "measured": "The torque holds a reflex, {size:.3g} N·m·s/rad "
                 "{late_ms:.0f} ms late, {share:.0f} % of what J, B and K leave to a linear filter "
                 "({p}). Left out, it moves {changes}, {value:.3g} % of half their intervals (at "
-                "most {limit:g} %).",
+                "most {limit:g} %)."
             },
             "coupling": {
                 "headline": "Something gives between sensor and joint: {changes}",
@@ -155,7 +155,7 @@ MODEL_KINDS = (
             },
             "of_drive": {
                 "meaning": "Below 2 % of the torque's SD it may be friction of the drive; "
-                "including it then does not help.",
+                "including it then does not help."
             },
             "within": {"meaning": "That is less than half their intervals."},
         },
@@ -202,9 +202,7 @@ MODEL_KINDS = (
                 "{shown_inertia:.3g} {shown_damping:.3g}; those of the settings seem to be "
                 "multiplied by 57.3."
             },
-            "instrument": {
-                "meaning": "{method} is less precise with it, not biased.",
-            },
+            "instrument": {"meaning": "{method} is less precise with it, not biased."},
             "small_bias": {
                 "meaning": "By the loop that the recording shows, torque from elsewhere biases J, "
                 "B and K by {share:.2g} % of half their intervals at most."
@@ -235,7 +233,7 @@ MODEL_KINDS = (
         variants={
             "instrument": {
                 "meaning": "{method} takes the motion that the perturbation would cause without "
-                "feedback, so it is less precise, not biased.",
+                "feedback, so it is less precise, not biased."
             },
             "small_bias": {
                 "meaning": "By the loop, torque from elsewhere biases J, B and K by {share:.2g} % "

@@ -102,7 +102,7 @@ SENSOR_KINDS = (
         variants={
             "left_out": {
                 "meaning": "The gap is left out, {spans}; J, B and K are from {used_s:.3g} of "
-                "{length_s:.3g} s.",
+                "{length_s:.3g} s."
             }
         },
         example={
@@ -212,12 +212,7 @@ SENSOR_KINDS = (
         "that something but the robot adds.",
         remedy="Record the perturbation, which tells the two apart, or take a known delay out of "
         "the recording.",
-        example={
-            "value": 4.0,
-            "limit": 1.2,
-            "late_ms": 4.0,
-            "percent_of": (-12.0, -5.1, 0.0),
-        },
+        example={"value": 4.0, "limit": 1.2, "late_ms": 4.0, "percent_of": (-12.0, -5.1, 0.0)},
     ),
     Kind(
         "guard_limited",

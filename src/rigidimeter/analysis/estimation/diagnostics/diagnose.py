@@ -53,9 +53,7 @@ CHECKS: list[Check] = [
 
 
 def diagnose(
-    case: Case,
-    seen: Mapping[str, Look | None] | None = None,
-    checks: Sequence[Check] = CHECKS,
+    case: Case, seen: Mapping[str, Look | None] | None = None, checks: Sequence[Check] = CHECKS
 ) -> tuple[Finding, ...]:
     """Return what the checks found for which there is something to look at.
 

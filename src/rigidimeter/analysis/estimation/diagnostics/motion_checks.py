@@ -22,12 +22,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigidimeter.analysis.estimation.bandlimited import bandlimited_signals, zero_phase_band
-from rigidimeter.analysis.estimation.diagnostics.check_record import (
-    Case,
-    Check,
-    Look,
-    at_most,
-)
+from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look, at_most
 from rigidimeter.analysis.estimation.least_squares import fit_inertia_damping_stiffness
 from rigidimeter.analysis.estimation.signals import (
     Array,

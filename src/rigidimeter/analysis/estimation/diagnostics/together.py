@@ -84,10 +84,7 @@ class Observed(NamedTuple):
 
 
 def checked_together(
-    prepared: Sequence[PreparedEpoch],
-    fits: Sequence[Fit],
-    pooled: Sequence[Fit],
-    estimator: Method,
+    prepared: Sequence[PreparedEpoch], fits: Sequence[Fit], pooled: Sequence[Fit], estimator: Method
 ) -> Together:
     """Return the fits, and the pooled fits, with what the epochs of each condition show together.
 
@@ -277,12 +274,7 @@ def _pooled_bias(
         return []
     return [
         found(
-            "loop_bias",
-            settings,
-            look.value,
-            look.limit,
-            effect=look.effect,
-            variant=look.variant,
+            "loop_bias", settings, look.value, look.limit, effect=look.effect, variant=look.variant
         )
     ]
 

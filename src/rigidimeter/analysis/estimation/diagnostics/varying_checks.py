@@ -8,10 +8,7 @@ from rigidimeter.analysis.estimation.between_epochs import also
 from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look
 from rigidimeter.analysis.estimation.diagnostics.missing_term import terms_found
 from rigidimeter.analysis.estimation.diagnostics.varying_lines import varying_lines
-from rigidimeter.analysis.estimation.diagnostics.varying_selection import (
-    Variation,
-    variation,
-)
+from rigidimeter.analysis.estimation.diagnostics.varying_selection import Variation, variation
 from rigidimeter.core.findings import Fact
 from rigidimeter.core.records import PARAMETERS
 from rigidimeter.core.settings import DiagnosticsSettings
