@@ -38,15 +38,14 @@ def commands(blocks: list[Block]) -> Iterator[tuple[str, list[str]]]:
 
 @cache
 def help_of(*command: str) -> str:
-    result = RUN.invoke(app, [*command, "--help"])
+    result = RUN.invoke(app, [*command, "--help-all"])
     assert result.exit_code == 0, result.output
     return result.output
 
 
 def below(*command: str) -> list[str]:
     """Return the names of the commands below a group; of a command, none."""
-    _, _, listed = help_of(*command).partition("\nCommands:\n")
-    return re.findall(r"^  ([a-z]+)  ", listed, re.M)
+    return re.findall(r"^  ([a-z]+)  ", help_of(*command), re.M)
 
 
 def command_of(words: list[str]) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigidimeter.cli.comparison_text import comparison_blocks
+from rigidimeter.cli.help_pages import COMPARE, ESTIMATE
 from rigidimeter.cli.inputs import (
     analyse_recordings,
     analyse_study_folder,
@@ -35,8 +36,9 @@ def compare(
         typer.Option(
             "--reference",
             metavar="NAME",
-            help="The first condition: differences are reference minus other. Default: OFF if "
+            help="Reference condition. Differences are reference minus other. Default: OFF if "
             "there is one, else the first.",
+            rich_help_panel=COMPARE,
         ),
     ] = None,
     other: Annotated[
@@ -44,8 +46,9 @@ def compare(
         typer.Option(
             "--other",
             metavar="NAME",
-            help="The second condition. Default: the next one, and each further one is compared "
+            help="The other condition. Default: the next one, and each further one is compared "
             "with the first, too.",
+            rich_help_panel=COMPARE,
         ),
     ] = None,
     json_out: JsonOption = None,
@@ -55,12 +58,18 @@ def compare(
         typer.Option(
             "--value",
             metavar="COLUMN",
-            help="Compare this column of a table; repeat for several.",
+            help="Compare this column of one CSV table. Repeat for several.",
+            rich_help_panel=COMPARE,
         ),
     ] = None,
     by: Annotated[
         str,
-        typer.Option("--by", metavar="COLUMN", help="With --value: the column of conditions."),
+        typer.Option(
+            "--by",
+            metavar="COLUMN",
+            help="With --value: column of conditions.",
+            rich_help_panel=COMPARE,
+        ),
     ] = "condition",
     session: Annotated[
         str | None,
@@ -68,20 +77,37 @@ def compare(
             "--session",
             metavar="COLUMN",
             help="With --value: the bootstrap resamples the labels of this column. Default: rows.",
+            rich_help_panel=COMPARE,
+            hidden=True,
         ),
     ] = None,
     seed: Annotated[
-        int, typer.Option("--seed", min=0, metavar="N", help="Seed of the bootstrap.")
+        int,
+        typer.Option(
+            "--seed",
+            min=0,
+            metavar="N",
+            help="Seed of the bootstrap.",
+            rich_help_panel=ESTIMATE,
+            hidden=True,
+        ),
     ] = 1,
     resamples: Annotated[
         int,
-        typer.Option("--resamples", min=100, metavar="N", help="Resamples of the bootstrap."),
+        typer.Option(
+            "--resamples",
+            min=100,
+            metavar="N",
+            help="Resamples of the bootstrap.",
+            rich_help_panel=ESTIMATE,
+            hidden=True,
+        ),
     ] = 9999,
     key: KeyOption = None,
 ) -> None:
-    """Compare conditions in J, B, K, angular impulse and work, or in columns of a table.
+    """Compare conditions in J, B, K, angular impulse and work.
 
-    Median and quartiles, the two-sided Wilcoxon rank-sum test (asymptotic, ties and continuity
+        Median and quartiles, the two-sided Wilcoxon rank-sum test (asymptotic, ties and continuity
     corrected), effect size r = z/√N, and the Hodges-Lehmann shift with its 95 % interval. Effect
     sizes have bootstrap intervals, and each pair of measures is compared in how well it separates
     the conditions. Inputs are session folders, recordings, or one JSON file from
@@ -97,8 +123,8 @@ def compare(
       rigidimeter compare demo-study
       rigidimeter compare study/sessions/day-1 study/sessions/day-2
       rigidimeter compare before.csv after.csv --condition OFF --condition DBS
-      rigidimeter compare estimates.json --reference OFF --other DBS --csv table.csv
-      rigidimeter compare ratings.csv --value score --by condition --json comparison.json
+      rigidimeter compare estimates.json --reference OFF --other DBS
+      rigidimeter compare ratings.csv --value score --by condition
     """
     from rigidimeter.analysis import study as studies
     from rigidimeter.cli.progress import Meter

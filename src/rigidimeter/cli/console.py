@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigidimeter.cli.help_pages import PAGE
 from rigidimeter.cli.options import CpuOption, PriorityOption, RigOption
 from rigidimeter.cli.output import echo
 from rigidimeter.core.errors import UserError
@@ -26,14 +27,33 @@ SHOWN_S = 3.0
 
 HostOption = Annotated[
     str,
-    typer.Option("--host", metavar="ADDRESS", help="Address of the page; any but this computer's "
-                 "own loopback needs a token, which is printed."),
-]  # fmt: skip
+    typer.Option(
+        "--host",
+        metavar="ADDRESS",
+        help="Address of the page. Any but this computer's own loopback needs a token, which is "
+        "printed.",
+        rich_help_panel=PAGE,
+    ),
+]
 PortOption = Annotated[
-    int, typer.Option("--port", metavar="N", min=0, max=65535, help="Port; 0 for a free one.")
+    int,
+    typer.Option(
+        "--port",
+        metavar="N",
+        min=0,
+        max=65535,
+        help="Port; 0 for a free one.",
+        rich_help_panel=PAGE,
+    ),
 ]
 TokenOption = Annotated[
-    str, typer.Option("--token", metavar="TEXT", help="Token of the page. Default: a random one.")
+    str,
+    typer.Option(
+        "--token",
+        metavar="TEXT",
+        help="Token of the page. Default: a random one.",
+        rich_help_panel=PAGE,
+    ),
 ]
 
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from rigidimeter.cli.help_pages import DETECT, PERTURB, WRITE
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import JsonOption, SettingsOption
 from rigidimeter.cli.output import echo
@@ -19,7 +20,9 @@ def design(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Folder for prbs.csv, sinusoid.csv, protocol.csv, bode.svg and design.json.",
+            help="Folder of the plan. It holds prbs.csv, sinusoid.csv, protocol.csv, bode.svg and "
+            "design.json.",
+            rich_help_panel=WRITE,
         ),
     ] = None,
     json_out: JsonOption = None,
@@ -27,38 +30,46 @@ def design(
         list[str] | None,
         typer.Option(
             metavar="NAME=AMOUNT",
-            help="Number of epochs needed to detect a difference in inertia, damping or "
-            "stiffness, such as damping=20% or stiffness=0.3; repeat as needed.",
+            help="Difference to detect, such as damping=20%. In inertia, damping or stiffness, as "
+            "a share or in N·m·s/rad and the like, as stiffness=0.3; repeat as needed.",
+            rich_help_panel=DETECT,
         ),
     ] = None,
     power: Annotated[
-        float, typer.Option("--power", metavar="P", help="Power of the test for --detect.")
+        float,
+        typer.Option("--power", metavar="P", help="Power of the test.", rich_help_panel=DETECT),
     ] = 0.8,
     alpha: Annotated[
         float,
-        typer.Option("--alpha", metavar="P", help="Significance level of the test for --detect."),
+        typer.Option(
+            "--alpha", metavar="P", help="Significance level of the test.", rich_help_panel=DETECT
+        ),
     ] = 0.05,
     optimise: Annotated[
         bool,
         typer.Option(
             "--optimise",
-            help="Search for the most precise PRBS (clock, bits, amplitude) within the guard's "
-            "limits.",
+            help="Search for the most precise PRBS. Its clock, bits and amplitude, within the "
+            "guard's limits.",
+            rich_help_panel=PERTURB,
         ),
     ] = False,
     criterion: Annotated[
         str,
         typer.Option(
             metavar="NAME",
-            help="What --optimise minimises: minimax (the largest relative error), A (their root "
-            "mean square) or D (the volume of the confidence region).",
+            help="What --optimise minimises: minimax, A or D. Minimax is the largest relative "
+            "error, A their root mean square, D the volume of the confidence region.",
+            rich_help_panel=PERTURB,
+            hidden=True,
         ),
     ] = "minimax",
     multisine: Annotated[
         bool,
         typer.Option(
             "--multisine",
-            help="Compare the PRBS with a multisine; with --out also write multisine.csv.",
+            help="Compare the PRBS with a multisine. With --out also write multisine.csv.",
+            rich_help_panel=PERTURB,
         ),
     ] = False,
     body_mass_kg: Annotated[
@@ -66,7 +77,9 @@ def design(
         typer.Option(
             "--body-mass",
             metavar="KG",
-            help="Body mass for the bandwidth of App. A, whose subject has 7.7 kg.",
+            help="Body mass for the bandwidth of the paper's arm. There it is 7.7 kg (App. A).",
+            rich_help_panel=PERTURB,
+            hidden=True,
         ),
     ] = None,
     forearm_m: Annotated[
@@ -74,15 +87,17 @@ def design(
         typer.Option(
             "--forearm",
             metavar="M",
-            help="Length of the forearm for the bandwidth of App. A, where it has 0.15 m.",
+            help="Length of the forearm for that bandwidth. There it is 0.15 m (App. A).",
+            rich_help_panel=PERTURB,
+            hidden=True,
         ),
     ] = None,
 ) -> None:
-    """Predict stability, standard errors and the number of epochs needed, before anything moves.
+    """Plan an experiment: stability, precision, days and epochs needed.
 
     Shows the perturbations and their band, the session, the stability of the loop, and the standard
-    errors to expect. The exit status is 1 if the loop is unstable, or nearly so, with the joint of
-    a condition.
+    errors to expect, before anything moves. The exit status is 1 if the loop is unstable, or nearly
+    so, with the joint of a condition.
 
     \b
     For example:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigidimeter.cli.help_pages import WRITE
 from rigidimeter.cli.inputs import analyse_recordings, keep_inputs, say_analysed
 from rigidimeter.cli.options import CsvOption, JsonOption
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
@@ -33,23 +34,26 @@ def estimate(
         typer.Option(
             "--subject-torque",
             metavar="FILE",
-            help="Write measured, joint and subject's torque of each epoch, as .csv or .parquet.",
+            help="Torque of the subject, .csv or .parquet. Measured, joint and subject's torque "
+            "of each epoch.",
+            rich_help_panel=WRITE,
         ),
     ] = None,
 ) -> None:
-    """Estimate inertia J, damping B and stiffness K of each epoch, and score the sinusoids.
+    """Estimate inertia J, damping B and stiffness K of each epoch.
 
-    A file holds time_s, torque_nm, at least one of velocity_rad_s and angle_rad, and optionally
-    velocity_command_rad_s, perturbation_nm, epoch, condition and task. Torque is positive when it
-    drives the joint toward positive angles. The exit status is 1 if any input was bad; the others
-    are still analysed.
+    Sinusoidal epochs have scores. A file holds time_s, torque_nm, at least one of velocity_rad_s
+    and angle_rad, and optionally velocity_command_rad_s, perturbation_nm, epoch, condition and
+    task. Torque is positive when it drives the joint toward positive angles. The exit status is 1
+    if any input was bad; the others are still analysed.
 
     \b
     For example:
       rigidimeter estimate demo-study/sessions/day-1
       rigidimeter estimate elbow.csv --epoch-length-s 20 --json estimates.json
       rigidimeter estimate ankle.npz --column angle_rad=position_rad \\
-          --column torque_nm=torque_Nm --rate-hz 1000 --reaction --epoch-length-s 20
+          --column torque_nm=torque_Nm --rate-hz 1000 --reaction \\
+          --epoch-length-s 20
     """
     from rigidimeter.analysis.reading import write_estimates_csv, write_estimates_json
     from rigidimeter.analysis.study import recording_result

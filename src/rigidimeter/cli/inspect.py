@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigidimeter.cli.help_pages import WRITE
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
@@ -24,19 +25,25 @@ def inspect(
     write_mapping: Annotated[
         Path | None,
         typer.Option(
-            "--write-mapping", metavar="FILE", help="Write a mapping file that reads the file."
+            "--write-mapping",
+            metavar="FILE",
+            help="A mapping file that reads the file.",
+            rich_help_panel=WRITE,
         ),
     ] = None,
     plot: Annotated[
         Path | None,
         typer.Option(
-            "--plot", metavar="FILE", help="Draw the columns, as an image (.png, .svg, .pdf)."
+            "--plot",
+            metavar="FILE",
+            help="The columns as an image (.png, .svg, .pdf).",
+            rich_help_panel=WRITE,
         ),
     ] = None,
 ) -> None:
-    """Show what is in a file and how it would be read, without estimating anything.
+    """Show what is in a file and how it would be read.
 
-    The exit status is 1 if a file cannot be read without being told more.
+    Nothing is estimated. The exit status is 1 if a file cannot be read without being told more.
 
     \b
     For example:

@@ -47,7 +47,6 @@ app = typer.Typer(
     name="rigidimeter",
     cls=VisibleErrors,
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
@@ -75,8 +74,8 @@ def _root(
             metavar="FILE",
             callback=_load,
             is_eager=True,
-            help="First run a Python file that adds an estimator, a file format, a term or a "
-            "check; repeat as needed.",
+            help="First run a Python file of extensions. It adds an estimator, a file format, a "
+            "term or a check; repeat as needed.",
         ),
     ] = None,
     version: Annotated[
@@ -84,38 +83,25 @@ def _root(
         typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
     ] = False,
 ) -> None:
-    """Measure joint rigidity: plan, run or simulate, estimate J, B and K, compare, report.
+    """Measure joint rigidity. Research software, not a medical device.
 
     \b
-    A first look:   rigidimeter demo --out demo-study
-    Your own data:  rigidimeter estimate recording.csv --epoch-length-s 20
-
-    rigidimeter is research software, not a medical device.
+    Analyse a recording:  rigidimeter estimate elbow.csv --epoch-length-s 20
+    Try all of it:        rigidimeter demo (a virtual subject on a virtual rig)
+    Run a rig:            rigidimeter console protocol.toml --rig rig.toml
     """
 
 
-for command in (
-    design,
-    simulate,
-    run,
-    console,
-    commission,
-    check,
-    emulate,
-    estimate,
-    batch,
-    inspect,
-    model,
-    compare,
-    ratings,
-    report,
-    export,
-    reproduce,
-    recover,
-    demo,
-):
-    app.command(cls=RegistryCommand)(command)
-app.add_typer(study)
+for panel, commands in {
+    "Analyse": (estimate, compare, report, model, inspect, batch, export),
+    "Plan": (design, simulate),
+    "Measure": (run, console, commission, check, emulate, recover),
+    "Paper": (reproduce, ratings),
+    "Start": (demo,),
+}.items():
+    for command in commands:
+        app.command(cls=RegistryCommand, rich_help_panel=panel)(command)
+app.add_typer(study, rich_help_panel="Start")
 
 
 def _terminated(_signal: int, _frame: FrameType | None) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigidimeter.cli.help_pages import ESTIMATE
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import JsonOption
 from rigidimeter.cli.output import echo
@@ -32,21 +33,23 @@ def model(
         typer.Option(
             "--terms",
             metavar="NAME,NAME,...",
-            help="The terms of the torque, by their names. Repeat to compare your own models.",
+            help="Terms of the torque, by their names. Repeat to compare your own models.",
+            rich_help_panel=ESTIMATE,
         ),
     ] = None,
     compare: Annotated[
         bool,
         typer.Option(
             "--compare",
-            help="Let each model predict blocks of an epoch that it has not seen, and recommend "
-            "one. With one --terms, try J, B and K alone, with each further term, and more beside "
-            "the best as long as they predict better.",
+            help="Compare models, and recommend one. Each model predicts blocks of an epoch that "
+            "it has not seen. With one --terms, J, B and K alone are tried, with each "
+            "further term, and more beside the best as long as they predict better.",
+            rich_help_panel=ESTIMATE,
         ),
     ] = False,
     json_out: JsonOption = None,
 ) -> None:
-    """Fit the torque as a sum of terms by name, and find which terms it needs.
+    """Fit the torque as a sum of terms, and find the terms it needs.
 
     Recordings are read as by `estimate`. A band from 0 Hz (--band-hz 0 40) keeps the mean of the
     torque, which offset and coulomb need. Each epoch passes the checks of `estimate` first. The
@@ -54,10 +57,8 @@ def model(
 
     \b
     For example:
-      rigidimeter model demo-study/sessions/day-1
-      rigidimeter model ankle.npz --column angle_rad=position_rad --column torque_nm=torque_Nm \\
-          --reaction --terms inertia,damping,stiffness,reflex --compare
-      rigidimeter model elbow.csv --terms inertia,damping,stiffness,offset,coulomb --band-hz 0 20
+      rigidimeter model ankle.csv --terms inertia,stiffness,reflex --compare
+      rigidimeter model elbow.csv --terms inertia,stiffness,coulomb --band-hz 0 20
     """
     from rigidimeter.analysis.estimation.terms import candidates, parse_terms
     from rigidimeter.analysis.study.torque_models import model_document, model_recording

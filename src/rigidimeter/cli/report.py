@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigidimeter.cli.help_pages import WRITE
 from rigidimeter.cli.inputs import (
     analyse_recordings,
     analyse_study_folder,
@@ -30,25 +31,34 @@ if TYPE_CHECKING:
 @reads_recordings
 def report(
     recordings: Recordings,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the report.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="DIR",
+            help="Folder of the report.",
+            rich_help_panel=WRITE,
+        ),
+    ],
     title: Annotated[
         str | None,
         typer.Option(
             "--title",
             metavar="TEXT",
             help="Title of the page. Default: the title of the study, or Joint rigidity.",
+            rich_help_panel=WRITE,
         ),
     ] = None,
     key: KeyOption = None,
 ) -> None:
-    """Analyse recordings and write one self-contained HTML page, with its tables and figures.
+    """Write one HTML page of results, with its tables and figures.
 
     For a study folder (with a study.toml) the page also shows tests by days, effect sizes, ratings,
     other methods and every exclusion.
 
     \b
     For example:
-      rigidimeter report demo-study/sessions/day-1 demo-study/sessions/day-2 --out report
+      rigidimeter report demo-study/sessions/day-1 --out report
       rigidimeter report study --out study/report
       rigidimeter report ankle.csv --reaction --epoch-length-s 20 --out report
     """

@@ -24,7 +24,7 @@ def reproduce(
         typer.Option("--only", metavar="ID", help="Only this row; repeat for several."),
     ] = None,
 ) -> None:
-    """Recompute every equation, figure and table of the paper, next to the printed values.
+    """Recompute every equation, figure and table of the paper.
 
     Writes one self-contained page, paper.html, with a verdict for each row, ledger.json with the
     same rows, and the figures. The recordings of the animal were never published; rows that need

@@ -54,8 +54,8 @@ def recording(tmp_path: Path) -> Path:
 
 def test_the_help_names_it(rigidimeter, estimator):
     named = "robust (least squares in which large residuals count less)"
-    assert named not in " ".join(rigidimeter("estimate", "--help").out.split())
-    ran = rigidimeter("--load", estimator, "estimate", "--help")
+    assert named not in " ".join(rigidimeter("estimate", "--help-all").out.split())
+    ran = rigidimeter("--load", estimator, "estimate", "--help-all")
     assert named in " ".join(ran.out.split())
     assert "bandlimited (least squares" in " ".join(ran.out.split())
 
@@ -112,7 +112,7 @@ def test_a_check_may_say_where_its_failure_is_harmless(
 def test_a_term_of_the_torque_is_one_entry(rigidimeter, recording, tmp_path):
     path = tmp_path / "quintic.py"
     path.write_text(TERM)
-    assert "quintic" in rigidimeter("--load", path, "model", "--help").out
+    assert "quintic" in rigidimeter("--load", path, "model", "--help-all").out
     ran = rigidimeter("--load", path, "model", recording, "--terms", "stiffness,quintic")
     assert ran.status == 0, ran.err
     assert "N·m/rad⁵" in ran.out
@@ -130,7 +130,7 @@ def test_a_term_of_the_torque_is_one_entry(rigidimeter, recording, tmp_path):
 def test_a_file_that_cannot_be_loaded_is_named(rigidimeter, tmp_path, name, text, words):
     if text is not None:
         (tmp_path / name).write_text(text)
-    ran = rigidimeter("--load", tmp_path / name, "estimate", "--help")
+    ran = rigidimeter("--load", tmp_path / name, "estimate", "--help-all")
     assert ran.status == 1
     assert words in ran.err
 
@@ -138,7 +138,7 @@ def test_a_file_that_cannot_be_loaded_is_named(rigidimeter, tmp_path, name, text
 def test_an_interruption_is_one_line(rigidimeter, tmp_path):
     path = tmp_path / "interrupts.py"
     path.write_text("raise KeyboardInterrupt")
-    ran = rigidimeter("--load", path, "estimate", "--help")
+    ran = rigidimeter("--load", path, "estimate", "--help-all")
     assert (ran.status, ran.err.strip()) == (130, "rigidimeter: interrupted")
 
 
