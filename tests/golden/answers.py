@@ -17,7 +17,7 @@ KEPT = re.compile(
     r"|percent|percent_low|percent_high|rho\w*|reml_deviance|variance\w*|means?|means_se"
     r"|held_out_vaf_percent|vaf_percent|recommended|aic|method|epochs|sound|doubted|doubt"
     r"|covered|half_power_hz|bandwidth_hz|gain_margin_db|delay_margin_s|angle_sd_rad|cost_percent"
-    r"|total_s|within|ours|epochs_needed|power|planned_power|corrected|(?!n_samples)n_samples"
+    r"|total_s|within|ours|subjects_needed|day_sd|power|corrected|(?!n_samples)n_samples"
 )
 """Keys whose value is an answer; names, texts and what else describes the input are none."""
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from rigidimeter.cli.design_screen import days_needed
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
 from rigidimeter.core.units import deg_from_rad, rad_from_deg
 from rigidimeter.model import Margins
 from rigidimeter.planning import (
     Candidate,
     Design,
-    Detection,
     MultisineComparison,
     chip_count,
     prbs_period_s,
@@ -21,7 +21,6 @@ from rigidimeter.planning import (
 
 _SHOWN = 8
 _HEADS = ("J\nkg·m²", "B\nN·m·s/rad", "K\nN·m/rad")
-_UNITS = {"inertia": "kg·m²", "damping": "N·m·s/rad", "stiffness": "N·m/rad"}
 _EQUAL = {
     "prbs": "PRBS",
     "same_peak_torque": "same peak torque",
@@ -30,13 +29,14 @@ _EQUAL = {
 }
 
 
-def design_blocks(design: Design, power: float, alpha: float) -> Iterator[Block]:
-    """Yield the text, section by section; `power` and `alpha` are those that were asked for."""
+def design_blocks(design: Design) -> Iterator[Block]:
+    """Yield the text, section by section."""
     sections = [
         part(design)
         for part in (_prbs, _sinusoid, _controller, _bandwidth, _protocol, _stability, _precision)
     ]
-    sections += [_detection(found, power, alpha) for found in design.detections]
+    if design.detections:
+        sections.append(days_needed(design.detections))
     if design.ranked is not None:
         sections.append(_ranking(design, design.ranked))
     if design.multisine is not None:
@@ -260,29 +260,3 @@ def _multisine(found: MultisineComparison) -> Iterator[Block]:
             (_EQUAL[what], *(f"{value:.3g}" for value in values)) for what, values in errors.items()
         ]
         yield Table((f"subject {name}", *_HEADS), rows, "<>>>")
-
-
-def _detection(found: Detection, power: float, alpha: float) -> Iterator[Block]:
-    """Yield how many epochs a difference needs."""
-    wanted, effect = found.wanted, found.effect
-    unit = _UNITS[wanted.parameter]
-    share = f" ({wanted.amount:g} %)" if wanted.percent else ""
-    yield Heading(
-        f"To detect a {wanted.parameter} different by {abs(effect.difference):.4g} {unit}{share} "
-        f"from subject {found.condition}"
-    )
-    yield f"  an epoch's value scatters by {effect.sd_x:.3g} and {effect.sd_y:.3g} {unit}"
-    yield (
-        f"  (standard error of iv, and {found.cv_percent:g} % from epoch to epoch: "
-        f"subject.{found.condition}.{wanted.parameter}_cv_percent)"
-    )
-    yield (
-        f"  {found.needed} epochs in each condition give a power of "
-        f"{found.power:.2f} (wanted {power:g}; rank-sum test at {alpha:g})"
-    )
-    yield "  power with " + ", ".join(f"{n}: {value:.2f}" for n, value in found.powers.items())
-    if found.planned is not None:
-        yield (
-            f"  the protocol's {found.planned[0]} and {found.planned[1]} epochs give "
-            f"{found.planned_power:.2f}"
-        )

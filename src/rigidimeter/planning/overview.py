@@ -1,7 +1,7 @@
 """Everything that will be commanded under one set of settings, and what will come of it.
 
 `design` computes it once: the perturbations and their band, the session, what the arm will do, the
-stability of the loop, the standard errors to expect and, where asked for, the epochs needed, a
+stability of the loop, the standard errors to expect and, where asked for, the days needed, a
 better PRBS and a multisine. `rigidimeter design` prints what it returns.
 """
 
@@ -21,7 +21,13 @@ from rigidimeter.core.records import readonly
 from rigidimeter.core.session import Protocol
 from rigidimeter.core.settings import Settings, settings_from
 from rigidimeter.model import JointDynamics, Stability, loop_stability, median_joint
-from rigidimeter.planning.epochs_needed import Detection, WantedDifference, detect, planned_epochs
+from rigidimeter.planning.days_needed import (
+    Detection,
+    Scatter,
+    WantedDifference,
+    detect,
+    planned_epochs,
+)
 from rigidimeter.planning.joint_bandwidth import APPENDIX_A, Corners, Forearm, corners
 from rigidimeter.planning.motion_demand import (
     Demand,
@@ -77,7 +83,7 @@ class Design:
         A sentence for each limit of the guard that a perturbation would pass, and for a sinusoid
         too short for the cycles to be scored; those on stability are in `stability`.
     detections : tuple of Detection
-        Epochs needed for each difference that was asked for.
+        Days, epochs a day and subjects needed for each difference that was asked for.
     criterion : str or None
         Of the search for a better PRBS, if there was one.
     present : Candidate or None
@@ -132,6 +138,7 @@ def design(
     differences: Sequence[str] = (),
     power: float = 0.8,
     alpha: float = 0.05,
+    scatter: Mapping[str, Scatter] | None = None,
     search: str | None = None,
     with_multisine: bool = False,
     forearm: Forearm | None = None,
@@ -141,16 +148,18 @@ def design(
     """Compute what will be commanded and what will come of it.
 
     Where the loop is unstable with the joint of a condition, that condition has no standard errors,
-    and there is no search, multisine or number of epochs.
+    and there is no search, multisine or number of days.
 
     Parameters
     ----------
     settings : Settings, path, mapping or None
         None stands for the defaults.
     differences : sequence of str
-        Differences for which to find the epochs needed, such as ``"damping=20%"``.
+        Differences for which to find the days and epochs needed, such as ``"damping=20%"``.
     power, alpha : float
-        Power and level of the rank-sum test for them.
+        Power and level of the test by days for them.
+    scatter : mapping of str to Scatter, optional
+        How much inertia, damping and stiffness vary, by name; without it what is assumed.
     search : {"minimax", "A", "D"}, optional
         Search for a better PRBS by this criterion.
     with_multisine : bool
@@ -210,7 +219,7 @@ def design(
         remarks=remarks,
         warnings=tuple(warnings),
         detections=tuple(
-            detect(chosen, perturbation_nm, difference, power=power, alpha=alpha)
+            detect(chosen, perturbation_nm, difference, scatter=scatter, power=power, alpha=alpha)
             for difference in wanted
             if stable
         ),

@@ -6,7 +6,6 @@ Epochs of one day share what the day was like, so they are no independent draws.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import t as t_distribution
 
 from rigidimeter.analysis.statistics.contrasts import interval_of
+from rigidimeter.analysis.statistics.day_components import day_components
 from rigidimeter.analysis.statistics.day_levels import SubjectEpochs, test_by_levels
 from rigidimeter.analysis.statistics.ranks import exact_ranksum
 from rigidimeter.analysis.statistics.summary import checked_sample
@@ -175,7 +175,7 @@ def day_difference(
         n_days_x=have[0],
         n_days_y=have[1],
         p_days=_p_of_medians(epochs),
-        day_share=_day_share(epochs),
+        day_share=day_components(epochs).day_share,
         offsets=tuple(name for name, there in parts if there),
         confidence=confidence,
         n_days_both=both,
@@ -191,28 +191,6 @@ def day_medians(values: ArrayLike, days: Sequence[str]) -> dict[str, float]:
     sample = np.asarray(values, dtype=np.float64)
     labels = np.asarray(days, dtype=object)
     return {str(day): float(np.median(sample[labels == day])) for day in dict.fromkeys(days)}
-
-
-def _day_share(epochs: SubjectEpochs) -> float:
-    """Return σ_d²/(σ_d² + σ²) by mean squares between and within the days of each condition."""
-    between = within = size = 0.0
-    df_between = df_within = 0
-    for own, k in itertools.product(epochs.values(), (0, 1)):
-        days = [np.array(by[k]) for by in own.values() if by[k]]
-        if not days:
-            continue
-        n = np.array([day.size for day in days])
-        means = np.array([day.mean() for day in days])
-        between += float(n @ (means - n @ means / n.sum()) ** 2)
-        within += sum(float(np.sum((day - day.mean()) ** 2)) for day in days)
-        size += n.sum() - n @ n / n.sum()
-        df_between += n.size - 1
-        df_within += int(n.sum()) - n.size
-    if not df_between or not df_within or not between + within:
-        return math.nan
-    residual = within / df_within
-    of_days = max((between / df_between - residual) * df_between / size, 0.0)
-    return of_days / (of_days + residual)
 
 
 def _p_of_medians(epochs: SubjectEpochs) -> float:

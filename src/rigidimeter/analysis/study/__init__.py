@@ -20,6 +20,7 @@ from rigidimeter.analysis.study.conclusions import (
     conclude,
     conclusion_rows,
 )
+from rigidimeter.analysis.study.day_scatter import DayScatter, day_scatter
 from rigidimeter.analysis.study.differences import Difference
 from rigidimeter.analysis.study.doubted_epochs import doubt_sentence
 from rigidimeter.analysis.study.measures import RATING, Measure, Observation, conditions
