@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from decimal import Decimal
 
 from rigidimeter.cli.design_screen import days_needed
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
@@ -20,7 +21,10 @@ from rigidimeter.planning import (
 )
 
 _SHOWN = 8
-_HEADS = ("J\nkg·m²", "B\nN·m·s/rad", "K\nN·m/rad")
+_HEADS = ("J\n10⁻³ kg·m²", "B\nN·m·s/rad", "K\nN·m/rad")
+_SCALES = (1e3, 1.0, 1.0)
+"""To the units of `_HEADS`, as J is written everywhere."""
+
 _EQUAL = {
     "prbs": "PRBS",
     "same_peak_torque": "same peak torque",
@@ -133,7 +137,7 @@ def _bandwidth(design: Design) -> Iterator[Block]:
     rows = [
         (
             "".join("−0+"[sign + 1] for sign in corner.signs) if any(corner.signs) else "nominal",
-            f"{corner.joint.inertia_kg_m2:.4f}",
+            f"{1e3 * corner.joint.inertia_kg_m2:.1f}",
             f"{corner.joint.damping_nm_s_rad:.3f}",
             f"{corner.joint.stiffness_nm_rad:.2f}",
             f"{corner.bandwidth_hz:.2f}",
@@ -196,7 +200,7 @@ def _precision(design: Design) -> Iterator[Block]:
         ]
         if counts[name] > 1:
             errors.insert(2, (f"iv, {counts[name]} epochs pooled", found.iv_pooled(counts[name])))
-        rows = [(what, *map(_error, values, found.values)) for what, values in errors]
+        rows = [(what, *map(_error, values, found.values, _SCALES)) for what, values in errors]
         yield Table((f"subject {name}", *_HEADS), rows, "<>>>")
         if any(found.least_squares_bias):
             off = ", ".join(
@@ -216,8 +220,20 @@ def _band(band_hz: tuple[float, float]) -> str:
     return f"{low:.2g}–{high:.2g} Hz"
 
 
-def _error(error: float, value: float) -> str:
-    return f"{error:.2g} ({100.0 * error / value:.2g} %)" if value else f"{error:.2g}"
+def _error(error: float, value: float, scale: float) -> str:
+    share = f" ({100.0 * error / value:.2g} %)" if value else ""
+    return _plain(scale * error) + share
+
+
+def _plain(value: float, digits: int = 2) -> str:
+    """Return a number of so many digits without an exponent.
+
+    Examples
+    --------
+    >>> _plain(0.00009163), _plain(0.01234, 3)
+    ('0.000092', '0.0123')
+    """
+    return f"{Decimal(f'{value:.{digits}g}'):f}"
 
 
 def _ranking(design: Design, ranked: tuple[Candidate, ...]) -> Iterator[Block]:
@@ -257,6 +273,10 @@ def _multisine(found: MultisineComparison) -> Iterator[Block]:
     )
     for name, errors in found.errors.items():
         rows = [
-            (_EQUAL[what], *(f"{value:.3g}" for value in values)) for what, values in errors.items()
+            (
+                _EQUAL[what],
+                *(_plain(scale * value, 3) for scale, value in zip(_SCALES, values, strict=True)),
+            )
+            for what, values in errors.items()
         ]
         yield Table((f"subject {name}", *_HEADS), rows, "<>>>")

@@ -126,9 +126,28 @@ class Design:
         columns = ["condition", "method", *(f"{name}_se" for name in PARAMETER_NAMES)]
         return pd.DataFrame(rows, columns=columns).set_index(["condition", "method"])
 
+    def days(self) -> pd.DataFrame:
+        """Return the days and subjects needed, one row a difference and number of epochs a day.
+
+        A number above 1000 is missing.
+        """
+        import pandas as pd
+
+        rows = [
+            (found.wanted.parameter, found.difference, each.epochs[0], *counts)
+            for found in self.detections
+            for each in found.needed
+            for counts in [(each.days, each.days_holm, each.subjects)]
+        ]
+        of = ["parameter", "difference", "epochs_a_day"]
+        needed = ["days_needed", "days_needed_holm", "subjects_needed"]
+        return pd.DataFrame(rows, columns=[*of, *needed]).set_index(of).astype("Int64")
+
     def _repr_html_(self) -> str:
         sentences = [*self.warnings, *self.stability.warnings, *self.remarks]
         table = str(self.table().to_html())
+        if self.detections:
+            table += str(self.days().to_html())
         return table + "".join(f"<p>{html.escape(sentence)}</p>" for sentence in sentences)
 
 

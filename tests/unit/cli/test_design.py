@@ -4,6 +4,7 @@ import csv
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -124,8 +125,8 @@ def test_prints_what_is_predicted() -> None:
         "subject OFF 28.3 dB 92.1 deg 1472 ms 0.95 stable",
         "worst joint around it 16.2 dB",
         "each of J, B, K from 0.25 to 4 times its value",
-        "iv, 0.1–30 Hz 2.8e-06 (0.062 %) 8.7e-05 (0.064 %) 0.00047 (0.027 %)",
-        "least squares, 3.6e-06 (0.079 %) 9.2e-05 (0.067 %) 0.00055 (0.031 %) passive arm,",
+        "iv, 0.1–30 Hz 0.0028 (0.062 %) 0.000087 (0.064 %) 0.00047 (0.027 %)",
+        "least squares, 0.0036 (0.079 %) 0.000092 (0.067 %) 0.00055 (0.031 %) passive arm,",
         "iv, 4 epochs pooled",
     ):
         assert expected in words
@@ -267,6 +268,27 @@ def test_the_scatter_comes_from_a_study(tmp_path: Path) -> None:
     assert 0 < scatter["between_epochs_percent"] < 60
     assert not (small_study / "analysis").exists()
     assert f"stiffness {scatter['between_epochs_percent']:.2g}, " in text
+
+
+def test_a_study_without_days_of_both_conditions_has_half_the_variance(tmp_path: Path) -> None:
+    off, dbs = tiny(prbs=4).conditions
+    apart = replace(tiny(), conditions=(replace(off, days=(1, 2)), replace(dbs, days=(3, 4))))
+    study, numbers = tmp_path / "study", tmp_path / "numbers.json"
+    write_virtual_study(study, apart, 1, processes=1)
+    run("--detect", "damping=20%", "--from", str(study), "--json", str(numbers))
+    (found,) = json.loads(numbers.read_text())["detection"]
+    scatter = found["scatter"]
+    of_days = scatter["between_days_percent"]
+    assert scatter["condition_in_day_percent"] == pytest.approx(of_days * 0.5**0.5)
+    assert "no two days with both conditions" in scatter["source"]
+
+
+def test_a_study_of_one_day_cannot_say_how_days_differ(tmp_path: Path) -> None:
+    one_day = tuple(replace(each, days=(1,)) for each in tiny(prbs=2).conditions)
+    study = tmp_path / "study"
+    write_virtual_study(study, replace(tiny(), conditions=one_day), 1, processes=1)
+    with pytest.raises(UserError, match=r"how much J differs between days is unknown"):
+        run("--detect", "damping=20%", "--from", str(study))
 
 
 def test_a_folder_that_is_no_study_is_named(tmp_path: Path) -> None:
