@@ -13,14 +13,13 @@ import typer
 from rigidimeter.cli.inputs import analyse_recordings, keep_inputs, say_analysed
 from rigidimeter.cli.options import CsvOption, JsonOption
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
-from rigidimeter.cli.terminal_tables import Block, Heading, Table, number_text, show, with_error
+from rigidimeter.cli.terminal_tables import Block, Heading, Table, number_text, show
+from rigidimeter.core.text import with_error
 
 if TYPE_CHECKING:
     from rigidimeter.analysis.study import StudyResult
     from rigidimeter.core.records import Analysis, Fit, Score
     from rigidimeter.core.settings import ScoreSettings
-
-_DIGITS = ("#.5g", "#.4g", "#.4g")
 
 
 @reads_recordings
@@ -124,7 +123,7 @@ def _delays(analysis: Analysis) -> list[Block]:
             done = "corrected" if delay.corrected else delay.remark
             side = "later" if delay.delay_s > 0 else "earlier"
             lines.append(
-                f"Torque {1e3 * abs(delay.delay_s):.3g} ± {1e3 * delay.delay_s_se:.2g} ms {side} "
+                f"Torque {with_error(1e3 * abs(delay.delay_s), 1e3 * delay.delay_s_se)} ms {side} "
                 f"than the motion in {delay.source}: {done}."
             )
         elif delay.remark and any(fit.source == delay.source for fit in analysis.fits):
@@ -217,19 +216,18 @@ def _fit_table(fits: Sequence[Fit], checked: Sequence[Fit], first: int = 0) -> T
             fit.epoch,
             fit.condition,
             *(
-                with_error(factor * fit.value[i], factor * fit.se[i], _DIGITS[i])
+                with_error(factor * fit.value[i], factor * fit.se[i])
                 for i, (factor, _) in scales.items()
             ),
-            number_text(fit.r_squared, ".4f"),
             number_text(fit.vaf_percent, ".2f"),
         )
         for fit in fits
     ]
     doubts = [f"doubt: {', '.join(fit.doubts)}" if fit.doubts else "" for fit in checked]
     return Table(
-        ("epoch", "condition", *headings, "R²", "VAF\n%"),
+        ("epoch", "condition", *headings, "VAF\n%"),
         _by_source(fits, rows, doubts),
-        "<<" + ">" * (len(shown) + 2),
+        "<<" + ">" * (len(shown) + 1),
     )
 
 

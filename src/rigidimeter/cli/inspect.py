@@ -12,6 +12,7 @@ from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import Table, show
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.text import with_error
 
 if TYPE_CHECKING:
     from rigidimeter.analysis.reading.channels.inspection import Inspection
@@ -84,7 +85,7 @@ def _inspect(
         options = joined_options(options)
         joining = _joining_words(recordings, given)
         if offset is not None:
-            echo(f"clock offset: {offset.value_s:.4f} ± {offset.error_s:.2g} s")
+            echo(f"clock offset: {with_error(offset.value_s, offset.error_s)} s")
     else:
         content = read_content(paths[0], options)
         if not isinstance(content, Table):

@@ -12,8 +12,9 @@ from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import JsonOption
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
-from rigidimeter.cli.terminal_tables import Block, Heading, Table, show, with_error
+from rigidimeter.cli.terminal_tables import Block, Heading, Table, show
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.text import with_error
 
 if TYPE_CHECKING:
     from rigidimeter.analysis.estimation.terms import Comparison, ModelRow
@@ -156,7 +157,7 @@ def _fit_blocks(row: ModelRow) -> list[Block]:
     rows = [
         (
             f"{one.term} {one.name}".strip(),
-            with_error(one.value, one.standard_error, ".5g"),
+            with_error(one.value, one.standard_error),
             one.unit,
         )
         for one in fit.parameters
@@ -168,7 +169,7 @@ def _fit_blocks(row: ModelRow) -> list[Block]:
         *(f"    {remark}" for remark in fit.remarks),
         *(
             f"    {one.term} from what no linear loop explains: "
-            f"{with_error(one.value, one.standard_error, '.5g')} {one.unit}"
+            f"{with_error(one.value, one.standard_error)} {one.unit}"
             for one in row.beyond
         ),
     ]

@@ -197,23 +197,3 @@ def _widths(columns: Sequence[str], align: Sequence[str], room: int) -> list[int
 def number_text(value: float, digits: str = ".2g") -> str:
     """Return a number, or a dash where there is none."""
     return "–" if math.isnan(value) else f"{value:{digits}}"
-
-
-def with_error(value: float, standard_error: float, digits: str) -> str:
-    """Return a number ± its standard error to the same decimal, or alone without an error.
-
-    The error has two digits if they are below 36 and one above, as the Particle Data Group rounds.
-
-    Examples
-    --------
-    >>> with_error(0.136801, 8.7e-05, ".4g"), with_error(4.50012, 0.00281, ".5g")
-    ('0.13680±0.00009', '4.5001±0.0028')
-    """
-    shown = number_text(value, digits)
-    if math.isnan(standard_error):
-        return shown
-    if not 1e-8 < standard_error < 1e4 or not abs(value) < 1e6:
-        return f"{shown}±{standard_error:.2g}"
-    size = math.floor(math.log10(standard_error))
-    decimals = max((1 if standard_error < 3.55 * 10.0**size else 0) - size, 0)
-    return f"{value:.{decimals}f}±{standard_error:.{decimals}f}"

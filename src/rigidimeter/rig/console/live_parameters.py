@@ -31,6 +31,7 @@ from dataclasses import dataclass
 from statistics import NormalDist, median
 
 from rigidimeter.core.settings import OnlineSettings
+from rigidimeter.core.text import with_error
 from rigidimeter.rig.acquisition.processes import LiveEstimate
 
 MAX_PART = 0.5
@@ -79,9 +80,7 @@ class LiveValue:
         """The value with its interval and unit, or why there is none."""
         if not self.settled:
             return f"{self.symbol} {self.why_not}"
-        # As many digits as the interval gives: two of its half width.
-        digits = max(0, 1 - math.floor(math.log10(self.half_width))) if self.half_width > 0 else 4
-        return f"{self.symbol} {self.value:.{digits}f} ± {self.half_width:.{digits}f} {self.unit}"
+        return f"{self.symbol} {with_error(self.value, self.half_width)} {self.unit}"
 
 
 def settling_s(settings: OnlineSettings) -> float:
