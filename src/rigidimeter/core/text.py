@@ -26,18 +26,48 @@ def with_error(value: float, standard_error: float) -> str:
     if math.isnan(value):
         return "–"
     if not standard_error > 0:
-        shown = f"{value:.4g}"
-    elif not 1e-9 * abs(value) < standard_error < math.inf:
-        shown = f"{value:.4g} ± {standard_error:.2g}"
-    else:
-        size = max(abs(value), standard_error)
-        power = 0 if _PLAIN[0] <= size < _PLAIN[1] else 3 * math.floor(math.log10(size) / 3)
-        number, error = value / 10.0**power, standard_error / 10.0**power
-        place = int(f"{error:.1e}".partition("e")[2]) - 1  # of the last of the two digits
-        rounded = (round(one, -place) + 0.0 for one in (number, error))
-        times = f"e{power}" if power else ""
-        shown = " ± ".join(f"{one:.{max(-place, 0)}f}{times}" for one in rounded)
-    return f"−{shown[1:]}" if shown.startswith("-") else shown
+        power = _power_of_ten(value)
+        return _minus(f"{value / 10.0**power:.4g}{f'e{power}' * bool(power)}")
+    if not 1e-9 * abs(value) < standard_error < math.inf:
+        return _minus(f"{value:.4g} ± {standard_error:.2g}")
+    return " ± ".join(_to_the_error((value, standard_error), standard_error))
+
+
+def interval_text(low: float, high: float) -> str:
+    """Return a 95 % interval to the place of its standard error, a dash where there is none.
+
+    Examples
+    --------
+    >>> interval_text(1.6704, 1.7372), interval_text(-0.0005, 0.0041), interval_text(math.nan, 1.0)
+    ('1.670 to 1.737', '−0.5e-3 to 4.1e-3', '–')
+    """
+    if not -math.inf < low < high < math.inf:
+        return "–"
+    return " to ".join(_to_the_error((low, high), (high - low) / 4))
+
+
+def _to_the_error(numbers: Sequence[float], error: float) -> Iterable[str]:
+    """Return numbers with one power of ten, to the place of the second digit of an error."""
+    power = _power_of_ten(max(map(abs, numbers)))
+    place = int(f"{error / 10.0**power:.1e}".partition("e")[2]) - 1
+    times = f"e{power}" if power else ""
+    rounded = (round(one / 10.0**power, -place) + 0.0 for one in numbers)
+    return (_minus(f"{one:.{max(-place, 0)}f}{times}") for one in rounded)
+
+
+def _power_of_ten(number: float) -> int:
+    size = abs(number)
+    plain = not size or math.isinf(size) or _PLAIN[0] <= size < _PLAIN[1]
+    return 0 if plain else 3 * math.floor(math.log10(size) / 3)
+
+
+def _minus(text: str) -> str:
+    return f"−{text[1:]}" if text.startswith("-") else text
+
+
+def plural(count: int, noun: str) -> str:
+    """Return ``1 epoch`` or ``2 epochs``."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def one_line(*parts: str, joint: str = "; ") -> str:

@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.records import readonly
+from rigidimeter.core.records import PARAMETERS, readonly
 from rigidimeter.core.session import Protocol
 from rigidimeter.core.settings import Settings, settings_from
+from rigidimeter.core.text import one_line, plural
 from rigidimeter.model import JointDynamics, Stability, loop_stability, median_joint
 from rigidimeter.planning.epochs_needed import Detection, WantedDifference, detect, planned_epochs
 from rigidimeter.planning.joint_bandwidth import APPENDIX_A, Corners, Forearm, corners
@@ -120,9 +121,29 @@ class Design:
         columns = ["condition", "method", *(f"{name}_se" for name in PARAMETER_NAMES)]
         return pd.DataFrame(rows, columns=columns).set_index(["condition", "method"])
 
+    def __repr__(self) -> str:
+        """Return the perturbation and what one epoch will tell, as one line."""
+        prbs, stable = self.settings.prbs, all(m.stable for m in self.stability.conditions.values())
+        warned = len(self.warnings) + len(self.stability.warnings)
+        errors = [
+            f"{condition} standard errors of one epoch: "
+            + ", ".join(
+                f"{p.symbol} {se:.2g} {p.unit}"
+                for p, se in zip(PARAMETERS, found.iv.free, strict=True)
+            )
+            for condition, found in self.precision.items()
+        ]
+        return one_line(
+            f"PRBS of {2**prbs.register_bits - 1} chips at {prbs.clock_hz:g} Hz, "
+            f"{prbs.amplitude_nm:g} N·m, {prbs.duration_s:g} s",
+            "" if stable else "the loop is unstable",
+            *errors,
+            plural(warned, "warning") if warned else "",
+        )
+
     def _repr_html_(self) -> str:
         sentences = [*self.warnings, *self.stability.warnings, *self.remarks]
-        table = str(self.table().to_html())
+        table = str(self.table().to_html(float_format="{:.2g}".format))
         return table + "".join(f"<p>{html.escape(sentence)}</p>" for sentence in sentences)
 
 

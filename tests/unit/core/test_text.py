@@ -25,6 +25,8 @@ def test_the_examples_of_the_docstrings_hold() -> None:
         (123456.0, 789.0, "123.46e3 ± 0.79e3"),
         (np.float64(1.5), np.float64(math.nan), "1.5"),
         (1.5, 0.0, "1.5"),
+        (-4.53712e-3, math.nan, "−4.537e-3"),
+        (0.0, math.nan, "0"),
         (1.5, math.inf, "1.5 ± inf"),
         (1.5, 1e-14, "1.5 ± 1e-14"),
         (math.nan, 0.1, "–"),

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from html import escape
 from os import PathLike
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from rigidimeter.analysis.reading.channels.joining import join_tables, joined_options, offset_notice
@@ -22,6 +25,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import noted_digests
 from rigidimeter.core.records import Epoch, Notice, Task
 from rigidimeter.core.settings import Settings, load_settings, settings_from
+from rigidimeter.core.text import html_table, one_line, plural
 
 _RECORDED_WITH = ("controller", "guard", "prbs", "sinusoid", "rig")
 _ANALYSED_WITH = ("estimation", "scores")
@@ -58,6 +62,43 @@ class Recording:
     def failed(self) -> bool:
         """Whether something that was asked for could not be read."""
         return any(notice.level == "error" for notice in self.notices)
+
+    def __repr__(self) -> str:
+        """Return what was read as one line."""
+        named = [path.name or str(path) for path in self.paths]
+        more = f" and {len(named) - 3} more" if len(named) > 3 else ""
+        counts = Counter(epoch.condition for epoch in self.epochs)
+        length_s, rate_hz = _length_and_rate(self.epochs)
+        return one_line(
+            f"{', '.join(named[:3])}{more}",
+            f"{plural(len(self.epochs), 'epoch')} of {length_s} s at {rate_hz} samples/s",
+            ", ".join(f"{name} {count}" for name, count in counts.items() if name),
+            ", ".join(dict.fromkeys(name for epoch in self.epochs for name in epoch.channels)),
+            plural(len(self.notices), "notice") if self.notices else "",
+        )
+
+    def _repr_html_(self) -> str:
+        """Return a table with a row for each source and condition, and the notices."""
+        parts: dict[tuple[str, str], list[Epoch]] = {}
+        for epoch in self.epochs:
+            parts.setdefault((epoch.source, epoch.condition), []).append(epoch)
+        rows = [
+            [*key, str(len(own)), *_length_and_rate(own), ", ".join(own[0].channels)]
+            for key, own in parts.items()
+        ]
+        heading = ["recording", "condition", "epochs", "length, s", "samples/s", "channels"]
+        notices = [f"<p>{escape(f'{one.level}: {one.text}')}</p>" for one in self.notices]
+        return "\n".join([html_table(heading, rows), *notices])
+
+
+def _length_and_rate(epochs: Iterable[Epoch]) -> tuple[str, str]:
+    """Return the median length in s and the median rate in samples/s of the fastest channel."""
+    longest = [max(epoch.channels.values(), key=len) for epoch in epochs if epoch.channels]
+    stamped = [channel for channel in longest if len(channel) > 1]
+    if not stamped:
+        return "–", "–"
+    length_s = median(float(one.time_s[-1] - one.time_s[0]) + 1 / one.rate_hz for one in stamped)
+    return f"{length_s:.3g}", f"{median(one.rate_hz for one in stamped):.4g}"
 
 
 def read(

@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterable, Sequence
 from pathlib import PurePath
 
+from rigidimeter.core.text import plural as plural
+
 SMALLEST_P = 1e-300
 """Below this a p-value has run out of floating point."""
 
@@ -107,11 +109,6 @@ def p_and_r(p: float, r: float) -> str:
     """
     text = f"p = {p_value(p)}, r = {r:.2f}".replace("= <", "<").replace("= -", "= −")
     return text.replace(" =", "\N{NO-BREAK SPACE}=").replace("= ", "=\N{NO-BREAK SPACE}")
-
-
-def plural(count: int, noun: str) -> str:
-    """Return ``1 epoch`` or ``2 epochs``."""
-    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def series(items: Sequence[str]) -> str:

@@ -17,9 +17,17 @@ from rigidimeter.analysis.study.measures import Measure
 from rigidimeter.analysis.study.ratings_found import RatingsFound
 from rigidimeter.core.records import Analysis, Epoch, Fit, Notice, Score
 from rigidimeter.core.settings import Settings
+from rigidimeter.core.text import one_line, with_error
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_READ = (
+    *("measure", "unit", "reference", "other", "n_reference", "n_other"),
+    *("median_reference", "median_other", "shift", "shift_low", "shift_high"),
+    *("p_holm", "days_p_holm"),
+)
+"""The columns of a table that is read by people."""
 
 
 @dataclass(frozen=True)
@@ -231,15 +239,33 @@ class StudyResult:
         """Return the comparison of a measure by its stored name."""
         return next((each for each in self.comparisons if each.measure.name == measure), None)
 
-    def table(self) -> pd.DataFrame:
-        """Return the comparisons as a pandas table, a row for each measure."""
+    def table(self, *, full: bool = False) -> pd.DataFrame:
+        """Return the comparisons as a pandas table, a row for each measure.
+
+        Parameters
+        ----------
+        full : bool
+            All columns of ``rigidimeter compare --csv``. Otherwise measure, unit and conditions,
+            the number of values and their median in each, the shift (reference − other) with its
+            95 % interval, p of the rank-sum test after Holm and, of a study, p by days after Holm.
+        """
         import pandas as pd
 
-        return pd.DataFrame(comparison_rows((*self.comparisons, *self.further)))
+        found = pd.DataFrame(comparison_rows((*self.comparisons, *self.further)))
+        return found if full else found[[name for name in _READ if name in found.columns]]
+
+    def __repr__(self) -> str:
+        """Return the medians of both conditions in each measure as one line."""
+        shown = []
+        for c in self.comparisons:
+            found = [c.summaries[name] for name in c.pair if name in c.summaries]
+            medians = " and ".join(with_error(s.median, math.nan) for s in found)
+            shown.append(one_line(c.measure.title, medians, c.measure.unit, joint=" "))
+        pair = " and ".join(name for name in (self.reference, self.other) if name)
+        medians = f"medians: {', '.join(shown)}" if shown else ""
+        return one_line(self.title, pair, medians)
 
     def _repr_html_(self) -> str:
-        columns = ["title", "unit", "median_reference", "median_other", "shift", "shift_low",
-                   "shift_high", "p", "p_holm", "r", "days_p", "days_p_holm"]  # fmt: skip
-        shown = self.table().reindex(columns=columns).dropna(axis="columns", how="all")
-        heading = f"{self.title}: {self.reference} − {self.other}".strip(": ")
+        heading = f"{self.title}: {self.reference} − {self.other}".strip(": −")
+        shown = self.table().dropna(axis="columns", how="all")
         return f"<p>{escape(heading)}</p>{shown.to_html(index=False, float_format='{:.4g}'.format)}"

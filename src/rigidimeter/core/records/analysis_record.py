@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,12 +16,23 @@ from rigidimeter.core.records.estimates import (
     Fit,
     Score,
 )
+from rigidimeter.core.text import html_table, interval_text, one_line, plural, with_error
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _MAX_SHOWN = 20
 """Epochs shown one by one; of more only the first are."""
+
+_READ = (
+    "source",
+    "epoch",
+    "condition",
+    *(p.name + ending for p in PARAMETERS for ending in ("", "_se")),
+    "vaf_percent",
+    "outcome",
+)
+"""The columns of a table that is read by people; what the checks found is the last."""
 
 
 WEIGHT_IN_STIFFNESS = (
@@ -102,11 +112,55 @@ class Analysis:
             )
         return rows or [score.row() for score in self.scores]
 
-    def table(self) -> pd.DataFrame:
-        """Return `rows` as a table, with the columns of ``rigidimeter estimate --csv``."""
+    def table(self, *, full: bool = False) -> pd.DataFrame:
+        """Return a row for each fitted epoch, or for each score of an analysis of sinusoids alone.
+
+        Parameters
+        ----------
+        full : bool
+            All columns of ``rigidimeter estimate --csv``. Otherwise source, epoch and condition,
+            J, B and K with their standard errors, the VAF in %, the outcome, and the names of the
+            findings that are more than a note.
+
+        Returns
+        -------
+        pandas.DataFrame
+        """
         import pandas as pd
 
-        return pd.DataFrame(self.rows())
+        if full or not self.fits:
+            return pd.DataFrame(self.rows())
+        rows = [
+            {name: row[name] for name in _READ} | {"findings": ", ".join(fit.doubts)}
+            for fit, row in zip(self.fits, self.rows(), strict=True)
+        ]
+        return pd.DataFrame(rows)
+
+    def __repr__(self) -> str:
+        """Return how many epochs there are, and what each condition gives, as one line."""
+        included = sum(fit.outcome.included for fit in self.fits)
+        fitted = f"{plural(len(self.fits), 'epoch')} by {self.method}, {included} included"
+        scored = f"{plural(len(self.scores), 'sinusoid')} scored"
+        several = len({fit.condition for fit in self.fits}) > 1
+        pooled = [fit for fit in self.pooled if fit.condition or not several]
+        of_each = [
+            one_line(
+                fit.condition,
+                ", ".join(
+                    f"{p.symbol} {with_error(value, se)} {p.unit}"
+                    for p, value, se in zip(PARAMETERS, fit.value, fit.se, strict=True)
+                ),
+                joint=" ",
+            )
+            for fit in pooled
+        ]
+        found = dict.fromkeys(g.first.name for g in self.findings if g.first.level != "note")
+        return one_line(
+            fitted if self.fits else "",
+            scored if self.scores else "",
+            *of_each,
+            f"findings: {', '.join(found)}" if found else "",
+        )
 
     def _repr_html_(self) -> str:
         """Return J, B and K with their 95 % intervals, what the checks found, and the scores."""
@@ -114,10 +168,11 @@ class Analysis:
         parts = [f"<p>{escape(f'Method {self.method}{reason}.')}</p>"]
         if self.fits:
             heading = ["epoch", "condition"]
-            heading += [f"{p.symbol} ({p.unit}) [95\xa0% interval]" for p in PARAMETERS]
+            heading += [f"{p.symbol}, {p.unit}" for p in PARAMETERS]
             shown = [*self.fits[:_MAX_SHOWN], *self.pooled]
-            heading += ["R²", "outcome", "doubted by"]
-            parts.append(_table(heading, [_fit_row(fit) for fit in shown]))
+            heading += ["VAF, %", "outcome", "findings"]
+            parts.append(html_table(heading, [_fit_row(fit) for fit in shown]))
+            parts.append("<p>J, B and K ± one standard error; all epochs: 95\xa0% intervals.</p>")
         if len(self.fits) > _MAX_SHOWN:
             parts.append(f"<p>The first {_MAX_SHOWN} of {len(self.fits)} epochs.</p>")
         if self.findings:
@@ -130,20 +185,20 @@ class Analysis:
                     where = f"{len(fits)}, first {where}"
                 rows.append([first.level, where, first.text, first.remedy])
             parts.append("<p>What the checks found:</p>")
-            parts.append(_table(["level", "epochs", "finding in the first", "remedy"], rows))
+            parts.append(html_table(["level", "epochs", "finding in the first", "remedy"], rows))
         if self.scores:
             rows = [
                 [
                     f"{s.source}, {s.epoch}",
                     s.condition,
-                    _number(s.impulse_nm_s),
-                    _number(s.work_j),
+                    with_error(s.impulse_nm_s, 0.0),
+                    with_error(s.work_j, 0.0),
                     f"{s.outcome.kind} {s.outcome.reason}",
                 ]
                 for s in self.scores[:_MAX_SHOWN]
             ]
             heading = ["epoch", "condition", "impulse (N·m·s)", "work (J)", "outcome"]
-            parts.append(_table(heading, rows))
+            parts.append(html_table(heading, rows))
         return "\n".join(parts)
 
 
@@ -152,23 +207,12 @@ def _in_a_cell(finding: Finding) -> str:
 
 
 def _fit_row(fit: Fit) -> list[str]:
-    intervals = [
-        f"{_number(value)} [{_number(low)}, {_number(high)}]" if math.isfinite(value) else "–"
-        for value, low, high in zip(fit.value, fit.low, fit.high, strict=True)
+    pooled = fit.epoch == "pooled"
+    numbers = [
+        f"{with_error(value, se)} ({interval_text(low, high)})" if pooled else with_error(value, se)
+        for value, se, low, high in zip(fit.value, fit.se, fit.low, fit.high, strict=True)
     ]
-    name = "all epochs" if fit.epoch == "pooled" else f"{fit.source}, {fit.epoch}"
+    name = "all epochs" if pooled else f"{fit.source}, {fit.epoch}"
     outcome = f"{fit.outcome.kind} {fit.outcome.reason}"
-    doubts = ", ".join(fit.doubts)
-    return [name, fit.condition, *intervals, _number(fit.r_squared), outcome, doubts]
-
-
-def _number(value: float) -> str:
-    return f"{value:.4g}" if math.isfinite(value) else "–"
-
-
-def _table(heading: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
-    head = "".join(f"<th>{escape(cell)}</th>" for cell in heading)
-    body = "".join(
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
-    )
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    vaf = "–" if math.isnan(fit.vaf_percent) else f"{fit.vaf_percent:.1f}"
+    return [name, fit.condition, *numbers, vaf, outcome, ", ".join(fit.doubts)]

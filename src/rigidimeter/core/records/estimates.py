@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from html import escape
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.core.records.epochs import Outcome, readonly
+from rigidimeter.core.text import html_table, interval_text, one_line, with_error
 
 
 class Parameter(NamedTuple):
@@ -182,6 +184,42 @@ class Fit:
 
     def __hash__(self) -> int:
         return hash((self.source, self.epoch, self.condition, self.method, self.outcome))
+
+    def __repr__(self) -> str:
+        """Return J, B and K with their standard errors, and how they were found, as one line."""
+        numbers = ", ".join(
+            f"{p.symbol} {with_error(value, se)} {p.unit}"
+            for p, value, se in zip(PARAMETERS, self.value, self.se, strict=True)
+            if math.isfinite(value)
+        )
+        return one_line(numbers, self.words)
+
+    @property
+    def words(self) -> str:
+        """Method, band, VAF, epoch, outcome and findings, as one line."""
+        low, high = self.band_hz
+        band = f"{low:.3g}–{high:.3g} Hz" if math.isfinite(high) else ""
+        vaf = f"VAF {self.vaf_percent:.1f} %" if math.isfinite(self.vaf_percent) else ""
+        label = "all epochs" if self.epoch == "pooled" else f"epoch {self.epoch}"
+        outcome = f"{self.outcome.kind}: {self.outcome.reason}" * (not self.outcome.included)
+        found = f"findings: {', '.join(self.doubts)}" if self.doubts else ""
+        return one_line(
+            one_line(self.method, band, vaf, joint=", "),
+            one_line(label, self.condition, joint=" "),
+            outcome,
+            found,
+        )
+
+    def _repr_html_(self) -> str:
+        """Return J, B and K with their standard errors and 95 % intervals as a table."""
+        rows = [
+            [f"{p.symbol}, {p.title}", with_error(value, se), interval_text(low, high), p.unit]
+            for p, value, se, low, high in zip(
+                PARAMETERS, self.value, self.se, self.low, self.high, strict=True
+            )
+        ]
+        table = html_table(["", "estimate ± standard error", "95\xa0% interval", "unit"], rows)
+        return f"{table}\n<p>{escape(self.words)}</p>"
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -156,7 +156,14 @@ def test_the_front_door_gives_the_same(study: Path, tmp_path: Path) -> None:
     table = found.table()
     assert list(table["measure"]) == [c.measure.name for c in found.comparisons]
     assert list(table["days_p_holm"]) == [c.days_p_holm for c in found.comparisons]
+    assert len(table.columns) == 13
+    assert table.equals(found.table(full=True)[list(table.columns)])
+    assert len(found.table(full=True).columns) > 50
     assert "Small study" in found._repr_html_()
+    work = found.comparison("work_j").summaries
+    assert repr(found).startswith("Small study; OFF and DBS; medians: ")
+    assert f"Work {work['OFF'].median:.4g} and {work['DBS'].median:.4g} J" in repr(found)
+    assert "\n" not in repr(found)
 
 
 def test_a_table_and_its_file_give_the_same(study: Path) -> None:
