@@ -40,6 +40,8 @@ from rigidimeter.planning.search import Candidate, assess, check_criterion, opti
 if TYPE_CHECKING:
     import pandas as pd
 
+    from rigidimeter.core.drawing import Axes
+
 
 @dataclass(frozen=True)
 class Design:
@@ -120,6 +122,22 @@ class Design:
         ]
         columns = ["condition", "method", *(f"{name}_se" for name in PARAMETER_NAMES)]
         return pd.DataFrame(rows, columns=columns).set_index(["condition", "method"])
+
+    def plot(self, *, axes: Sequence[Axes] | None = None) -> NDArray[Any]:
+        """Draw the perturbation, its first seconds and complete, and its power spectrum.
+
+        Parameters
+        ----------
+        axes : three matplotlib Axes, optional
+            To draw on; without them a new figure is made.
+
+        Returns
+        -------
+        array of matplotlib Axes, shape (3,)
+        """
+        from rigidimeter.core.drawing import plots
+
+        return plots.plot_design(self, axes)
 
     def __repr__(self) -> str:
         """Return the perturbation and what one epoch will tell, as one line."""

@@ -9,7 +9,7 @@ from html import escape
 from os import PathLike
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rigidimeter.analysis.reading.channels.joining import join_tables, joined_options, offset_notice
 from rigidimeter.analysis.reading.channels.mapping_file import merged, read_mapping
@@ -26,6 +26,11 @@ from rigidimeter.core.files import noted_digests
 from rigidimeter.core.records import Epoch, Notice, Task
 from rigidimeter.core.settings import Settings, load_settings, settings_from
 from rigidimeter.core.text import html_table, one_line, plural
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rigidimeter.core.drawing import Axes
 
 _RECORDED_WITH = ("controller", "guard", "prbs", "sinusoid", "rig")
 _ANALYSED_WITH = ("estimation", "scores")
@@ -62,6 +67,39 @@ class Recording:
     def failed(self) -> bool:
         """Whether something that was asked for could not be read."""
         return any(notice.level == "error" for notice in self.notices)
+
+    def plot(
+        self,
+        epoch: int = 0,
+        *,
+        span_s: float | None = 7.0,
+        axes: Sequence[Axes] | None = None,
+    ) -> NDArray[Any]:
+        """Draw perturbation, torque and angle of one epoch as recorded, not filtered.
+
+        The velocity is drawn if there is no angle. Angles are in degrees.
+
+        Parameters
+        ----------
+        epoch : int
+            Place in `epochs`.
+        span_s : float or None
+            How much is drawn, in s from the start of the epoch; None for all of it.
+        axes : matplotlib Axes, optional
+            To draw on, one for each channel; without them a new figure is made.
+
+        Returns
+        -------
+        array of matplotlib Axes, shape (number of channels,)
+
+        Raises
+        ------
+        IndexError
+            If there is no such epoch.
+        """
+        from rigidimeter.core.drawing import plots
+
+        return plots.plot_recording(self, epoch, span_s, axes)
 
     def __repr__(self) -> str:
         """Return what was read as one line."""

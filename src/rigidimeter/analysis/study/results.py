@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.statistics import (
@@ -21,6 +21,9 @@ from rigidimeter.core.text import one_line, with_error
 
 if TYPE_CHECKING:
     import pandas as pd
+    from numpy.typing import NDArray
+
+    from rigidimeter.core.drawing import Axes
 
 _READ = (
     *("measure", "unit", "reference", "other", "n_reference", "n_other"),
@@ -253,6 +256,62 @@ class StudyResult:
 
         found = pd.DataFrame(comparison_rows((*self.comparisons, *self.further)))
         return found if full else found[[name for name in _READ if name in found.columns]]
+
+    def plot(
+        self, measures: Sequence[str] | None = None, *, axes: Sequence[Axes] | None = None
+    ) -> NDArray[Any]:
+        """Draw every value of each measure by condition.
+
+        A point with its 95 % interval is an epoch, the bar beside the points goes from the lower to
+        the upper quartile, the diamond is the median, and the open square the estimate of all
+        epochs of the condition together. Above are p and effect size of the rank-sum test, for
+        which all values are independent: conclusions on a study go by its days.
+
+        Parameters
+        ----------
+        measures : sequence of str, optional
+            Stored names, such as ``"stiffness_nm_rad"``. Default: all but ratings.
+        axes : matplotlib Axes, optional
+            To draw on, one for each measure; without them a new figure is made.
+
+        Returns
+        -------
+        array of matplotlib Axes, shape (number of measures,)
+
+        Raises
+        ------
+        ValueError
+            If a measure was not compared.
+        """
+        from rigidimeter.core.drawing import plots
+
+        return plots.plot_result(self, measures, axes)
+
+    def plot_days(self, measure: str = "stiffness_nm_rad", *, ax: Axes | None = None) -> Axes:
+        """Draw a measure day by day: every value a point, and each day's median and quartiles.
+
+        A line joins the medians of a day that has both conditions.
+
+        Raises
+        ------
+        ValueError
+            If the measure was not compared, or days are not known, as they are of a study folder.
+        """
+        from rigidimeter.core.drawing import plots
+
+        return plots.plot_days(self, measure, ax)
+
+    def plot_effects(self, *, ax: Axes | None = None) -> Axes:
+        """Draw the effect size r of each measure with its 95 % interval.
+
+        Raises
+        ------
+        ValueError
+            If no measure was tested.
+        """
+        from rigidimeter.core.drawing import plots
+
+        return plots.plot_effects(self, ax)
 
     def __repr__(self) -> str:
         """Return the medians of both conditions in each measure as one line."""

@@ -19,7 +19,12 @@ from rigidimeter.core.records.estimates import (
 from rigidimeter.core.text import html_table, interval_text, one_line, plural, with_error
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pandas as pd
+    from numpy.typing import NDArray
+
+    from rigidimeter.core.drawing import Axes
 
 _MAX_SHOWN = 20
 """Epochs shown one by one; of more only the first are."""
@@ -135,6 +140,67 @@ class Analysis:
             for fit, row in zip(self.fits, self.rows(), strict=True)
         ]
         return pd.DataFrame(rows)
+
+    def plot(self, *, axes: Sequence[Axes] | None = None) -> NDArray[Any]:
+        """Draw J, B and K of every epoch in the order of recording, each with its 95 % interval.
+
+        A hollow point does not count; a cross at the bottom is an epoch without numbers. The line
+        and its band are the estimate of all epochs of a condition together. Of an analysis of
+        sinusoids alone, impulse and work are drawn.
+
+        Parameters
+        ----------
+        axes : three (of sinusoids two) matplotlib Axes, optional
+            To draw on; without them a new figure is made.
+
+        Returns
+        -------
+        array of matplotlib Axes, shape (3,) or (2,)
+
+        Raises
+        ------
+        ValueError
+            If there is no epoch.
+        """
+        from rigidimeter.core.drawing import plots
+
+        return plots.plot_estimates(self, axes)
+
+    def plot_torque(
+        self,
+        recording: Any,
+        epoch: int = 0,
+        *,
+        span_s: float | None = 7.0,
+        axes: Sequence[Axes] | None = None,
+    ) -> NDArray[Any]:
+        """Draw measured and modelled torque of one epoch, what the model leaves, and its terms.
+
+        Parameters
+        ----------
+        recording : Recording
+            The one that was estimated, since an analysis does not hold the signals.
+        epoch : int
+            Place in `fits`, as in the index of `table()`.
+        span_s : float or None
+            How much is drawn, in s from the first fitted sample; None for all of it.
+        axes : five matplotlib Axes, optional
+            To draw on; without them a new figure is made.
+
+        Returns
+        -------
+        array of matplotlib Axes, shape (5,)
+
+        Raises
+        ------
+        IndexError
+            If there is no such epoch.
+        ValueError
+            If the epoch has no numbers, or is not in the recording.
+        """
+        from rigidimeter.core.drawing import plots
+
+        return plots.plot_torque(self, recording, epoch, span_s, axes)
 
     def __repr__(self) -> str:
         """Return how many epochs there are, and what each condition gives, as one line."""

@@ -5,13 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from html import escape
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.core.records.epochs import Outcome, readonly
 from rigidimeter.core.text import html_table, interval_text, one_line, with_error
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rigidimeter.core.drawing import Axes
 
 
 class Parameter(NamedTuple):
@@ -230,6 +235,30 @@ class Fit:
     def doubts(self) -> tuple[str, ...]:
         """The names of the checks that cast doubt on it, or exclude it."""
         return tuple(dict.fromkeys(one.name for one in self.findings if one.level != "note"))
+
+    def plot(self, *, axes: Sequence[Axes] | None = None) -> NDArray[Any]:
+        """Draw J, B and K in pairs, with their 95 % intervals and the 95 % ellipse of each pair.
+
+        A fit does not hold the torque: measured beside modelled torque is drawn by
+        `Analysis.plot_torque`, which is given the recording.
+
+        Parameters
+        ----------
+        axes : three matplotlib Axes, optional
+            To draw on; without them a new figure is made.
+
+        Returns
+        -------
+        array of matplotlib Axes, shape (3,)
+
+        Raises
+        ------
+        ValueError
+            If the fit has no numbers.
+        """
+        from rigidimeter.core.drawing import plots
+
+        return plots.plot_fit(self, axes)
 
     def row(self) -> dict[str, Any]:
         """Return the names and numbers of the fit, as files and tables have them."""
