@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from html import escape
+from pathlib import PurePath
 
 _PLAIN = (0.01, 1e5)
 """Numbers of this size are written without a power of ten."""
@@ -80,6 +81,22 @@ def one_line(*parts: str, joint: str = "; ") -> str:
     """
     line = " ".join(joint.join(part for part in parts if part).split())
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line)
+
+
+def short_names(sources: Iterable[str]) -> dict[str, str]:
+    """Return the last parts of each path: as few as keep the sources apart."""
+    unique = list(dict.fromkeys(sources))
+    parts = {source: PurePath(source).parts for source in unique}
+    for depth in range(1, max(map(len, parts.values()), default=1) + 1):
+        names = {source: "/".join(parts[source][-depth:]) or source for source in unique}
+        if len(set(names.values())) == len(unique):
+            return names
+    return {source: source for source in unique}
+
+
+def one_cell(number: str) -> str:
+    """Return a number of several parts for a cell of a table that does not break it."""
+    return number.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def html_table(heading: Iterable[str], rows: Iterable[Sequence[str]]) -> str:

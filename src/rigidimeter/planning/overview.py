@@ -20,7 +20,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import PARAMETERS, readonly
 from rigidimeter.core.session import Protocol
 from rigidimeter.core.settings import Settings, settings_from
-from rigidimeter.core.text import one_line, plural
+from rigidimeter.core.text import html_table, one_line, plural
 from rigidimeter.model import JointDynamics, Stability, loop_stability, median_joint
 from rigidimeter.planning.epochs_needed import Detection, WantedDifference, detect, planned_epochs
 from rigidimeter.planning.joint_bandwidth import APPENDIX_A, Corners, Forearm, corners
@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from rigidimeter.core.drawing import Axes
+
+_METHODS = ("bound", "iv", "least_squares")
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,7 @@ class Design:
         rows = [
             (condition, method, *getattr(found, method).free)
             for condition, found in self.precision.items()
-            for method in ("bound", "iv", "least_squares")
+            for method in _METHODS
         ]
         columns = ["condition", "method", *(f"{name}_se" for name in PARAMETER_NAMES)]
         return pd.DataFrame(rows, columns=columns).set_index(["condition", "method"])
@@ -161,7 +163,13 @@ class Design:
 
     def _repr_html_(self) -> str:
         sentences = [*self.warnings, *self.stability.warnings, *self.remarks]
-        table = str(self.table().to_html(float_format="{:.2g}".format))
+        heading = ["condition", "method", *(f"{p.symbol}, {p.unit}" for p in PARAMETERS)]
+        rows = [
+            [condition, method, *(f"{se:.2g}" for se in getattr(found, method).free)]
+            for condition, found in self.precision.items()
+            for method in _METHODS
+        ]
+        table = f"<p>Standard errors of one epoch</p>{html_table(heading, rows)}"
         return table + "".join(f"<p>{html.escape(sentence)}</p>" for sentence in sentences)
 
 

@@ -25,7 +25,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import noted_digests
 from rigidimeter.core.records import Epoch, Notice, Task
 from rigidimeter.core.settings import Settings, load_settings, settings_from
-from rigidimeter.core.text import html_table, one_line, plural
+from rigidimeter.core.text import html_table, one_line, plural, short_names
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -120,9 +120,13 @@ class Recording:
         parts: dict[tuple[str, str], list[Epoch]] = {}
         for epoch in self.epochs:
             parts.setdefault((epoch.source, epoch.condition), []).append(epoch)
+        names = short_names(source for source, _ in parts)
         rows = [
-            [*key, str(len(own)), *_length_and_rate(own), ", ".join(own[0].channels)]
-            for key, own in parts.items()
+            [
+                *(names[source], condition, str(len(own))),
+                *(*_length_and_rate(own), ", ".join(own[0].channels)),
+            ]
+            for (source, condition), own in parts.items()
         ]
         heading = ["recording", "condition", "epochs", "length, s", "samples/s", "channels"]
         notices = [f"<p>{escape(f'{one.level}: {one.text}')}</p>" for one in self.notices]

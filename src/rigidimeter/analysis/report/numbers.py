@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from pathlib import PurePath
 
 from rigidimeter.core.text import plural as plural
+from rigidimeter.core.text import short_names as short_names
 
 SMALLEST_P = 1e-300
 """Below this a p-value has run out of floating point."""
@@ -130,14 +130,3 @@ def within(title: str) -> str:
 def condition_name(condition: str) -> str:
     """Return the condition as people read it."""
     return condition or "(no condition)"
-
-
-def short_names(sources: Iterable[str]) -> dict[str, str]:
-    """Return the last parts of each path: as few as keep the sources apart."""
-    unique = list(dict.fromkeys(sources))
-    parts = {source: PurePath(source).parts for source in unique}
-    for depth in range(1, max(map(len, parts.values()), default=1) + 1):
-        names = {source: "/".join(parts[source][-depth:]) or source for source in unique}
-        if len(set(names.values())) == len(unique):
-            return names
-    return {source: source for source in unique}

@@ -17,7 +17,7 @@ from rigidimeter.analysis.study.measures import Measure
 from rigidimeter.analysis.study.ratings_found import RatingsFound
 from rigidimeter.core.records import Analysis, Epoch, Fit, Notice, Score
 from rigidimeter.core.settings import Settings
-from rigidimeter.core.text import one_line, with_error
+from rigidimeter.core.text import html_table, interval_text, one_cell, one_line, with_error
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -325,6 +325,19 @@ class StudyResult:
         return one_line(self.title, pair, medians)
 
     def _repr_html_(self) -> str:
-        heading = f"{self.title}: {self.reference} − {self.other}".strip(": −")
-        shown = self.table().dropna(axis="columns", how="all")
-        return f"<p>{escape(heading)}</p>{shown.to_html(index=False, float_format='{:.4g}'.format)}"
+        """Return the medians, their shift with its 95 % interval, and p after Holm."""
+        every = (*self.comparisons, *self.further)
+        p = ["p_holm", "days_p_holm"] if any(c.days is not None for c in every) else ["p_holm"]
+        rows = []
+        for c, row in zip(every, comparison_rows(every), strict=True):
+            known = {name: math.nan if value is None else value for name, value in row.items()}
+            medians = [known[f"median_{side}"] for side in ("reference", "other")]
+            rows.append(
+                [c.measure.label, c.reference, c.other]
+                + [with_error(number, math.nan) for number in (*medians, known["shift"])]
+                + [one_cell(interval_text(known["shift_low"], known["shift_high"]))]
+                + [f"{known.get(name, math.nan):.3g}".replace("nan", "–") for name in p]
+            )
+        heading = ["measure", "reference", "other", "median of reference", "median of other"]
+        heading += ["shift, reference − other", "95\xa0% interval", "p", "p by days"]
+        return f"<p>{escape(self.title)}</p>\n{html_table(heading[: 7 + len(p)], rows)}"

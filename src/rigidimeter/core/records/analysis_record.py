@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,7 +17,15 @@ from rigidimeter.core.records.estimates import (
     Fit,
     Score,
 )
-from rigidimeter.core.text import html_table, interval_text, one_line, plural, with_error
+from rigidimeter.core.text import (
+    html_table,
+    interval_text,
+    one_cell,
+    one_line,
+    plural,
+    short_names,
+    with_error,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -231,13 +240,15 @@ class Analysis:
     def _repr_html_(self) -> str:
         """Return J, B and K with their 95 % intervals, what the checks found, and the scores."""
         reason = f": {self.method_reason}" if self.method_reason else ""
+        results: tuple[Fit | Score, ...] = (*self.fits, *self.scores)
+        names = short_names(one.source for one in results)
         parts = [f"<p>{escape(f'Method {self.method}{reason}.')}</p>"]
         if self.fits:
             heading = ["epoch", "condition"]
             heading += [f"{p.symbol}, {p.unit}" for p in PARAMETERS]
             shown = [*self.fits[:_MAX_SHOWN], *self.pooled]
             heading += ["VAF, %", "outcome", "findings"]
-            parts.append(html_table(heading, [_fit_row(fit) for fit in shown]))
+            parts.append(html_table(heading, [_fit_row(fit, names) for fit in shown]))
             parts.append("<p>J, B and K ± one standard error; all epochs: 95\xa0% intervals.</p>")
         if len(self.fits) > _MAX_SHOWN:
             parts.append(f"<p>The first {_MAX_SHOWN} of {len(self.fits)} epochs.</p>")
@@ -246,7 +257,7 @@ class Analysis:
             for first, fits in self.findings:
                 where = "all together"
                 if fits[0].epoch != "pooled":
-                    where = f"{fits[0].source}, {fits[0].epoch}"
+                    where = f"{names[fits[0].source]}, {fits[0].epoch}"
                 if len(fits) > 1:
                     where = f"{len(fits)}, first {where}"
                 rows.append([first.level, where, first.text, first.remedy])
@@ -255,7 +266,7 @@ class Analysis:
         if self.scores:
             rows = [
                 [
-                    f"{s.source}, {s.epoch}",
+                    f"{names[s.source]}, {s.epoch}",
                     s.condition,
                     with_error(s.impulse_nm_s, 0.0),
                     with_error(s.work_j, 0.0),
@@ -263,7 +274,7 @@ class Analysis:
                 ]
                 for s in self.scores[:_MAX_SHOWN]
             ]
-            heading = ["epoch", "condition", "impulse (N·m·s)", "work (J)", "outcome"]
+            heading = ["epoch", "condition", "impulse, N·m·s", "work, J", "outcome"]
             parts.append(html_table(heading, rows))
         return "\n".join(parts)
 
@@ -272,13 +283,14 @@ def _in_a_cell(finding: Finding) -> str:
     return f"{finding.level}, {finding.name}: {finding.text}"
 
 
-def _fit_row(fit: Fit) -> list[str]:
+def _fit_row(fit: Fit, names: Mapping[str, str]) -> list[str]:
     pooled = fit.epoch == "pooled"
     numbers = [
-        f"{with_error(value, se)} ({interval_text(low, high)})" if pooled else with_error(value, se)
+        one_cell(with_error(value, se))
+        + (f" ({one_cell(interval_text(low, high))})" if pooled else "")
         for value, se, low, high in zip(fit.value, fit.se, fit.low, fit.high, strict=True)
     ]
-    name = "all epochs" if pooled else f"{fit.source}, {fit.epoch}"
+    name = "all epochs" if pooled else f"{names[fit.source]}, {fit.epoch}"
     outcome = f"{fit.outcome.kind} {fit.outcome.reason}"
     vaf = "–" if math.isnan(fit.vaf_percent) else f"{fit.vaf_percent:.1f}"
     return [name, fit.condition, *numbers, vaf, outcome, ", ".join(fit.doubts)]

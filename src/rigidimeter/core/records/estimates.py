@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.core.records.epochs import Outcome, readonly
-from rigidimeter.core.text import html_table, interval_text, one_line, with_error
+from rigidimeter.core.text import html_table, interval_text, one_cell, one_line, with_error
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -218,7 +218,11 @@ class Fit:
     def _repr_html_(self) -> str:
         """Return J, B and K with their standard errors and 95 % intervals as a table."""
         rows = [
-            [f"{p.symbol}, {p.title}", with_error(value, se), interval_text(low, high), p.unit]
+            [
+                f"{p.symbol}, {p.title}",
+                *(one_cell(with_error(value, se)), one_cell(interval_text(low, high))),
+                p.unit,
+            ]
             for p, value, se, low, high in zip(
                 PARAMETERS, self.value, self.se, self.low, self.high, strict=True
             )

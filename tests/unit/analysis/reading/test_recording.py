@@ -40,7 +40,7 @@ def test_a_file_alone(tmp_path):
     )
     assert "\n" not in repr(recording)
     shown = recording._repr_html_()
-    assert f"<td>{path}</td><td>OFF</td><td>2</td><td>1</td><td>100</td>" in shown
+    assert f"<td>{path.name}</td><td>OFF</td><td>2</td><td>1</td><td>100</td>" in shown
 
 
 def test_options_reach_the_file(tmp_path):
