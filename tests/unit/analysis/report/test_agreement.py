@@ -254,8 +254,8 @@ def test_estimates_and_scores_of_every_epoch(study, json, folder: Path, page: Pa
             for name, cell in zip(names, terminal[2:], strict=False):
                 factor = 1e3 if name == "inertia_kg_m2" else 1.0
                 value, error = (factor * found[key] for key in (name, f"{name}_se"))
-                assert_shows(cell, [value, error], 1)
-                decimals = [len(shown.partition(".")[2]) for shown in cell.split("±")]
+                assert_shows(cell, [value, error], 2)
+                decimals = [len(shown.partition(".")[2]) for shown in cell.split(" ± ")]
                 assert decimals[0] == decimals[1]
     for score, row in zip(json["estimates"]["scores"], rows_of(folder, "scores"), strict=True):
         assert_same(row, score)
