@@ -27,9 +27,9 @@ FIRST_HZ = (500.0, 1000.0, 333.0, 200.0, 2000.0, 100.0)
 FILTERS_HZ = (0.0, 30.0, 100.0, 320.0)
 EPOCHS = 4
 WANTED = np.array([2.0, 1.0, 0.5])
-"""Largest errors of J, B and K in % of an estimate that is not doubted."""
+"""Largest errors of J, B and K in % of an estimate that is not flagged."""
 TITLES = (
-    "| samples/s | filter | J | B | K | half interval of J | covered | doubted | broken |",
+    "| samples/s | filter | J | B | K | half interval of J | covered | flagged | broken |",
     "| ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
 )
 NOT_RUN = ["not run", "", "", "", "", "", ""]
@@ -43,8 +43,8 @@ continuous time, {EPOCHS} epochs of 20 s, `iv`, drives of 50 Hz, J 0.0045 kg·m�
 K 1.751 N·m/rad. Torque, motion and command have the rate of the loop; the filter is a Butterworth
 low-pass of second order, and `estimation.torque_lowpass_hz` is its corner. Mean errors of J, B, K
 and half the interval of J, in %; "covered" counts intervals of J, B and K that hold the truth, of
-{3 * EPOCHS}; "doubted" counts epochs with the finding `between_samples`. Each parameter shall be
-within 2, 1 and 0.5 %, or be doubted with an interval that holds the truth; "broken" counts epochs
+{3 * EPOCHS}; "flagged" counts epochs with the finding `between_samples`. Each parameter shall be
+within 2, 1 and 0.5 %, or be flagged with an interval that holds the truth; "broken" counts epochs
 with one that is neither. [What happens between the samples](../explanation/between-samples.md)
 explains the method and its limits; this page has only the measured tables.
 """

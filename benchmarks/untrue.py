@@ -51,7 +51,7 @@ CASES: dict[str, Untrue] = {
     "drive adds 1 deg/s": Untrue(drift_deg_s=1.0),
     "drive adds 2 deg/s": Untrue(drift_deg_s=2.0),
     "drive adds 5 deg/s": Untrue(drift_deg_s=5.0),
-    "drive and encoder: 10 % more than told, reported as told": Untrue(
+    "drive and encoder: 10 % more than commanded, reported as commanded": Untrue(
         1.1,
         read=lambda r, _, __: r._replace(
             angle_rad=r.angle_rad / 1.1, velocity_rad_s=r.velocity_rad_s / 1.1

@@ -7,7 +7,7 @@ conditions (SD of the logarithm: J 2 %, B 9 %, K 12 %, as in `rigidimeter.virtua
 and each by itself (B and K, 2 %); epochs scatter by 2 %. With a difference B and K are 15 % lower
 in DBS.
 
-Half of the studies are sound: the perturbation recorded or not, the subject at rest. The others
+Half of the studies are regular: the perturbation recorded or not, the subject at rest. The others
 are trapped, in turn, by what `TRAPS` lists, in DBS alone.
 
 A verdict is right if it is the truth, wrong if it claims a difference that is not there or of the
@@ -75,7 +75,7 @@ TRAPS = (
 
 
 def case_of(number: int) -> Case:
-    """Return the case of a study: sound and trapped in turn."""
+    """Return the case of a study: regular and trapped in turn."""
     cases = TRAPS if number % 2 else SOUND
     return cases[number // 2 % len(cases)]
 
@@ -164,7 +164,7 @@ def table(rows: list[dict[str, Any]]) -> Iterator[str]:
     for row in rows:
         trapped = row["number"] % 2
         truth = "with" if row["lower"] else "without"
-        groups.setdefault(f"{'trapped' if trapped else 'sound'}, {truth}", []).append(row)
+        groups.setdefault(f"{'trapped' if trapped else 'regular'}, {truth}", []).append(row)
     for row in rows:
         truth = "with" if row["lower"] else "without"
         groups.setdefault(f"{case_of(row['number']).name}, {truth}", []).append(row)

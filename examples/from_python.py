@@ -1,4 +1,4 @@
-"""A complete experiment from Python: design, simulate, estimate, compare, report.
+"""A complete experiment from Python: design, simulate, estimate, plot, compare, report.
 
     python examples/from_python.py OUT
 
@@ -33,6 +33,7 @@ def main(out: Path) -> None:
     # Stability of the loop and predicted standard errors of J, B and K.
     plan = rm.design(SETTINGS)
     print(plan.table())
+    plan.plot()[0].figure.savefig(out / "perturbation.png")
 
     # Run a session on the virtual rig and read its epochs.
     recording = rm.simulate(SETTINGS, out / "session")
@@ -47,11 +48,12 @@ def main(out: Path) -> None:
         perturbation_nm=channels["perturbation_nm"],
         rate_hz=1000.0,
     )
-    print(f"K = {fit.stiffness_nm_rad:.4f} ± {fit.stiffness_nm_rad_se:.4f} N·m/rad")
+    print(fit)  # J, B and K ± one standard error
 
     # Estimate every epoch, compare the two conditions, and write a report.
     estimates = rm.estimate(recording)
-    print(estimates.table()[["condition", "damping_nm_s_rad", "stiffness_nm_rad"]])
+    print(estimates.table().drop(columns="source"))
+    estimates.plot()[0].figure.savefig(out / "estimates.png")
     print(rm.compare(estimates).table().T)
     print(rm.report(recording, out / "report"))
 

@@ -14,6 +14,10 @@ def older(settings: dict[str, Any]) -> dict[str, Any]:
     for table in RENAMED.keys() & settings.keys():
         old = {new: old for old, new in RENAMED[table].items()}
         before[table] = {old.get(key, key): value for key, value in settings[table].items()}
+    if "levels" in before.get("diagnostics", {}):
+        levels = before["diagnostics"]["levels"].items()
+        named = {name: "doubt" if level == "caution" else level for name, level in levels}
+        before["diagnostics"] = {**before["diagnostics"], "levels": named}
     return before
 
 

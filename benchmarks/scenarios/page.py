@@ -10,7 +10,7 @@ from benchmarks.scenarios.rule import Answer, Array, Row
 
 HEADER = (
     "method", "scenario", "bias (%)", "scatter (%)", "coverage (%)", "pooled: bias (%)",
-    "coverage (%)", "doubts: epochs, recordings (%)", "findings (% of recordings)", "rule",
+    "coverage (%)", "flagged: epochs, recordings (%)", "findings (% of recordings)", "rule",
 )  # fmt: skip
 
 Rows = Mapping[tuple[str, str], Row]
@@ -26,9 +26,9 @@ def summary(rows: Rows) -> list[str]:
         lines.append(
             f"- `{method}`: {breaks.count('')} of {len(own)} rows keep the rule; "
             f"{breaks.count('silent, off')} are off by more than 10 % and silent, "
-            f"{breaks.count('silent, too sure')} too sure and silent, "
-            f"{breaks.count('misnamed')} doubted by another finding, "
-            f"{breaks.count('false doubt')} doubt in vain."
+            f"{breaks.count('silent, overconfident')} overconfident and silent, "
+            f"{breaks.count('misnamed')} flagged by another finding, "
+            f"{breaks.count('false alarm')} flagged in vain."
         )
     return lines
 
@@ -71,7 +71,7 @@ def _cells(scenario: str, method: str, row: Row) -> Iterable[str]:
         _whole(row.pooled),
         f"{100 * row.doubted_epochs:.0f}, {100 * row.doubted:.0f}",
         shares or "–",
-        f"**{row.breaks}**" if row.breaks else ("wrong, said" if row.wrong else "right"),
+        f"**{row.breaks}**" if row.breaks else ("wrong, reported" if row.wrong else "right"),
     )
 
 
@@ -107,14 +107,14 @@ The second form measures the rows again whose names hold one of the words.
 
 Three numbers in a cell are J, B and K. Bias and scatter (SD) of the single epochs are in % of the
 truth: the intrinsic J, B and K that were simulated, their mean where they changed. Coverage is the
-share of 95 % intervals that hold it. A doubt is a finding of level doubt or exclude. `blind` is
-`bandlimited` on a file of torque and motion alone, without perturbation and command.
+share of 95 % intervals that hold it. A finding of level caution or exclude flags an epoch. `blind`
+is `bandlimited` on a file of torque and motion alone, without perturbation and command.
 
 The rule: an answer is wrong if the mean error of J, B or K exceeds 10 % or an interval covers less
 than 80 %, in single epochs or pooled. It must then come with the right finding in at least 90 % of
-the recordings; if not, the row is **silent, off** or, within 10 %, **silent, too sure**, and
-**misnamed** where other findings doubt it that often. A right answer may be doubted in at most 5 %
-of the recordings, or it is a **false doubt**. Where the joint is not one J, B and K (it changes, or
+the recordings; if not, the row is **silent, off** or, within 10 %, **silent, overconfident**, and
+**misnamed** where other findings flag it that often. A right answer may be flagged in at most 5 %
+of the recordings, or it is a **false alarm**. Where the joint is not one J, B and K (it changes, or
 has another term), to say so is never false. A share breaks a limit where chance alone, from a true
 share at the limit, would do so in less than 1 of 20 cases. Which findings are right for a scenario
 is in `tests/scenarios/catalogue.py`.

@@ -2,8 +2,8 @@
 
 The answer of a row is wrong if the mean error of J, B or K exceeds 10 %, or if less than 80 % of
 the 95 % intervals hold the truth, in single epochs or pooled. A wrong answer must come with the
-right finding in at least 90 % of the recordings; a right one may be doubted in at most 5 %. Where
-the joint is not one J, B and K, to say so is no false doubt even if their means are right.
+right finding in at least 90 % of the recordings; a right one may be flagged in at most 5 %. Where
+the joint is not one J, B and K, to say so is no false alarm even if their means are right.
 
 A share is above or below a limit where chance, if the true share were the limit, would take it that
 far in less than 1 of 20 cases (binomial): of a few recordings, one alone says little.
@@ -68,9 +68,9 @@ class Row(NamedTuple):
     ----------
     epochs, pooled : Answer
     doubted_epochs, doubted : float
-        Shares of the epochs and of the recordings with a doubt.
+        Shares of the epochs and of the recordings that a finding flags.
     in_vain : float
-        Share of the recordings with a doubt that is false if the answer is right.
+        Share of the recordings that a finding flags that is false if the answer is right.
     raised : float
         Share of the recordings with a finding that is right for the scenario.
     shares : dict of str to float
@@ -96,12 +96,12 @@ class Row(NamedTuple):
     def breaks(self) -> str:
         """How the row breaks the rule; empty where it does not."""
         if not self.wrong:
-            return "false doubt" if above(self.in_vain, MOST_DOUBTED, self.recordings) else ""
+            return "false alarm" if above(self.in_vain, MOST_DOUBTED, self.recordings) else ""
         if not below(self.raised, LEAST_RAISED, self.recordings):
             return ""
         if not below(self.doubted, LEAST_RAISED, self.recordings):
             return "misnamed"
-        return "silent, off" if self.epochs.off or self.pooled.off else "silent, too sure"
+        return "silent, off" if self.epochs.off or self.pooled.off else "silent, overconfident"
 
 
 def row(kept: Sequence[dict[str, Any]], right: Sequence[str], other_model: bool = False) -> Row:

@@ -133,7 +133,7 @@ def test_a_session_from_the_form_to_its_end(console, chromium):
     page.get_by_text("may be 1.500 or 1500").wait_for()
     fill(page, "prbs_amplitude", "1,1")
     start(page, operator=MARKUP)
-    other.get_by_text("this page can only look").wait_for()
+    other.get_by_text("this page is read-only").wait_for()
     assert other.locator("#emergency").is_disabled()
     other.close()
     page.wait_for_function(RUNS)

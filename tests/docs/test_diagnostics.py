@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
+
+from tests.docs.findings_page import PAGE, with_table
 
 from rigidimeter.analysis.estimation.diagnostics import CHECKS
+from rigidimeter.core.findings import KINDS
 from rigidimeter.core.settings import DiagnosticLevels, DiagnosticsSettings
-
-ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "reference" / "diagnostics.md"
 
 
 def _rows() -> list[list[str]]:
@@ -26,17 +25,15 @@ def test_every_check_has_its_row_and_no_other_has() -> None:
     assert sorted(names) == sorted([*(check.name for check in CHECKS), *of_fits])
 
 
-def test_the_levels_are_the_defaults() -> None:
-    levels = DiagnosticLevels()
-    for name, _, _, level, remedy in _rows():
-        assert level == getattr(levels, name.strip("`")), name
-        assert remedy, name
+def test_the_table_is_that_of_the_kinds() -> None:
+    page = PAGE.read_text("utf-8")
+    assert page == with_table(page), "python -m tests.docs.findings_page writes it anew"
 
 
 def test_every_key_exists_and_every_setting_is_mentioned() -> None:
     known = set(DiagnosticsSettings.model_fields) - {"levels"}
     mentioned: set[str] = set()
-    for name, looked_at, key, _, _ in _rows():
-        assert key == "–" or key.strip("`") in known, name
-        mentioned |= set(re.findall(r"`(\w+)`", looked_at + key))
+    for kind in KINDS.values():
+        assert kind.setting in {"", *known}, kind.name
+        mentioned |= {kind.setting, *re.findall(r"`(\w+)`", kind.checks)} - {""}
     assert mentioned == known

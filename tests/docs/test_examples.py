@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
 import pytest
 from typer.testing import CliRunner
 
@@ -39,9 +40,12 @@ def test_from_python_goes_from_design_to_report(
         block["epochs"] = 2  # of 3
     example["main"](tmp_path / "out")
     printed = capsys.readouterr().out
-    stiffness = float(printed.split("K = ")[1].split()[0])
+    stiffness = float(printed.split(", K ")[1].split()[0])
     assert stiffness == pytest.approx(1.751, rel=2e-3)  # [subject.OFF] by default
     assert (tmp_path / "out/report/report.html").exists()
+    for name in ("perturbation.png", "estimates.png"):
+        assert (tmp_path / "out" / name).read_bytes().startswith(b"\x89PNG")
+    plt.close("all")
 
 
 def test_filter_alike_shows_that_a_filter_on_the_position_alone_biases(

@@ -16,7 +16,8 @@ from rigidimeter.analysis.batch import columns as batch_columns
 from rigidimeter.analysis.reading import ReadOptions, estimates_document, read_recording
 from rigidimeter.cli.main import app
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.records import Analysis, Delay, Finding, Fit, Outcome, Score
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import Analysis, Delay, Fit, Outcome, Score
 from rigidimeter.core.session import SAMPLE_UNITS, SessionWriter, read_events, read_manifest
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.study_files import STUDY_SCHEMA
@@ -58,7 +59,7 @@ def _analysis() -> Analysis:
                 "bandlimited",
                 Outcome(),
                 value=(1.0 + k, 2.0 + k, 3.0 + k),
-                findings=(Finding("frozen", "doubt", 1.0, 2.0, "a", "b"),),
+                findings=(Finding("frozen", "caution", 1.0, 2.0),),
             )
             for k, name in enumerate(conditions)
         )

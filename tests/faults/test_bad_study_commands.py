@@ -84,7 +84,7 @@ def test_a_key_without_a_study(rigidimeter, study) -> None:
 def test_a_folder_that_cannot_be_written_loses_no_result(compared, study) -> None:
     (study / "analysis").write_text("a file in its place")
     ran, _ = compared()
-    only_error(ran, "the analysis is not kept", "analysis: cannot be written")
+    only_error(ran, "the analysis is not stored", "analysis: cannot be written")
     assert "comparison.json and tables" not in ran.out
 
 

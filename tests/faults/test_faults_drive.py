@@ -307,6 +307,6 @@ def test_a_port_that_vanishes_as_the_session_ends_leaves_the_power_unconfirmed(t
         trial = run(made, tmp_path / "s", sink=sink)
         assert [event["outcome"] for event in trial.of("epoch_ended")] == ["success"]
         assert trial.result.outcome == "fail"
-        assert "the drive has not said so: keep hands off the joint" in trial.result.reason
+        assert "that its power is off: keep hands off the joint" in trial.result.reason
         assert trial.of("session_ended")[0]["reason"] == trial.result.reason
         assert made.drive._line._thread.is_alive()  # it answers nothing, and fails nothing

@@ -136,7 +136,7 @@ def test_fault_20_told_to_end(rig, tmp_path, measured):
         desk = Desk(causes={round(AT_S * made.rate_hz): Cause.SIGNAL})
         trial = run(made, tmp_path / "s", desk=desk)
         assert_stopped(trial, Cause.SIGNAL, 1 / made.rate_hz)
-        measured(20, rig, "told to end", trial, 1 / made.rate_hz)
+        measured(20, rig, "signal to end", trial, 1 / made.rate_hz)
 
 
 @pytest.mark.parametrize("rig", RIGS)

@@ -14,10 +14,11 @@ KEPT = re.compile(
     r"|outcome|level|value|verdict|tested_by|chosen"
     r"|p|p_\w+|\w+_p|estimate|se|low|high|df|df_\w+|f|f_\w+|n|n_\w+|sd|excluded"
     r"|z|r|r_low|r_high|u|shift|shift_low|shift_high|rank_biserial\w*|median|days_\w+|day_share"
-    r"|percent|percent_low|percent_high|rho\w*|reml_deviance|variance\w*|means?|means_se"
+    r"|percent|percent_low|percent_high|difference\w*|measured_\w+|days_to_decide"
+    r"|rho\w*|reml_deviance|variance\w*|means?|means_se"
     r"|held_out_vaf_percent|vaf_percent|recommended|aic|method|epochs|sound|doubted|doubt"
     r"|covered|half_power_hz|bandwidth_hz|gain_margin_db|delay_margin_s|angle_sd_rad|cost_percent"
-    r"|total_s|within|ours|epochs_needed|power|planned_power|corrected|(?!n_samples)n_samples"
+    r"|total_s|within|ours|subjects_needed|day_sd|power|corrected|(?!n_samples)n_samples"
 )
 """Keys whose value is an answer; names, texts and what else describes the input are none."""
 
@@ -27,16 +28,16 @@ LABELS = (
 )
 """What an item of a list is called by, as far as it has them."""
 
+FINDING = ("level", "value")
+"""What of a finding is an answer."""
+
 NOT_KEPT = re.compile(r"\w+_(bound|change|change_se)")
 SKIPPED = ("provenance", "settings", "band_hz", "rows", "sessions", "corners", "optimised")
 """Parts that repeat the input, or what stands elsewhere."""
 
 
 def rows_of(document: Mapping[str, Any], left_out: Sequence[str] = ()) -> dict[str, Row]:
-    """Return the answers of a document by where they stand in it.
-
-    Of the findings those count that failed: a check that passed is no answer.
-    """
+    """Return the answers of a document by where they stand in it."""
     found: dict[str, Row] = {}
     for what, row in _walk("", document, (*SKIPPED, *left_out)):
         found[what if what not in found else f"{what} again"] = row
@@ -53,7 +54,9 @@ def _walk(path: str, value: Any, skipped: Sequence[str]) -> Iterator[tuple[str, 
                 yield from _walk(f"{path}/{key}" if path else key, one, skipped)
     elif isinstance(value, list):
         for number, one in enumerate(value):
-            if isinstance(one, Mapping) and one.get("remedy") != "":
+            if isinstance(one, Mapping) and "headline" in one:
+                yield f"{path} {one['name']}", {k: one[k] for k in FINDING if one[k] is not None}
+            elif isinstance(one, Mapping):
                 yield from _walk(f"{path} {_label(one) or number}", one, skipped)
 
 

@@ -292,7 +292,7 @@ def _of_plans() -> Iterator[Case]:
     nothing = lambda folder: None  # noqa: E731
     wanted = ("--detect", "damping=20%", "--detect", "stiffness=0.3")
     yield Case(
-        "design: the paper's rig", "design: stability, standard errors, epochs needed", nothing,
+        "design: the paper's rig", "design: stability, standard errors, days needed", nothing,
         [["design", "--settings", SPREAD, *wanted, "--json", ANSWER]],
     )  # fmt: skip
     yield Case(

@@ -143,7 +143,7 @@ SPOILED: Mapping[str, tuple[Callable[[Columns], object], Mapping[str, object]]] 
     "torque computed from the motion": (computed_torque, {}),
     "torque that follows the angle": (torque_of_the_angle, {}),
     "torque of nothing": (torque_of_nothing, {}),
-    "reaction, not said": (reaction, {}),
+    "reaction, not stated": (reaction, {}),
     "three hundred times the torque": (three_hundred_times, {}),
     "an active muscle": (active_muscle, {}),
     "torque 8 ms late": (late_torque, {}),

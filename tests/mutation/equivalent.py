@@ -103,16 +103,15 @@ EQUIVALENT: dict[str, str] = {
     LOOP + "0 → 1 #4": ANEW,
     LOOP + "0 → -1 #4": ANEW,
     LOOP + "self.limit_time_s = math.nan → pass": ANEW,
-    "tick.py TickResult: late_ticks: int = 0 → late_ticks: int = -1": GIVEN,
-    "tick.py TickResult: missed_ticks: int = 0 → missed_ticks: int = -1": GIVEN,
-    "tick.py TickResult: 0 → 1": GIVEN,
-    "tick.py TickResult: 0 → -1": GIVEN,
-    "tick.py TickResult: interrupted: bool = False → interrupted: bool = -1": GIVEN,
-    "tick.py TickResult: False → True": GIVEN,
     "tick.py run_tick: sent != allowed and math.isfinite(sent) → math.isfinite(sent)": "what was "
     "sent as it was allowed is the guard's velocity already",
     "tick.py run_tick: loop.limit_time_s <= due_s → loop.limit_time_s < due_s": "a later tick is "
     "due later",
+    "session_end.py _after_power: angle_rad + reading.torque_nm → "
+    "angle_rad - reading.torque_nm": ANY_SIGN,
+    "session_end.py _after_power: return '' → return None": "nothing is as untrue as no words",
+    "stop_report.py _velocity: means.reported_rad2 > means.moved_rad2 → "
+    "means.reported_rad2 >= means.moved_rad2": "of equal ones neither is 1.5 times the other",
     "stop_report.py _stalled: if math.isfinite(latched.measured): ... → if True: ...": "of a "
     "number and NaN after it the number is the larger",
     "control_modes.py ramp_to_rest: 0 → 1": RAMP,

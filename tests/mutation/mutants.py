@@ -164,8 +164,8 @@ def _changes(node: ast.AST) -> Iterator[ast.AST]:
             yield _with(node, test=ast.UnaryOp(ast.Not(), node.test))
             yield _with(node, test=ast.Constant(False))
             yield _with(node, test=ast.Constant(True))
-        case ast.Return(value=ast.Constant(value=False)):
-            pass  # nothing is as untrue; the constant itself is changed
+        case ast.Return(value=ast.Constant(value=False | None)):
+            pass  # nothing is the same, or as untrue; False itself is changed
         case ast.Return() if node.value is not None:
             yield _with(node, value=ast.Constant(None))
         case ast.Assign() | ast.Raise():

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from tests.unit.virtual.tiny import tiny
 
-from rigidimeter.analysis.report.numbers import number
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.words import number
 from rigidimeter.model import JointDynamics
 from rigidimeter.paper import (
     AGREES,

@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 
 from rigidimeter.analysis.estimation import fit_epochs
-from rigidimeter.analysis.statistics import ranksum
+from rigidimeter.analysis.statistics import day_difference
 from rigidimeter.core.records import Epoch, Fit
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.planning import (
     PARAMETER_NAMES,
     PredictedPrecision,
+    Scatter,
     WantedDifference,
     detect,
+    paired_power,
     prbs_nm,
     predicted_precision,
 )
@@ -94,8 +96,10 @@ def test_least_squares_is_off_as_predicted() -> None:
 
 @pytest.mark.slow
 def test_studies_see_the_difference_as_often_as_predicted() -> None:
-    """Epochs of two conditions, fits with the median inertia held, and the test of `compare`."""
-    studies, n = 250, 10
+    """Days with both conditions, fits of J, B and K in each epoch, and the test of `compare`.
+
+    The joint varies between epochs; nothing varies between days."""
+    studies, n = 250, 3
     varied = {"voluntary_sd_nm": 0.2, "damping_cv_percent": 15.0}
     settings = parse_settings(
         {
@@ -104,28 +108,27 @@ def test_studies_see_the_difference_as_often_as_predicted() -> None:
         }
     )
     torque_nm = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
-    found = detect(settings, torque_nm, WantedDifference.parse("damping=20%"))
-    assert found.planned == (n, n)
-    significant, values = 0, []
+    of_epochs = {"damping": Scatter(15.0, 0.0, 0.0, "drawn")}
+    wanted = WantedDifference.parse("damping=20%")
+    found = detect(settings, torque_nm, wanted, scatter=of_epochs)
+    assert found.planned is not None
+    assert found.planned.epochs == (n, n)
+    days = found.planned.days
+    assert days is not None
+    predicted = paired_power(found.difference, found.planned.day_sd, days)
+    significant = 0
+    labels = [f"{day}" for day in range(days) for _ in range(n)]
     for batch in simulate_chunks(
         settings,
-        studies * 2 * n,
-        chunk=2 * n,
-        conditions=[*["OFF"] * n, *["ON"] * n] * studies,
+        studies * 2 * n * days,
+        chunk=2 * n * days,
+        conditions=[*["OFF"] * (n * days), *["ON"] * (n * days)] * studies,
         seed=21,
     ):
         epochs = [batch.epoch(i) for i in range(len(batch))]
-        inertia = np.median([fit.inertia_kg_m2 for fit in fit_epochs(epochs, "iv", settings)[0]])
-        fits, _ = fit_epochs(epochs, "iv", settings, float(inertia))
-        B = [fit.damping_nm_s_rad for fit in fits]
-        values.append(B)
-        significant += ranksum(B[:n], B[n:]).p < 0.05
+        B = [fit.damping_nm_s_rad for fit in fit_epochs(epochs, "iv", settings)[0]]
+        significant += day_difference(B[: n * days], B[n * days :], labels, labels).p < 0.05
     power = significant / studies
-    spread = np.array(values)
-    print(
-        f"\npower {power:.3f}, predicted {found.planned_power:.3f}; an epoch scatters by "
-        f"{np.std(spread[:, :n]):.4f} and {np.std(spread[:, n:]):.4f}, predicted "
-        f"{found.effect.sd_x:.4f} and {found.effect.sd_y:.4f}"
-    )
+    print(f"\n{days} days: power {power:.3f}, predicted {predicted:.3f}")
     monte_carlo = np.sqrt(power * (1 - power) / studies)
-    assert abs(power - found.planned_power) < 0.03 + 2 * monte_carlo
+    assert abs(power - predicted) < 0.03 + 2 * monte_carlo

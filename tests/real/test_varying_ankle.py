@@ -24,7 +24,7 @@ def varying(epochs):
     settings = Settings()
     fits, _ = fit_epochs(epochs, "bandlimited", settings)
     return [
-        {f.name: f.text for f in checked(prepared, fit).findings if f.name.startswith("varying")}
+        {f.name: f.details for f in checked(prepared, fit).findings if f.name.startswith("varying")}
         for prepared, fit in zip(prepare(epochs, settings), fits, strict=True)
     ]
 

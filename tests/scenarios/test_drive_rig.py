@@ -46,7 +46,7 @@ def test_the_drive_is_found_and_the_joint_with_it(rig):
 def test_what_cannot_be_known_is_doubted_with_an_interval_that_covers(rig):
     for fit in fits_of(rig):
         (finding,) = (one for one in fit.findings if one.name == "between_samples")
-        assert finding.level == "doubt"
+        assert finding.level == "caution"
         assert "torque_lowpass_hz" in finding.remedy
         assert np.all((fit.low <= TRUTH) & (fit.high >= TRUTH))
 

@@ -25,9 +25,9 @@ def recording(error: float = 0.0, half_width: float = 0.05, doubts=(), pooled_do
     ("one", "breaks"),
     [
         (recording(), ""),
-        (recording(doubts=["tremor"]), "false doubt"),
+        (recording(doubts=["tremor"]), "false alarm"),
         (recording(error=0.2, half_width=0.3), "silent, off"),
-        (recording(error=0.02, half_width=0.01), "silent, too sure"),
+        (recording(error=0.02, half_width=0.01), "silent, overconfident"),
         (recording(error=0.2, doubts=["coherence"]), "misnamed"),
         (recording(error=0.2, pooled_doubts=["tremor_line"]), ""),
     ],
@@ -37,32 +37,32 @@ def test_a_wrong_answer_needs_the_right_finding_and_a_right_one_none(one, breaks
 
 
 def test_shares_that_chance_may_give_break_nothing() -> None:
-    """Binomial: of 20, 3 doubts at 5 % come by chance in 8 %, 4 in 2 %; 16 said at 90 % in 13 %."""
+    """Binomial: of 20, 3 flags at 5 % come by chance in 8 %, 4 in 2 %; 16 right at 90 % in 13 %."""
     good, doubted = recording(), recording(doubts=["tremor"])
     assert row([good] * 17 + [doubted] * 3, ["tremor"]).breaks == ""
-    assert row([good] * 16 + [doubted] * 4, ["tremor"]).breaks == "false doubt"
+    assert row([good] * 16 + [doubted] * 4, ["tremor"]).breaks == "false alarm"
     wrong, said = recording(error=0.2), recording(error=0.2, doubts=["tremor"])
     assert row([said] * 16 + [wrong] * 4, ["tremor"]).breaks == ""
     assert row([said] * 15 + [wrong] * 5, ["tremor"]).breaks == "silent, off"
     missed = recording(error=0.02, half_width=0.01)
     assert row([good] * 2 + [missed], []).breaks == ""
-    assert row([good] * 13 + [missed] * 7, []).breaks == "silent, too sure"
+    assert row([good] * 13 + [missed] * 7, []).breaks == "silent, overconfident"
 
 
 def test_of_many_the_share_itself_decides() -> None:
     good, doubted = recording(), recording(doubts=["tremor"])
     assert row([good] * 950 + [doubted] * 50, []).breaks == ""
-    assert row([good] * 930 + [doubted] * 70, []).breaks == "false doubt"
+    assert row([good] * 930 + [doubted] * 70, []).breaks == "false alarm"
 
 
-def test_to_say_that_a_joint_changed_is_no_false_doubt() -> None:
+def test_to_say_that_a_joint_changed_is_no_false_alarm() -> None:
     said = recording(doubts=["varying_stiffness"])
-    assert row([said] * 20, ["varying"]).breaks == "false doubt"
+    assert row([said] * 20, ["varying"]).breaks == "false alarm"
     assert row([said] * 20, ["varying"], other_model=True).breaks == ""
     also = recording(doubts=["varying_stiffness", "lack_of_fit"])
     assert row([also] * 20, ["varying"], other_model=True).breaks == ""
     both = recording(doubts=["varying_stiffness", "saturation"])
-    assert row([both] * 20, ["varying"], other_model=True).breaks == "false doubt"
+    assert row([both] * 20, ["varying"], other_model=True).breaks == "false alarm"
 
 
 def test_numbers_of_a_row() -> None:

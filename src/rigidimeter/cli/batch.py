@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from rigidimeter.cli.help_pages import RUN, WRITE
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
@@ -21,22 +22,36 @@ def batch(
     recordings: Recordings,
     out: Annotated[
         Path,
-        typer.Option("--out", metavar="FILE", help="The table to write, .parquet or .csv."),
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help="The table, .parquet or .csv.",
+            rich_help_panel=WRITE,
+        ),
     ],
     jobs: Annotated[
-        int, typer.Option("--jobs", metavar="N", min=1, max=1024, help="Processes on this machine.")
+        int,
+        typer.Option(
+            "--jobs",
+            metavar="N",
+            min=1,
+            max=1024,
+            help="Processes on this machine.",
+            rich_help_panel=RUN,
+        ),
     ] = 1,
     scheduler: Annotated[
         str,
         typer.Option(
             "--scheduler",
             metavar="ADDRESS",
-            help="A Dask scheduler, such as tcp://host:8786, whose workers do the work instead of "
+            help="Dask scheduler, such as tcp://host:8786. Its workers do the work instead of "
             "--jobs.",
+            rich_help_panel=RUN,
         ),
     ] = "",
 ) -> None:
-    """Estimate many recordings, and write a table with a row for each epoch.
+    """Estimate many recordings into one table, a row for each epoch.
 
     INPUT may also be a folder of recordings, a study folder or a quoted pattern. Each recording is
     estimated on its own, as by estimate. One that fails is a row with the reason, and the exit

@@ -39,40 +39,44 @@ def check(
         typer.Option(
             "--known-inertia-kg-m2",
             metavar="J",
-            help="The true inertia of everything beyond the torque sensor, such as a weight on the "
-            "cuff; compared in place of the reference.",
+            help="True inertia beyond the torque sensor. Such as a weight on the cuff; compared "
+            "in place of the reference.",
         ),
     ] = None,
     new_reference: Annotated[
         bool,
         typer.Option(
             "--new-reference",
-            help="Keep today's inertia as the reference: the cuff or the handle was changed.",
+            help="Keep today's inertia as the reference. After the cuff or the handle was changed.",
         ),
     ] = False,
     zero: Annotated[
         bool,
         typer.Option(
             "--zero",
-            help="Only zero and noise of the torque sensor, without power, by the limits of "
+            help="Only zero and noise of the torque sensor. Without power, by the limits of "
             "[zeroing], as `run` does when it begins; nothing is recorded.",
         ),
     ] = False,
     yes: Annotated[
         bool,
-        typer.Option("--yes", help="Consent to the motions in advance; for an emulated rig only."),
+        typer.Option(
+            "--yes",
+            help="Consent in advance, for an emulated rig only.",
+        ),
     ] = False,
     piped: Annotated[
         bool,
         typer.Option("--piped", hidden=True, help="A program asks somebody and pipes the answer."),
     ] = False,
 ) -> None:
-    """Check a commissioned rig in about 20 s, with nobody in it; `run` requires it every day.
+    """Check a commissioned rig, every day before the first run.
 
-    Without power: device settings, rates, noise and zero of the torque. With power: uncommanded
-    motion, a small move, then a motion of a few degrees. The torque that it takes to move cuff and
-    handle shows the sign, the gain and the delay of the torque sensor. The first check since the
-    rig was commissioned keeps their inertia as the reference for the next ones.
+    It takes about 20 s, with nobody in the rig. Without power: device settings, rates, noise and
+    zero of the torque. With power: uncommanded motion, a small move, then a motion of a few
+    degrees. The torque that it takes to move cuff and handle shows the sign, the gain and the delay
+    of the torque sensor. The first check since the rig was commissioned keeps their inertia as the
+    reference for the next ones.
 
     \b
     For example:
@@ -109,14 +113,14 @@ def check(
     kept = found.reference
     if kept is not None and kept.made_utc == found.made_utc:
         was = "" if kept.before_kg_m2 is None else f"; it was {kept.before_kg_m2:.3g} kg·m²"
-        echo(f"Kept as the reference: {kept.inertia_kg_m2:.3g} kg·m², {kept.reason}{was}.")
+        echo(f"Stored as the reference: {kept.inertia_kg_m2:.3g} kg·m², {kept.reason}{was}.")
     echo(f"Valid until {found.valid_until:%Y-%m-%d %H:%M} UTC.")
 
 
 def _require_answers(rigfile: RigFile, *, yes: bool, piped: bool) -> None:
     if yes and not rigfile.emulated:
         raise UserError(
-            f"{rigfile.path}: is real hardware; somebody must look that nobody's arm is in it and "
+            f"{rigfile.path}: is real hardware; somebody must check that nobody's arm is in it and "
             "answer, so leave out --yes"
         )
     if not yes and not piped and not sys.stdin.isatty():

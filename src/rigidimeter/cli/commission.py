@@ -51,7 +51,7 @@ def commission(
         typer.Option(
             "--known-torque-nm",
             metavar="NM",
-            help="A known torque that you apply by hand or with a weight, toward positive angles.",
+            help="Known torque, applied by hand or by a weight. It acts toward positive angles.",
         ),
     ] = None,
     known_angle: Annotated[
@@ -59,7 +59,7 @@ def commission(
         typer.Option(
             "--known-angle-deg",
             metavar="DEG",
-            help="A known angle by which you turn the joint by hand, with the drive off.",
+            help="Known angle by which you turn the joint. By hand, with the drive off.",
         ),
     ] = None,
     out: Annotated[
@@ -73,22 +73,23 @@ def commission(
         typer.Option(
             "--eds",
             metavar="FILE",
-            help="Only compare a CANopen drive's EDS with what the rig file writes, or with the "
+            help="Only compare a CANopen drive's EDS. With what the rig file writes, or with the "
             "driver's defaults without one; nothing is connected.",
         ),
     ] = None,
 ) -> None:
-    """Check a rig with nobody in it, and write the record that `run` requires.
+    """Check a new rig with nobody in it, before its first run.
 
-    First without power: device settings, rates, noise, timing, mechanical stops. Then, with your
-    consent, with small slow motions: directions, units, delays, stability of the protocol's
-    controller, watchdog and emergency stop. Attach a spring or a weight similar to a relaxed arm to
-    the joint. On hardware a person must be present, and sign.
+    The command writes the record that `run` requires. First without power: device settings, rates,
+    noise, timing, mechanical stops. Then, with your consent, with small slow motions: directions,
+    units, delays, stability of the protocol's controller, watchdog and emergency stop. Attach a
+    spring or a weight similar to a relaxed arm to the joint. On hardware a person must be present,
+    and sign.
 
     \b
     For example:
       rigidimeter commission --rig RIG.toml --signed-by "A. Weber"
-      rigidimeter commission --rig RIG.toml --settings study.toml --known-torque-nm 2
+      rigidimeter commission --rig RIG.toml --known-torque-nm 2
       rigidimeter commission --eds drive.eds
     """
     from datetime import UTC, datetime

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rigidimeter.cli.comparison_text import comparison_blocks
+from rigidimeter.cli.help_pages import COMPARE, ESTIMATE
 from rigidimeter.cli.inputs import (
     analyse_recordings,
     analyse_study_folder,
@@ -17,7 +19,7 @@ from rigidimeter.cli.inputs import (
     study_files,
     study_of,
 )
-from rigidimeter.cli.options import CsvOption, JsonOption, KeyOption
+from rigidimeter.cli.options import CsvOption, FullOption, JsonOption, KeyOption
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import show
@@ -35,8 +37,9 @@ def compare(
         typer.Option(
             "--reference",
             metavar="NAME",
-            help="The first condition: differences are reference minus other. Default: OFF if "
+            help="Reference condition. Differences are reference minus other. Default: OFF if "
             "there is one, else the first.",
+            rich_help_panel=COMPARE,
         ),
     ] = None,
     other: Annotated[
@@ -44,8 +47,9 @@ def compare(
         typer.Option(
             "--other",
             metavar="NAME",
-            help="The second condition. Default: the next one, and each further one is compared "
+            help="The other condition. Default: the next one, and each further one is compared "
             "with the first, too.",
+            rich_help_panel=COMPARE,
         ),
     ] = None,
     json_out: JsonOption = None,
@@ -55,12 +59,18 @@ def compare(
         typer.Option(
             "--value",
             metavar="COLUMN",
-            help="Compare this column of a table; repeat for several.",
+            help="Compare this column of one CSV table. Repeat for several.",
+            rich_help_panel=COMPARE,
         ),
     ] = None,
     by: Annotated[
         str,
-        typer.Option("--by", metavar="COLUMN", help="With --value: the column of conditions."),
+        typer.Option(
+            "--by",
+            metavar="COLUMN",
+            help="With --value: column of conditions.",
+            rich_help_panel=COMPARE,
+        ),
     ] = "condition",
     session: Annotated[
         str | None,
@@ -68,18 +78,36 @@ def compare(
             "--session",
             metavar="COLUMN",
             help="With --value: the bootstrap resamples the labels of this column. Default: rows.",
+            rich_help_panel=COMPARE,
+            hidden=True,
         ),
     ] = None,
     seed: Annotated[
-        int, typer.Option("--seed", min=0, metavar="N", help="Seed of the bootstrap.")
+        int,
+        typer.Option(
+            "--seed",
+            min=0,
+            metavar="N",
+            help="Seed of the bootstrap.",
+            rich_help_panel=ESTIMATE,
+            hidden=True,
+        ),
     ] = 1,
     resamples: Annotated[
         int,
-        typer.Option("--resamples", min=100, metavar="N", help="Resamples of the bootstrap."),
+        typer.Option(
+            "--resamples",
+            min=100,
+            metavar="N",
+            help="Resamples of the bootstrap.",
+            rich_help_panel=ESTIMATE,
+            hidden=True,
+        ),
     ] = 9999,
     key: KeyOption = None,
+    full: FullOption = False,
 ) -> None:
-    """Compare conditions in J, B, K, angular impulse and work, or in columns of a table.
+    """Compare conditions in J, B, K, angular impulse and work.
 
     Median and quartiles, the two-sided Wilcoxon rank-sum test (asymptotic, ties and continuity
     corrected), effect size r = z/√N, and the Hodges-Lehmann shift with its 95 % interval. Effect
@@ -88,7 +116,7 @@ def compare(
     `rigidimeter estimate`.
 
     A study folder (with a study.toml) also has tests by days, the examiners' ratings, other methods
-    and every exclusion; its analysis is kept in its folder `analysis`.
+    and every exclusion; its analysis is stored in its folder `analysis`.
 
     With --value the input is one table as CSV.
 
@@ -97,8 +125,8 @@ def compare(
       rigidimeter compare demo-study
       rigidimeter compare study/sessions/day-1 study/sessions/day-2
       rigidimeter compare before.csv after.csv --condition OFF --condition DBS
-      rigidimeter compare estimates.json --reference OFF --other DBS --csv table.csv
-      rigidimeter compare ratings.csv --value score --by condition --json comparison.json
+      rigidimeter compare estimates.json --reference OFF --other DBS
+      rigidimeter compare ratings.csv --value score --by condition
     """
     from rigidimeter.analysis import study as studies
     from rigidimeter.cli.progress import Meter
@@ -115,7 +143,7 @@ def compare(
         )
         try:
             _write(study.result, *outputs, str(folder))
-            show(comparison_blocks(study.result))
+            show(comparison_blocks(study.result, full=full))
             _say_changes(study.result, folder, kept=not study.not_kept)
         finally:
             status = study.say()
@@ -138,8 +166,10 @@ def compare(
                 resamples=resamples,
                 progress=meter.advance,
             )
+        if analysed is not None:
+            found = replace(found, epochs=analysed[0].epochs, settings=analysed[0].settings)
         _write(found, *outputs)
-        show(comparison_blocks(found))
+        show(comparison_blocks(found, full=full))
         say(found.notices)
     finally:
         if analysed is not None:
@@ -160,10 +190,14 @@ def _write(
 
 
 def _say_changes(found: StudyResult, folder: Path, *, kept: bool) -> None:
+    from rigidimeter.analysis.study import UNCHANGED
+
     echo("")
-    if found.changes:
+    if found.changes == (UNCHANGED,):
+        echo(f"{UNCHANGED[:1].upper()}{UNCHANGED[1:]}.")
+    elif found.changes:
         echo("Since the last analysis:")
-    for change in found.changes:
-        echo(f"  {change}")
+        for change in found.changes:
+            echo(f"  {change}")
     if kept:
-        echo(f"{folder / 'analysis'}: estimates.json, comparison.json and tables")
+        echo(f"Tables and JSON: {folder / 'analysis'}; here all but those of single epochs: --full")

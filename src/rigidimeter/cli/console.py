@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigidimeter.cli.help_pages import PAGE
 from rigidimeter.cli.options import CpuOption, PriorityOption, RigOption
 from rigidimeter.cli.output import echo
 from rigidimeter.core.errors import UserError
@@ -26,14 +27,33 @@ SHOWN_S = 3.0
 
 HostOption = Annotated[
     str,
-    typer.Option("--host", metavar="ADDRESS", help="Address of the page; any but this computer's "
-                 "own loopback needs a token, which is printed."),
-]  # fmt: skip
+    typer.Option(
+        "--host",
+        metavar="ADDRESS",
+        help="Address of the page. Any but this computer's own loopback needs a token, which is "
+        "printed.",
+        rich_help_panel=PAGE,
+    ),
+]
 PortOption = Annotated[
-    int, typer.Option("--port", metavar="N", min=0, max=65535, help="Port; 0 for a free one.")
+    int,
+    typer.Option(
+        "--port",
+        metavar="N",
+        min=0,
+        max=65535,
+        help="Port; 0 for a free one.",
+        rich_help_panel=PAGE,
+    ),
 ]
 TokenOption = Annotated[
-    str, typer.Option("--token", metavar="TEXT", help="Token of the page. Default: a random one.")
+    str,
+    typer.Option(
+        "--token",
+        metavar="TEXT",
+        help="Token of the page. Default: a random one.",
+        rich_help_panel=PAGE,
+    ),
 ]
 
 
@@ -93,7 +113,7 @@ def run_on_page(
     Raises
     ------
     UserError
-        If the program was told to end before.
+        If the program was stopped before.
     """
     from rigidimeter.rig.console.page import Place, ServerState
 
@@ -109,7 +129,7 @@ def run_on_page(
             if ended is not None:
                 time.sleep(SHOWN_S)  # for the page to say how it ended
                 return ended
-    raise UserError("the program was told to end before a session was run")
+    raise UserError("the program was stopped before a session was run")
 
 
 @contextmanager

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigidimeter.cli.help_pages import DETECT, PERTURB, WRITE
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import JsonOption, SettingsOption
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.terminal_tables import show
+from rigidimeter.core.errors import UserError
+
+if TYPE_CHECKING:
+    from rigidimeter.planning import Scatter
 
 
 def design(
@@ -19,7 +25,9 @@ def design(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Folder for prbs.csv, sinusoid.csv, protocol.csv, bode.svg and design.json.",
+            help="Folder of the plan. It holds prbs.csv, sinusoid.csv, protocol.csv, bode.svg and "
+            "design.json.",
+            rich_help_panel=WRITE,
         ),
     ] = None,
     json_out: JsonOption = None,
@@ -27,38 +35,56 @@ def design(
         list[str] | None,
         typer.Option(
             metavar="NAME=AMOUNT",
-            help="Number of epochs needed to detect a difference in inertia, damping or "
-            "stiffness, such as damping=20% or stiffness=0.3; repeat as needed.",
+            help="Difference to detect, such as damping=20%. In inertia, damping or stiffness, as "
+            "a share or in N·m·s/rad and the like, as stiffness=0.3; repeat as needed.",
+            rich_help_panel=DETECT,
+        ),
+    ] = None,
+    from_study: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            metavar="STUDY",
+            help="Study whose SDs between days and epochs are used. A folder with a study.toml and "
+            "two conditions; without it the SDs are assumed.",
+            rich_help_panel=DETECT,
         ),
     ] = None,
     power: Annotated[
-        float, typer.Option("--power", metavar="P", help="Power of the test for --detect.")
+        float,
+        typer.Option("--power", metavar="P", help="Power of the test.", rich_help_panel=DETECT),
     ] = 0.8,
     alpha: Annotated[
         float,
-        typer.Option("--alpha", metavar="P", help="Significance level of the test for --detect."),
+        typer.Option(
+            "--alpha", metavar="P", help="Significance level of the test.", rich_help_panel=DETECT
+        ),
     ] = 0.05,
     optimise: Annotated[
         bool,
         typer.Option(
             "--optimise",
-            help="Search for the most precise PRBS (clock, bits, amplitude) within the guard's "
-            "limits.",
+            help="Search for the most precise PRBS. Its clock, bits and amplitude, within the "
+            "guard's limits.",
+            rich_help_panel=PERTURB,
         ),
     ] = False,
     criterion: Annotated[
         str,
         typer.Option(
             metavar="NAME",
-            help="What --optimise minimises: minimax (the largest relative error), A (their root "
-            "mean square) or D (the volume of the confidence region).",
+            help="What --optimise minimises: minimax, A or D. Minimax is the largest relative "
+            "error, A their root mean square, D the volume of the confidence region.",
+            rich_help_panel=PERTURB,
+            hidden=True,
         ),
     ] = "minimax",
     multisine: Annotated[
         bool,
         typer.Option(
             "--multisine",
-            help="Compare the PRBS with a multisine; with --out also write multisine.csv.",
+            help="Compare the PRBS with a multisine. With --out also write multisine.csv.",
+            rich_help_panel=PERTURB,
         ),
     ] = False,
     body_mass_kg: Annotated[
@@ -66,7 +92,9 @@ def design(
         typer.Option(
             "--body-mass",
             metavar="KG",
-            help="Body mass for the bandwidth of App. A, whose subject has 7.7 kg.",
+            help="Body mass for the bandwidth of the paper's arm. There it is 7.7 kg (App. A).",
+            rich_help_panel=PERTURB,
+            hidden=True,
         ),
     ] = None,
     forearm_m: Annotated[
@@ -74,24 +102,28 @@ def design(
         typer.Option(
             "--forearm",
             metavar="M",
-            help="Length of the forearm for the bandwidth of App. A, where it has 0.15 m.",
+            help="Length of the forearm for that bandwidth. There it is 0.15 m (App. A).",
+            rich_help_panel=PERTURB,
+            hidden=True,
         ),
     ] = None,
+    full: Annotated[
+        bool, typer.Option("--full", help="Show all of it.", rich_help_panel=WRITE)
+    ] = False,
 ) -> None:
-    """Predict stability, standard errors and the number of epochs needed, before anything moves.
+    """Plan an experiment: stability, precision, days needed.
 
     Shows the perturbations and their band, the session, the stability of the loop, and the standard
-    errors to expect. The exit status is 1 if the loop is unstable, or nearly so, with the joint of
-    a condition.
+    errors to expect, before anything moves. The exit status is 1 if the loop is unstable, or nearly
+    so, with the joint of a condition.
 
     \b
     For example:
       rigidimeter design
       rigidimeter design --settings rig.toml --out planned --json numbers.json
-      rigidimeter design --settings rig.toml --detect damping=20% --power 0.8
-      rigidimeter design --settings rig.toml --optimise --multisine
-      rigidimeter design --body-mass 70 --forearm 0.26
+      rigidimeter design --detect damping=20% --detect stiffness=20% --from study
     """
+    from rigidimeter.cli.design_screen import first_screen
     from rigidimeter.cli.design_text import design_blocks
     from rigidimeter.cli.progress import Meter
     from rigidimeter.core.files import write_json
@@ -99,22 +131,24 @@ def design(
     from rigidimeter.planning import Forearm, check_criterion, design_document
     from rigidimeter.planning import design as compute
 
-    keep_inputs((json_out,), [settings] if settings is not None else [])
+    keep_inputs((json_out,), [path for path in (settings, from_study) if path is not None])
     check_criterion(criterion)
     size = {"body_mass_kg": body_mass_kg, "length_m": forearm_m}
     given = {name: value for name, value in size.items() if value is not None}
+    scatter = None if from_study is None else _scatter_of(from_study)
     with Meter("design", 1.0, from_first=True) as meter:
         designed = compute(
             settings,
             differences=detect or (),
             power=power,
             alpha=alpha,
+            scatter=scatter,
             search=criterion if optimise else None,
             with_multisine=multisine,
             forearm=Forearm(**given) if given else None,
             progress=meter.advance,
         )
-    show(design_blocks(designed, power, alpha))
+    show(design_blocks(designed) if full else first_screen(designed))
     if out is not None:
         from rigidimeter.analysis.report.design_folder import write_design_folder
 
@@ -122,3 +156,32 @@ def design(
     if json_out is not None:
         write_json(json_out, design_document(designed))
     refuse_unstable(designed.settings, designed.stability)
+
+
+def _scatter_of(folder: Path) -> dict[str, Scatter]:
+    """Estimate every epoch of a study, and return how much inertia, damping and stiffness vary."""
+    from rigidimeter.analysis.study import day_scatter, estimate_study, read_study
+    from rigidimeter.cli.inputs import say
+    from rigidimeter.cli.progress import Meter
+    from rigidimeter.core.study_files import STUDY_FILE, is_study
+    from rigidimeter.planning import CORRELATION, Scatter
+
+    if not is_study(folder):
+        raise UserError(f"--from {folder}: is no study folder: it has no {STUDY_FILE}")
+    with Meter("read", 1.0) as meter:
+        read = read_study(folder, progress=meter.advance)
+    with Meter("estimate", 1.0) as meter:
+        analysis, notices = estimate_study(read, meter.advance)
+    say((*read.notices, *notices))
+    found = {}
+    for one in day_scatter(read, analysis):
+        source, of_one = f"{folder}, {one.epochs} epochs", one.condition_in_day_percent
+        if math.isnan(of_one):
+            of_one = one.between_days_percent * math.sqrt(1.0 - CORRELATION)
+            source += ", no two days with both conditions: half of the variance of days in one"
+        else:
+            source += f", {one.days_both} days with both conditions"
+        found[one.name.partition("_")[0]] = Scatter(
+            one.between_epochs_percent, one.between_days_percent, of_one, source
+        )
+    return found

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from decimal import Decimal
 
+from rigidimeter.cli.design_screen import days_needed
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
 from rigidimeter.core.units import deg_from_rad, rad_from_deg
 from rigidimeter.model import Margins
 from rigidimeter.planning import (
     Candidate,
     Design,
-    Detection,
     MultisineComparison,
     chip_count,
     prbs_period_s,
@@ -20,8 +21,10 @@ from rigidimeter.planning import (
 )
 
 _SHOWN = 8
-_HEADS = ("J\nkg·m²", "B\nN·m·s/rad", "K\nN·m/rad")
-_UNITS = {"inertia": "kg·m²", "damping": "N·m·s/rad", "stiffness": "N·m/rad"}
+_HEADS = ("J\n10⁻³ kg·m²", "B\nN·m·s/rad", "K\nN·m/rad")
+_SCALES = (1e3, 1.0, 1.0)
+"""To the units of `_HEADS`, as J is written everywhere."""
+
 _EQUAL = {
     "prbs": "PRBS",
     "same_peak_torque": "same peak torque",
@@ -30,13 +33,14 @@ _EQUAL = {
 }
 
 
-def design_blocks(design: Design, power: float, alpha: float) -> Iterator[Block]:
-    """Yield the text, section by section; `power` and `alpha` are those that were asked for."""
+def design_blocks(design: Design) -> Iterator[Block]:
+    """Yield the text, section by section."""
     sections = [
         part(design)
         for part in (_prbs, _sinusoid, _controller, _bandwidth, _protocol, _stability, _precision)
     ]
-    sections += [_detection(found, power, alpha) for found in design.detections]
+    if design.detections:
+        sections.append(days_needed(design.detections))
     if design.ranked is not None:
         sections.append(_ranking(design, design.ranked))
     if design.multisine is not None:
@@ -133,7 +137,7 @@ def _bandwidth(design: Design) -> Iterator[Block]:
     rows = [
         (
             "".join("−0+"[sign + 1] for sign in corner.signs) if any(corner.signs) else "nominal",
-            f"{corner.joint.inertia_kg_m2:.4f}",
+            f"{1e3 * corner.joint.inertia_kg_m2:.1f}",
             f"{corner.joint.damping_nm_s_rad:.3f}",
             f"{corner.joint.stiffness_nm_rad:.2f}",
             f"{corner.bandwidth_hz:.2f}",
@@ -196,7 +200,7 @@ def _precision(design: Design) -> Iterator[Block]:
         ]
         if counts[name] > 1:
             errors.insert(2, (f"iv, {counts[name]} epochs pooled", found.iv_pooled(counts[name])))
-        rows = [(what, *map(_error, values, found.values)) for what, values in errors]
+        rows = [(what, *map(_error, values, found.values, _SCALES)) for what, values in errors]
         yield Table((f"subject {name}", *_HEADS), rows, "<>>>")
         if any(found.least_squares_bias):
             off = ", ".join(
@@ -216,8 +220,20 @@ def _band(band_hz: tuple[float, float]) -> str:
     return f"{low:.2g}–{high:.2g} Hz"
 
 
-def _error(error: float, value: float) -> str:
-    return f"{error:.2g} ({100.0 * error / value:.2g} %)" if value else f"{error:.2g}"
+def _error(error: float, value: float, scale: float) -> str:
+    share = f" ({100.0 * error / value:.2g} %)" if value else ""
+    return _plain(scale * error) + share
+
+
+def _plain(value: float, digits: int = 2) -> str:
+    """Return a number of so many digits without an exponent.
+
+    Examples
+    --------
+    >>> _plain(0.00009163), _plain(0.01234, 3)
+    ('0.000092', '0.0123')
+    """
+    return f"{Decimal(f'{value:.{digits}g}'):f}"
 
 
 def _ranking(design: Design, ranked: tuple[Candidate, ...]) -> Iterator[Block]:
@@ -257,32 +273,10 @@ def _multisine(found: MultisineComparison) -> Iterator[Block]:
     )
     for name, errors in found.errors.items():
         rows = [
-            (_EQUAL[what], *(f"{value:.3g}" for value in values)) for what, values in errors.items()
+            (
+                _EQUAL[what],
+                *(_plain(scale * value, 3) for scale, value in zip(_SCALES, values, strict=True)),
+            )
+            for what, values in errors.items()
         ]
         yield Table((f"subject {name}", *_HEADS), rows, "<>>>")
-
-
-def _detection(found: Detection, power: float, alpha: float) -> Iterator[Block]:
-    """Yield how many epochs a difference needs."""
-    wanted, effect = found.wanted, found.effect
-    unit = _UNITS[wanted.parameter]
-    share = f" ({wanted.amount:g} %)" if wanted.percent else ""
-    yield Heading(
-        f"To detect a {wanted.parameter} different by {abs(effect.difference):.4g} {unit}{share} "
-        f"from subject {found.condition}"
-    )
-    yield f"  an epoch's value scatters by {effect.sd_x:.3g} and {effect.sd_y:.3g} {unit}"
-    yield (
-        f"  (standard error of iv, and {found.cv_percent:g} % from epoch to epoch: "
-        f"subject.{found.condition}.{wanted.parameter}_cv_percent)"
-    )
-    yield (
-        f"  {found.needed} epochs in each condition give a power of "
-        f"{found.power:.2f} (wanted {power:g}; rank-sum test at {alpha:g})"
-    )
-    yield "  power with " + ", ".join(f"{n}: {value:.2f}" for n, value in found.powers.items())
-    if found.planned is not None:
-        yield (
-            f"  the protocol's {found.planned[0]} and {found.planned[1]} epochs give "
-            f"{found.planned_power:.2f}"
-        )

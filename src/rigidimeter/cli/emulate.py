@@ -17,7 +17,11 @@ def emulate(
     ] = "cia402",
     joint: Annotated[
         tuple[float, float, float],
-        typer.Option("--joint", metavar="J B K", help="The arm, in kg·m², N·m·s/rad and N·m/rad."),
+        typer.Option(
+            "--joint",
+            metavar="J B K",
+            help="J, B, K in kg·m², N·m·s/rad, N·m/rad.",
+        ),
     ] = (0.0045, 0.1368, 1.751),
     rig_out: Annotated[
         Path | None,
@@ -38,15 +42,16 @@ def emulate(
     ] = 50.0,
     seed: Annotated[int, typer.Option("--seed", help="Seed of all random numbers.")] = 1,
 ) -> None:
-    """Emulate a rig: an arm with a torque sensor (UDP) and a drive (CANopen or ASCII).
+    """Emulate a rig: an arm, a torque sensor and a drive.
 
-    Prints one line of JSON when ready, then reads commands, one per line, and answers each with a
-    line of JSON; the command `help` lists them. It ends with the end of its input.
+    The torque sensor sends UDP, the drive speaks CANopen or ASCII. Prints one line of JSON when
+    ready, then reads commands, one per line, and answers each with a line of JSON; the command
+    `help` lists them. It ends with the end of its input.
 
     \b
     For example:
       rigidimeter emulate --rig-out RIG.toml
-      rigidimeter emulate --drive ascii --joint 0.0045 0.14 1.75 --rig-out RIG.toml
+      rigidimeter emulate --drive ascii --joint 0.0045 0.14 1.75
     """
     from rigidimeter.model import JointDynamics
     from rigidimeter.testing import EmulatedRig, serve

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigidimeter.cli.help_pages import HOW_TO_READ, WRITE
 from rigidimeter.cli.inputs import analyse_recordings, say, say_analysed, study_of
 from rigidimeter.cli.options import KeyOption
 from rigidimeter.cli.output import echo
@@ -23,29 +24,71 @@ if TYPE_CHECKING:
 @reads_recordings
 def export(
     recordings: Recordings,
-    to: Annotated[str, typer.Option("--to", metavar="FORMAT", help="The format.")],
+    to: Annotated[
+        str,
+        typer.Option(
+            "--to",
+            metavar="FORMAT",
+            help="Format: nwb, bids, parquet, csv, mat.",
+            rich_help_panel=WRITE,
+        ),
+    ],
     out: Annotated[
         Path,
         typer.Option(
-            "--out", metavar="PATH", help="What to write: one file, or a folder of several."
+            "--out",
+            metavar="PATH",
+            help="File, or folder of several files.",
+            rich_help_panel=WRITE,
         ),
     ],
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace files of the same name.")
+        bool,
+        typer.Option(
+            "--overwrite",
+            help="Replace files of the same name.",
+            rich_help_panel=WRITE,
+            hidden=True,
+        ),
     ] = False,
     estimates: Annotated[
         bool,
-        typer.Option("--estimates/--no-estimates", help="Whether J, B, K and scores travel along."),
+        typer.Option(
+            "--estimates/--no-estimates",
+            help="Whether J, B, K and scores travel along.",
+            rich_help_panel=WRITE,
+            hidden=True,
+        ),
     ] = True,
     subject: Annotated[
-        str, typer.Option("--subject", metavar="NAME", help="The subject of single recordings.")
+        str,
+        typer.Option(
+            "--subject",
+            metavar="NAME",
+            help="The subject of single recordings.",
+            rich_help_panel=HOW_TO_READ,
+            hidden=True,
+        ),
     ] = "",
     day: Annotated[
-        str, typer.Option("--day", metavar="NAME", help="The day of single recordings.")
+        str,
+        typer.Option(
+            "--day",
+            metavar="NAME",
+            help="The day of single recordings.",
+            rich_help_panel=HOW_TO_READ,
+            hidden=True,
+        ),
     ] = "",
     joint: Annotated[
         str,
-        typer.Option("--joint", metavar="NAME", help="The joint of single recordings, as elbow."),
+        typer.Option(
+            "--joint",
+            metavar="NAME",
+            help="The joint of single recordings, as elbow.",
+            rich_help_panel=HOW_TO_READ,
+            hidden=True,
+        ),
     ] = "",
     started: Annotated[
         datetime | None,
@@ -54,11 +97,13 @@ def export(
             metavar="TIME",
             formats=["%Y-%m-%dT%H:%M:%S%z", "%Y-%m-%dT%H:%M%z"],
             help="When single recordings began that do not say so, as 2026-03-01T10:30+0100.",
+            rich_help_panel=HOW_TO_READ,
+            hidden=True,
         ),
     ] = None,
     key: KeyOption = None,
 ) -> None:
-    """Write session folders, recordings or a study in another format.
+    """Write sessions, recordings or a study in another format.
 
     Each sensor keeps its own clock, values are in SI units, and settings, stimulation, ratings,
     exclusions, estimates with intervals and the version of the software travel along. A recording
@@ -67,9 +112,8 @@ def export(
 
     \b
     For example:
-      rigidimeter export session --to parquet --out session-parquet
       rigidimeter export demo-study --to mat --out matlab
-      rigidimeter export elbow.csv --epoch-length-s 20 --to mat --out elbow.mat --subject S1
+      rigidimeter export elbow.csv --to mat --out elbow.mat --subject S1
     """
     from rigidimeter.analysis.export import export_sessions, format_named
     from rigidimeter.cli.progress import Meter

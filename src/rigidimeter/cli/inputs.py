@@ -91,9 +91,22 @@ def keep_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path]) -> None:
 
 
 def say(notices: Iterable[Notice]) -> None:
-    """Print notices to the standard error, one sentence a line."""
+    """Print notices to the standard error, one sentence a line.
+
+    What is the same of several files is said once, of the first of them.
+    """
+    same: dict[tuple[str, str, str], list[str]] = {}
     for notice in notices:
-        echo(f"{notice.level}: {notice.text}", err=True)
+        place, colon, rest = notice.text.partition(": ")
+        # A path is told from words by its separator; only what it holds may be said for others.
+        key = (rest, Path(place).name) if colon and os.sep in place else (notice.text, "")
+        same.setdefault((notice.level, *key), []).append(place)
+    for (level, text, name), places in same.items():
+        if name and len(places) > 1:
+            text = f"{places[0]} and {len(places) - 1} more: {text}"
+        elif name:
+            text = f"{places[0]}: {text}"
+        echo(f"{level}: {text}", err=True)
 
 
 def _say_failed(analysis: Analysis) -> bool:
@@ -117,7 +130,7 @@ class AnalysedStudy(NamedTuple):
         bad = any(notice.level == "error" for notice in self.result.notices)
         bad |= _say_failed(self.result.analysis)
         if self.not_kept:
-            echo(f"error: the analysis is not kept: {self.not_kept}", err=True)
+            echo(f"error: the analysis is not stored: {self.not_kept}", err=True)
         return int(bad or bool(self.not_kept))
 
 

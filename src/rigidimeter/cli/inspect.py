@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigidimeter.cli.help_pages import WRITE
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import Table, show
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.words import with_error
 
 if TYPE_CHECKING:
     from rigidimeter.analysis.reading.channels.inspection import Inspection
@@ -24,19 +26,25 @@ def inspect(
     write_mapping: Annotated[
         Path | None,
         typer.Option(
-            "--write-mapping", metavar="FILE", help="Write a mapping file that reads the file."
+            "--write-mapping",
+            metavar="FILE",
+            help="A mapping file that reads the file.",
+            rich_help_panel=WRITE,
         ),
     ] = None,
     plot: Annotated[
         Path | None,
         typer.Option(
-            "--plot", metavar="FILE", help="Draw the columns, as an image (.png, .svg, .pdf)."
+            "--plot",
+            metavar="FILE",
+            help="The columns as an image (.png, .svg, .pdf).",
+            rich_help_panel=WRITE,
         ),
     ] = None,
 ) -> None:
-    """Show what is in a file and how it would be read, without estimating anything.
+    """Show what is in a file and how it would be read.
 
-    The exit status is 1 if a file cannot be read without being told more.
+    Nothing is estimated. The exit status is 1 if a file cannot be read without more options.
 
     \b
     For example:
@@ -84,7 +92,7 @@ def _inspect(
         options = joined_options(options)
         joining = _joining_words(recordings, given)
         if offset is not None:
-            echo(f"clock offset: {offset.value_s:.4f} ± {offset.error_s:.2g} s")
+            echo(f"clock offset: {with_error(offset.value_s, offset.error_s)} s")
     else:
         content = read_content(paths[0], options)
         if not isinstance(content, Table):

@@ -26,6 +26,7 @@ from rigidimeter.cli.console import console
 from rigidimeter.cli.design import design
 from rigidimeter.cli.emulate import emulate
 from rigidimeter.cli.estimate import estimate
+from rigidimeter.cli.explain import explain
 from rigidimeter.cli.export import export
 from rigidimeter.cli.inspect import inspect
 from rigidimeter.cli.model import model
@@ -47,7 +48,6 @@ app = typer.Typer(
     name="rigidimeter",
     cls=VisibleErrors,
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
@@ -75,8 +75,8 @@ def _root(
             metavar="FILE",
             callback=_load,
             is_eager=True,
-            help="First run a Python file that adds an estimator, a file format, a term or a "
-            "check; repeat as needed.",
+            help="First run a Python file of extensions. It adds an estimator, a file format, a "
+            "term or a check; repeat as needed.",
         ),
     ] = None,
     version: Annotated[
@@ -84,38 +84,25 @@ def _root(
         typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
     ] = False,
 ) -> None:
-    """Measure joint rigidity: plan, run or simulate, estimate J, B and K, compare, report.
+    """Measure joint rigidity. Research software, not a medical device.
 
     \b
-    A first look:   rigidimeter demo --out demo-study
-    Your own data:  rigidimeter estimate recording.csv --epoch-length-s 20
-
-    rigidimeter is research software, not a medical device.
+    Analyse a recording:  rigidimeter estimate elbow.csv --epoch-length-s 20
+    Try all of it:        rigidimeter demo (a virtual subject on a virtual rig)
+    Run a rig:            rigidimeter console protocol.toml --rig rig.toml
     """
 
 
-for command in (
-    design,
-    simulate,
-    run,
-    console,
-    commission,
-    check,
-    emulate,
-    estimate,
-    batch,
-    inspect,
-    model,
-    compare,
-    ratings,
-    report,
-    export,
-    reproduce,
-    recover,
-    demo,
-):
-    app.command(cls=RegistryCommand)(command)
-app.add_typer(study)
+for panel, commands in {
+    "Analyse": (estimate, compare, report, model, inspect, explain, batch, export),
+    "Plan": (design, simulate),
+    "Measure": (run, console, commission, check, emulate, recover),
+    "Paper": (reproduce, ratings),
+    "Start": (demo,),
+}.items():
+    for command in commands:
+        app.command(cls=RegistryCommand, rich_help_panel=panel)(command)
+app.add_typer(study, rich_help_panel="Start")
 
 
 def _terminated(_signal: int, _frame: FrameType | None) -> None:

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigidimeter.cli.help_pages import ESTIMATE
 from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import JsonOption
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
-from rigidimeter.cli.terminal_tables import Block, Heading, Table, show, with_error
+from rigidimeter.cli.terminal_tables import Block, Heading, Table, show
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.words import with_error
 
 if TYPE_CHECKING:
     from rigidimeter.analysis.estimation.terms import Comparison, ModelRow
@@ -32,21 +34,23 @@ def model(
         typer.Option(
             "--terms",
             metavar="NAME,NAME,...",
-            help="The terms of the torque, by their names. Repeat to compare your own models.",
+            help="Terms of the torque, by their names. Repeat to compare your own models.",
+            rich_help_panel=ESTIMATE,
         ),
     ] = None,
     compare: Annotated[
         bool,
         typer.Option(
             "--compare",
-            help="Let each model predict blocks of an epoch that it has not seen, and recommend "
-            "one. With one --terms, try J, B and K alone, with each further term, and more beside "
-            "the best as long as they predict better.",
+            help="Compare models, and recommend one. Each model predicts blocks of an epoch that "
+            "it has not seen. With one --terms, J, B and K alone are tried, with each "
+            "further term, and more beside the best as long as they predict better.",
+            rich_help_panel=ESTIMATE,
         ),
     ] = False,
     json_out: JsonOption = None,
 ) -> None:
-    """Fit the torque as a sum of terms by name, and find which terms it needs.
+    """Fit the torque as a sum of terms, and find the terms it needs.
 
     Recordings are read as by `estimate`. A band from 0 Hz (--band-hz 0 40) keeps the mean of the
     torque, which offset and coulomb need. Each epoch passes the checks of `estimate` first. The
@@ -54,10 +58,8 @@ def model(
 
     \b
     For example:
-      rigidimeter model demo-study/sessions/day-1
-      rigidimeter model ankle.npz --column angle_rad=position_rad --column torque_nm=torque_Nm \\
-          --reaction --terms inertia,damping,stiffness,reflex --compare
-      rigidimeter model elbow.csv --terms inertia,damping,stiffness,offset,coulomb --band-hz 0 20
+      rigidimeter model ankle.csv --terms inertia,stiffness,reflex --compare
+      rigidimeter model elbow.csv --terms inertia,stiffness,coulomb --band-hz 0 20
     """
     from rigidimeter.analysis.estimation.terms import candidates, parse_terms
     from rigidimeter.analysis.study.torque_models import model_document, model_recording
@@ -106,10 +108,7 @@ def _blocks(found: ModelledEpoch) -> list[Block]:
     heading: list[Block] = [Heading(f"{found.epoch.name}, {low:.4g} to {high:.4g} Hz")]
     if found.clock:
         heading.append(f"  {found.clock}")
-    findings = [
-        f"  {finding.level}: {finding.text}. Remedy: {finding.remedy}."
-        for finding in found.models.findings
-    ]
+    findings = [f"  {one.level}  {one.name}  {one.headline}" for one in found.models.findings]
     if not found.compared:
         fits = (block for row in compared.rows for block in _fit_blocks(row))
         return [*heading, *fits, *findings]
@@ -156,7 +155,7 @@ def _fit_blocks(row: ModelRow) -> list[Block]:
     rows = [
         (
             f"{one.term} {one.name}".strip(),
-            with_error(one.value, one.standard_error, ".5g"),
+            with_error(one.value, one.standard_error),
             one.unit,
         )
         for one in fit.parameters
@@ -168,7 +167,7 @@ def _fit_blocks(row: ModelRow) -> list[Block]:
         *(f"    {remark}" for remark in fit.remarks),
         *(
             f"    {one.term} from what no linear loop explains: "
-            f"{with_error(one.value, one.standard_error, '.5g')} {one.unit}"
+            f"{with_error(one.value, one.standard_error)} {one.unit}"
             for one in row.beyond
         ),
     ]

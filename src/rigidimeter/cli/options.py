@@ -8,10 +8,18 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperArgument, TyperCommand, TyperOption
+from typer.core import TyperArgument, TyperOption
+
+from rigidimeter.cli.help_pages import (
+    HOW_TO_READ,
+    READ,
+    RUN,
+    WRITE,
+    HelpCommand,
+)
 
 
-class RegistryCommand(TyperCommand):
+class RegistryCommand(HelpCommand):
     """A command whose help lists formats, estimators and terms, those of `--load` too."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -26,34 +34,32 @@ class RegistryCommand(TyperCommand):
                     )
         return super().parse_args(ctx, args)
 
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Fill in what there is to choose from; only here, because it imports all of it."""
-        for parameter in self.params:
-            if isinstance(parameter, TyperArgument) and parameter.name == "paths":
-                from rigidimeter.analysis.reading.formats import formats_text
+    def full_text(self, parameter: Any) -> str:
+        """Return what there is to choose from; this imports all of it."""
+        if isinstance(parameter, TyperArgument) and parameter.name == "paths":
+            from rigidimeter.analysis.reading.formats import formats_text
 
-                parameter.help = f"What to read: {formats_text()}."
-            if isinstance(parameter, TyperOption) and "--method" in parameter.opts:
-                from rigidimeter.analysis.estimation import METHODS
+            return f"What to read: {formats_text()}."
+        if "--method" in parameter.opts:
+            from rigidimeter.analysis.estimation import METHODS
 
-                known = ", ".join(f"{method.name} ({method.title})" for method in METHODS)
-                parameter.help = (
-                    "auto (iv where the perturbation was recorded, else bandlimited), or one of: "
-                    f"{known}."
-                )
-            if isinstance(parameter, TyperOption) and "--to" in parameter.opts:
-                from rigidimeter.analysis.export import FORMATS
+            known = ", ".join(f"{method.name} ({method.title})" for method in METHODS)
+            return (
+                f"auto (iv where the perturbation was recorded, else bandlimited), or one of: "
+                f"{known}."
+            )
+        if "--to" in parameter.opts:
+            from rigidimeter.analysis.export import FORMATS
 
-                known = ", ".join(f"{each.name} ({each.title})" for each in FORMATS)
-                parameter.help = f"The format: {known}."
-            if isinstance(parameter, TyperOption) and "--terms" in parameter.opts:
-                from rigidimeter.analysis.estimation.terms import term_names
+            return f"Format: {', '.join(f'{each.name} ({each.title})' for each in FORMATS)}."
+        if "--terms" in parameter.opts:
+            from rigidimeter.analysis.estimation.terms import term_names
 
-                parameter.help = (
-                    f"Terms of the torque: {', '.join(term_names())} (+ or - after a reflex: the "
-                    "direction that stretches the muscle). Repeat to compare your own models."
-                )
-        super().format_help(ctx, formatter)
+            return (
+                f"Terms of the torque: {', '.join(term_names())} (+ or - after a reflex: the "
+                "direction that stretches the muscle). Repeat to compare your own models."
+            )
+        return super().full_text(parameter)
 
 
 SettingsOption = Annotated[
@@ -61,22 +67,45 @@ SettingsOption = Annotated[
     typer.Option(
         "--settings",
         metavar="FILE",
-        help="Settings in TOML, such as examples/settings/study.toml. A value that the file does "
-        "not give has its default.",
+        help="Settings in TOML. A value that the file does not give has its default; "
+        "examples/settings/study.toml is an example.",
+        rich_help_panel=READ,
     ),
 ]
 JsonOption = Annotated[
-    Path | None, typer.Option("--json", metavar="FILE", help="Write all results to a JSON file.")
+    Path | None,
+    typer.Option(
+        "--json",
+        metavar="FILE",
+        help="All results, as JSON.",
+        rich_help_panel=WRITE,
+    ),
+]
+FullOption = Annotated[
+    bool,
+    typer.Option("--full", help="Show every table below the first screen.", rich_help_panel=WRITE),
 ]
 CsvOption = Annotated[
-    Path | None, typer.Option("--csv", metavar="FILE", help="Write the table to a CSV file.")
+    Path | None,
+    typer.Option(
+        "--csv",
+        metavar="FILE",
+        help="The table, as CSV.",
+        rich_help_panel=WRITE,
+    ),
 ]
 NewSessionOption = Annotated[
-    Path, typer.Option("--out", metavar="DIR", help="New folder for the session.")
+    Path,
+    typer.Option("--out", metavar="DIR", help="New folder for the session.", rich_help_panel=WRITE),
 ]
 RigOption = Annotated[
     Path | None,
-    typer.Option("--rig", metavar="RIG.toml", help="The rig file. Default: the virtual rig."),
+    typer.Option(
+        "--rig",
+        metavar="RIG.toml",
+        help="The rig file. Default: the virtual rig.",
+        rich_help_panel=READ,
+    ),
 ]
 PriorityOption = Annotated[
     int,
@@ -86,31 +115,53 @@ PriorityOption = Annotated[
         min=0,
         max=99,
         help="Real-time priority (SCHED_FIFO) of the loop; 0 for none.",
+        rich_help_panel=RUN,
+        hidden=True,
     ),
 ]
 CpuOption = Annotated[
     int | None,
-    typer.Option("--cpu", metavar="N", help="Processor of the loop. Default: the last one."),
+    typer.Option(
+        "--cpu",
+        metavar="N",
+        help="Processor of the loop. Default: the last one.",
+        rich_help_panel=RUN,
+        hidden=True,
+    ),
 ]
 NewStudyOption = Annotated[
-    Path, typer.Option("--out", metavar="DIR", help="New folder for the study.")
+    Path,
+    typer.Option("--out", metavar="DIR", help="New folder for the study.", rich_help_panel=WRITE),
 ]
 SeedOption = Annotated[
     int | None,
     typer.Option(
-        "--seed", metavar="N", help="Seed of all random numbers. Default: that of the settings."
+        "--seed",
+        metavar="N",
+        help="Seed of all random numbers. Default: that of the settings.",
+        rich_help_panel=RUN,
+        hidden=True,
     ),
 ]
 StudySeedOption = Annotated[
     int,
-    typer.Option("--seed", metavar="N", min=0, max=2**31, help="Seed of all random numbers."),
+    typer.Option(
+        "--seed",
+        metavar="N",
+        min=0,
+        max=2**31,
+        help="Seed of all random numbers.",
+        rich_help_panel=RUN,
+    ),
 ]
 KeyOption = Annotated[
     Path | None,
     typer.Option(
         "--key",
         metavar="FILE",
-        help="Blinding key of a study folder (columns code and condition), if it is kept "
+        help="Blinding key of a study folder (columns code and condition), if it is stored "
         "elsewhere.",
+        rich_help_panel=HOW_TO_READ,
+        hidden=True,
     ),
 ]

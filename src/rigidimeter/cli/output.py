@@ -10,7 +10,8 @@ from contextlib import contextmanager
 from typing import Any
 
 import typer
-from typer.core import TyperGroup
+
+from rigidimeter.cli.help_pages import HelpGroup
 
 
 def echo(text: str = "", *, err: bool = False) -> None:
@@ -30,7 +31,7 @@ def echo(text: str = "", *, err: bool = False) -> None:
     typer.echo(shown, err=err)
 
 
-class VisibleErrors(TyperGroup):
+class VisibleErrors(HelpGroup):
     """Commands whose errors of usage, which Click prints itself, show no word as it was given."""
 
     def make_context(self, *args: Any, **more: Any) -> Any:
@@ -46,12 +47,12 @@ class VisibleErrors(TyperGroup):
 
 @contextmanager
 def _visible() -> Iterator[None]:
-    from rigidimeter.core.files import visible
-
     try:
         yield
     except Exception as error:
         # Where Click's own exceptions are depends on the version of typer; they have a `show`.
         if hasattr(error, "show") and isinstance(message := getattr(error, "message", None), str):
+            from rigidimeter.core.files import visible
+
             error.message = visible(message, lines=True)  # type: ignore[attr-defined]
         raise

@@ -44,8 +44,9 @@ def ratings(
         list[str] | None,
         typer.Option(
             "--random",
-            metavar="examiner|subject|subject/day",
-            help="What has a random offset. Default: examiner. Repeat for several.",
+            metavar="NAME",
+            help="Random offset of examiner, subject or subject/day. Default: examiner; repeat "
+            "for several.",
         ),
     ] = None,
     scale: Annotated[
@@ -60,12 +61,12 @@ def ratings(
         typer.Option(
             "--contrast",
             metavar="A B",
-            help="Test A minus B. Default: the first two conditions in the file's order, OFF first "
-            "where it occurs.",
+            help="Test A minus B. Default: the first two conditions in the file's order, OFF "
+            "first where it occurs.",
         ),
     ] = None,
 ) -> None:
-    """Model ratings by several examiners: a mean for each condition, an offset for each examiner.
+    """Model ratings by several examiners, each with an offset.
 
     A linear mixed model by restricted maximum likelihood (Sec. 2.2 of the paper): condition means
     without intercept, random offsets. The contrast of two conditions is tested with residual
@@ -75,7 +76,7 @@ def ratings(
     \b
     For example:
       rigidimeter ratings ratings.csv --json ratings.json
-      rigidimeter ratings ratings.csv --score updrs --examiner rater --scale 0 4 --step 1
+      rigidimeter ratings ratings.csv --score updrs --scale 0 4 --step 1
       rigidimeter ratings ratings.csv --random subject/day --contrast OFF DBS
     """
     from rigidimeter.analysis.study.ratings_found import ratings_document

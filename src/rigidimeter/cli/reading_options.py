@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_type_hints
 
 import typer
 
+from rigidimeter.cli.help_pages import ESTIMATE, HOW_TO_READ
 from rigidimeter.cli.options import SettingsOption
 from rigidimeter.core.errors import UserError
 
@@ -25,18 +26,28 @@ class Recordings:
     """What the user named, and how to read and fit it; the fields are options of the commands."""
 
     paths: Annotated[
-        list[Path], typer.Argument(metavar="INPUT", help="What to read.", show_default=False)
+        list[Path],
+        typer.Argument(
+            metavar="INPUT", help="Sessions, tables and other recordings.", show_default=False
+        ),
     ]
     method: Annotated[
-        str, typer.Option("--method", metavar="NAME", help="The estimator, by its name.")
+        str,
+        typer.Option(
+            "--method",
+            metavar="NAME",
+            help="iv, bandlimited, spectral, published.",
+            rich_help_panel=ESTIMATE,
+        ),
     ] = "auto"
     column: Annotated[
         list[str] | None,
         typer.Option(
             "--column",
             metavar="NAME=COLUMN",
-            help="What the file calls a quantity, for example torque=Fz; torque_nm=Fz says that it "
-            "is in N·m. Repeat as needed.",
+            help="Column of a quantity, such as torque=Fz. Write torque_nm=Fz to say that it is "
+            "in N·m. Repeat as needed.",
+            rich_help_panel=HOW_TO_READ,
         ),
     ] = None
     unit: Annotated[
@@ -44,8 +55,9 @@ class Recordings:
         typer.Option(
             "--unit",
             metavar="NAME=UNIT",
-            help="The unit of a column, where the file does not state it, for example angle=deg or "
-            "time=ms; repeat as needed.",
+            help="Unit of a column, such as angle=deg. Where the file does not state it; repeat "
+            "as needed.",
+            rich_help_panel=HOW_TO_READ,
         ),
     ] = None
     scale: Annotated[
@@ -55,6 +67,8 @@ class Recordings:
             metavar="NAME=FACTOR",
             help='What a column is multiplied by, for example "torque=2.5 Nm/V", or "torque=0.25 '
             'm" for a force with a lever arm; repeat as needed.',
+            rich_help_panel=HOW_TO_READ,
+            hidden=True,
         ),
     ] = None
     offset: Annotated[
@@ -63,12 +77,19 @@ class Recordings:
             "--offset",
             metavar="NAME=VALUE",
             help='What a column reads at zero, for example "torque=0.1 V"; repeat as needed.',
+            rich_help_panel=HOW_TO_READ,
+            hidden=True,
         ),
     ] = None
     skip_rows: Annotated[
         int,
         typer.Option(
-            "--skip-rows", metavar="N", min=0, help="Lines at the beginning of a text not to read."
+            "--skip-rows",
+            metavar="N",
+            min=0,
+            help="Lines at the beginning of a text not to read.",
+            rich_help_panel=HOW_TO_READ,
+            hidden=True,
         ),
     ] = 0
     names: Annotated[
@@ -77,6 +98,8 @@ class Recordings:
             "--names",
             metavar="A,B,...",
             help="The names of the columns of a text that does not name them.",
+            rich_help_panel=HOW_TO_READ,
+            hidden=True,
         ),
     ] = None
     table: Annotated[
@@ -86,6 +109,8 @@ class Recordings:
             metavar="NAME",
             help="The sheet, or the variable of a MATLAB "
             "file, that is read, of a file with several.",
+            rich_help_panel=HOW_TO_READ,
+            hidden=True,
         ),
     ] = None
     mapping: Annotated[
@@ -95,12 +120,17 @@ class Recordings:
             metavar="FILE",
             help="A mapping file, which says columns, units and the like for the files of one "
             "laboratory; `rigidimeter inspect` writes one.",
+            rich_help_panel=HOW_TO_READ,
+            hidden=True,
         ),
     ] = None
     join: Annotated[
         bool,
         typer.Option(
-            "--join", help="The inputs are one recording, such as torque and motion in two files."
+            "--join",
+            help="The inputs are one recording, such as torque and motion in two files.",
+            rich_help_panel=HOW_TO_READ,
+            hidden=True,
         ),
     ] = False
     clock_offset: Annotated[
@@ -110,20 +140,27 @@ class Recordings:
             metavar="S|found",
             help="With --join: seconds to add to the clocks of the second and later inputs; found: "
             "estimated from torque and motion.",
+            rich_help_panel=HOW_TO_READ,
+            hidden=True,
         ),
     ] = None
     rate_hz: Annotated[
         float | None,
         typer.Option(
-            "--rate-hz", metavar="HZ", help="Sampling rate of a file without a time_s column."
+            "--rate-hz",
+            metavar="HZ",
+            help="Sampling rate of a file without a time_s column.",
+            rich_help_panel=HOW_TO_READ,
+            hidden=True,
         ),
     ] = None
     reaction: Annotated[
         bool,
         typer.Option(
             "--reaction",
-            help="The file holds the reaction torque of the joint, the negative of the torque that "
-            "drives it.",
+            help="Torque is the joint's reaction, of opposite sign. The file holds the negative "
+            "of the torque that drives the joint.",
+            rich_help_panel=HOW_TO_READ,
         ),
     ] = False
     epoch_length_s: Annotated[
@@ -131,7 +168,8 @@ class Recordings:
         typer.Option(
             "--epoch-length-s",
             metavar="S",
-            help="Cut a file without an epoch column into epochs of this length.",
+            help="Cut into epochs of this length. For a file without an epoch column.",
+            rich_help_panel=HOW_TO_READ,
         ),
     ] = None
     condition: Annotated[
@@ -139,8 +177,9 @@ class Recordings:
         typer.Option(
             "--condition",
             metavar="NAME",
-            help="Condition of files without a condition column: once for all of them, or once "
-            "for each input in their order.",
+            help="Condition of each input, in their order. For files without a condition column; "
+            "once for all of them, or once for each.",
+            rich_help_panel=HOW_TO_READ,
         ),
     ] = None
     task: Annotated[
@@ -149,6 +188,8 @@ class Recordings:
             "--task",
             metavar="prbs|sinusoid",
             help="Fit J, B and K (prbs) or score (sinusoid). Default: found from the motion.",
+            rich_help_panel=HOW_TO_READ,
+            hidden=True,
         ),
     ] = None
     leave_out: Annotated[
@@ -158,12 +199,17 @@ class Recordings:
             metavar='"[NAME=]START:STOP REASON"',
             help="Seconds on the recording's clock that no estimate uses, for example "
             '"12.3:14.0 cough"; NAME is a recording, where there are several. Repeat as needed.',
+            rich_help_panel=HOW_TO_READ,
+            hidden=True,
         ),
     ] = None
     blinded: Annotated[
         bool,
         typer.Option(
-            "--blinded", help="Of sessions that were recorded blinded: codes for the conditions."
+            "--blinded",
+            help="Of sessions that were recorded blinded: codes for the conditions.",
+            rich_help_panel=HOW_TO_READ,
+            hidden=True,
         ),
     ] = False
     band_hz: Annotated[
@@ -174,6 +220,8 @@ class Recordings:
             help="Band of the fit. Default: bandlimited 0.15 to 10 where the perturbation is "
             "known, else to 50; iv and spectral 0.15 to 30; at most 0.4 times the slowest "
             "channel's rate.",
+            rich_help_panel=ESTIMATE,
+            hidden=True,
         ),
     ] = None
     controller: Annotated[
@@ -184,6 +232,8 @@ class Recordings:
             help="Inertia in kg·m² and damping in N·m·s/rad of the admittance, for files without "
             "a manifest. Default: those of the settings, else the paper's. A wrong value makes iv "
             "less precise but does not bias it.",
+            rich_help_panel=ESTIMATE,
+            hidden=True,
         ),
     ] = None
     settings: SettingsOption = None

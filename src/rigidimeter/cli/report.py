@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigidimeter.cli.help_pages import WRITE
 from rigidimeter.cli.inputs import (
     analyse_recordings,
     analyse_study_folder,
@@ -30,29 +31,38 @@ if TYPE_CHECKING:
 @reads_recordings
 def report(
     recordings: Recordings,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the report.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out",
+            metavar="DIR",
+            help="Folder of the report.",
+            rich_help_panel=WRITE,
+        ),
+    ],
     title: Annotated[
         str | None,
         typer.Option(
             "--title",
             metavar="TEXT",
             help="Title of the page. Default: the title of the study, or Joint rigidity.",
+            rich_help_panel=WRITE,
         ),
     ] = None,
     key: KeyOption = None,
 ) -> None:
-    """Analyse recordings and write one self-contained HTML page, with its tables and figures.
+    """Write one HTML page of results, with its tables and figures.
 
     For a study folder (with a study.toml) the page also shows tests by days, effect sizes, ratings,
     other methods and every exclusion.
 
     \b
     For example:
-      rigidimeter report demo-study/sessions/day-1 demo-study/sessions/day-2 --out report
+      rigidimeter report demo-study/sessions/day-1 --out report
       rigidimeter report study --out study/report
       rigidimeter report ankle.csv --reaction --epoch-length-s 20 --out report
     """
-    from rigidimeter.analysis.study import recording_result
+    from rigidimeter.analysis.study import lead, recording_result
     from rigidimeter.core.session import is_session
 
     if any(is_session(folder) for folder in (out, *out.resolve().parents)):
@@ -63,7 +73,7 @@ def report(
     if (folder := study_of(recordings, key)) is not None:
         if out.resolve() in (folder.resolve(), (folder / "analysis").resolve()):
             raise UserError(
-                f"--out {out}: is the study or its kept analysis; name another folder, such as "
+                f"--out {out}: is the study or its stored analysis; name another folder, such as "
                 f"{folder / 'report'}"
             )
         study = analyse_study_folder(folder, recordings, key)
@@ -74,7 +84,9 @@ def report(
         last = partial(say_analysed, read, analysis)
         result = recording_result(read, analysis, command_line())
     try:
-        echo(str(write_page(result, out, title)))
+        page = write_page(result, out, title)
+        show([Heading(lead(result)), ""])
+        echo(str(page))
     finally:
         status = last()
     raise typer.Exit(status)
@@ -89,14 +101,12 @@ def can_be_made(out: Path) -> None:
 
 
 def write_page(result: StudyResult, out: Path, title: str | None = None) -> Path:
-    """Write the report of a result with progress, and show its verdict; return the page's path."""
+    """Write the report of a result with progress; return the path of its page."""
     from rigidimeter.analysis import report as reporting
     from rigidimeter.analysis.reading import write_estimates_json
-    from rigidimeter.analysis.report.verdict_text import verdict
     from rigidimeter.cli.progress import Meter
 
     with Meter("report", 1.0) as meter:
         page = reporting.report(result, out, title, progress=meter.reach)
     write_estimates_json(out / "estimates.json", result.analysis)
-    show([Heading(verdict(result).lead), ""])
     return page

@@ -24,11 +24,11 @@ def reproduce(
         typer.Option("--only", metavar="ID", help="Only this row; repeat for several."),
     ] = None,
 ) -> None:
-    """Recompute every equation, figure and table of the paper, next to the printed values.
+    """Recompute every equation, figure and table of the paper.
 
     Writes one self-contained page, paper.html, with a verdict for each row, ledger.json with the
     same rows, and the figures. The recordings of the animal were never published; rows that need
-    them use a virtual study of the same design and say so. That study is kept in
+    them use a virtual study of the same design and say so. That study is stored in
     DIR/virtual-study, where the other commands can read it.
 
     \b

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigidimeter.cli.console import HostOption, PortOption, TokenOption, run_on_page
+from rigidimeter.cli.help_pages import RUN
 from rigidimeter.cli.options import (
     CpuOption,
     NewSessionOption,
@@ -34,7 +35,10 @@ def run(
     resume: Annotated[
         Path | None,
         typer.Option(
-            "--resume", metavar="DIR", help="Continue this session: run the epochs that are left."
+            "--resume",
+            metavar="DIR",
+            help="Continue this session: run the epochs that are left.",
+            rich_help_panel=RUN,
         ),
     ] = None,
     seed: SeedOption = None,
@@ -42,7 +46,8 @@ def run(
         bool,
         typer.Option(
             "--unattended",
-            help="Run without an operator: what would pause the session ends it instead.",
+            help="Run without an operator. What would pause the session ends it instead.",
+            rich_help_panel=RUN,
         ),
     ] = False,
     priority: PriorityOption = 80,
@@ -51,22 +56,24 @@ def run(
         bool,
         typer.Option(
             "--console",
-            help="Lead the session from a page in a browser, as `rigidimeter console` does.",
+            help="Lead the session from a page in a browser. As `rigidimeter console` does.",
+            rich_help_panel=RUN,
         ),
     ] = False,
     blinded: Annotated[
         bool,
         typer.Option(
             "--blinded",
-            help="Show codes in place of conditions, for an examiner who may see the screen; also "
-            "with `estimate --blinded`.",
+            help="Show codes in place of conditions. For an examiner who may see the screen; "
+            "also with `estimate --blinded`.",
+            rich_help_panel=RUN,
         ),
     ] = False,
     host: HostOption = "127.0.0.1",
     port: PortOption = 8765,
     token: TokenOption = "",
 ) -> None:
-    """Run a protocol in real time, on the virtual rig or on hardware.
+    """Run a protocol in real time, on a rig or the virtual rig.
 
     Loop, recorder and live estimate run in separate processes. With --rig, the rig must have been
     commissioned (`rigidimeter commission`) and checked within a day (`rigidimeter check`). Fit
@@ -193,11 +200,11 @@ def recover(
         typer.Option("--force", help="Also a session that was closed and is damaged at its end."),
     ] = False,
 ) -> None:
-    """Close an interrupted session, keeping everything that was written or is still in memory.
+    """Close an interrupted session, keeping everything recorded.
 
-    Open epochs end with `fail` and the reason. A session that is closed already does not change,
-    and one that a process still records is refused.
-    Samples that a killed session left in memory are brought in, until the computer is switched off.
+    So is what is still in memory. Open epochs end with `fail` and the reason. A session that is
+    closed already does not change, and one that a process still records is refused. Samples that a
+    killed session left in memory are brought in, until the computer is switched off.
 
     \b
     For example:
@@ -218,5 +225,5 @@ def recover(
         return
     epochs = ", ".join(found.epochs_closed) or "none"
     kept = " and ".join(found.torn_files)
-    torn = f"; {found.torn_bytes} torn bytes of samples; kept: {kept}" if kept else ""
+    torn = f"; {found.torn_bytes} torn bytes of samples; stored in {kept}" if kept else ""
     echo(f"{session} is closed: {extent}; open epochs closed as failed: {epochs}{torn}")

@@ -32,15 +32,19 @@ def simulate(
         bool,
         typer.Option(
             "--paper-rates",
-            help="Torque at 100 samples/s, motion at 50 samples/s with up to 5 ms of jitter "
-            "(Sec. 2.2 of the paper).",
+            help="Sample as in the paper (Sec. 2.2). Torque at 100 samples/s, motion at 50 "
+            "samples/s with up to 5 ms of jitter.",
         ),
     ] = False,
     real_time: Annotated[
-        bool, typer.Option("--real-time", help="Run in real time, not as fast as possible.")
+        bool,
+        typer.Option(
+            "--real-time",
+            help="Run in real time, not as fast as possible.",
+        ),
     ] = False,
 ) -> None:
-    """Run a protocol on the virtual rig and record it as a session folder.
+    """Run a protocol on the virtual rig, and record a session folder.
 
     Uses the same loop, guard and recorder as on hardware, with a simulated drive, arm, subject and
     sensors. Without settings: four PRBS and four sinusoidal epochs in OFF.
@@ -51,7 +55,7 @@ def simulate(
     For example:
       rigidimeter simulate --out session
       rigidimeter simulate --out session --settings study.toml --seed 7
-      rigidimeter simulate --out session --task prbs --condition DBS --epochs 12 --paper-rates
+      rigidimeter simulate --out session --task prbs --condition DBS --epochs 12
     """
     from rigidimeter.cli.progress import Meter
     from rigidimeter.core.session import count_epochs, require_all

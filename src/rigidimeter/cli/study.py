@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigidimeter.cli.help_pages import HelpCommand, HelpGroup
 from rigidimeter.cli.inputs import analyse_study_folder
 from rigidimeter.cli.options import NewStudyOption, StudySeedOption
 from rigidimeter.cli.output import echo
@@ -21,18 +22,20 @@ study = typer.Typer(
     name="study",
     no_args_is_help=True,
     rich_markup_mode=None,
-    help="Make a study folder: an empty one, one of sessions that were run, or a virtual one.",
+    cls=HelpGroup,
+    help="Make a study folder: empty, of recorded sessions, or virtual.",
 )
 
 
-@study.command()
+@study.command(cls=HelpCommand)
 def new(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="New folder.", show_default=False)],
     title: Annotated[str, typer.Option("--title", metavar="TEXT", help="Title of the study.")] = "",
 ) -> None:
-    """Make a study folder: study.toml and its tables, with comments and no rows.
+    """Make an empty study folder: study.toml and its tables.
 
-    Write a row in sessions.csv for each session folder or recording, then run compare and report.
+    The tables have comments and no rows. Write a row in sessions.csv for each session folder or
+    recording, then run compare and report.
 
     \b
     For example:
@@ -46,7 +49,7 @@ def new(
     echo(f"{folder}: write your sessions into {folder / 'sessions.csv'}")
 
 
-@study.command()
+@study.command(cls=HelpCommand)
 def add(
     folder: Annotated[
         Path,
@@ -67,11 +70,12 @@ def add(
         typer.Option("--subject", metavar="CODE", help="Subject of sessions that do not say it."),
     ] = "",
 ) -> None:
-    """Add recorded sessions to a study folder: subject, day, conditions, stimulation, ratings.
+    """Add recorded sessions to a study folder.
 
-    `console` does so after each session. What was written or changed by hand stays as it is: a
-    study.toml that was edited must have the conditions of a session, and a session whose row is
-    made a comment (#) is not added again.
+    Subject, day, conditions, stimulation and ratings are added; `console` does so after each
+    session. What was written or changed by hand stays as it is: a study.toml that was edited must
+    have the conditions of a session, and a session whose row is made a comment (#) is not added
+    again.
 
     \b
     For example:
@@ -89,7 +93,7 @@ def add(
         raise UserError(*refused)
 
 
-@study.command()
+@study.command(cls=HelpCommand)
 def simulate(
     out: NewStudyOption,
     seed: StudySeedOption = 2023,
@@ -98,8 +102,8 @@ def simulate(
         typer.Option(
             "--design",
             metavar="paper|pushing|null",
-            help="paper: the conditions differ as in the paper. pushing: equal joints, and a "
-            "subject who pushes. null: the conditions do not differ.",
+            help="What differs between conditions. Paper: as in the paper; pushing: equal joints, "
+            "and a subject who pushes; null: nothing.",
         ),
     ] = "paper",
     processes: Annotated[
@@ -109,7 +113,7 @@ def simulate(
         ),
     ] = 2,
 ) -> None:
-    """Make a virtual study: sessions of nine days, ratings, and the tables that describe them.
+    """Make a virtual study: nine days, with ratings.
 
     Every epoch runs through the same loop, guard and recorder as on hardware. The counts are those
     of the paper's Table 1. Equal seeds give equal files, whatever the number of processes.
@@ -164,7 +168,7 @@ def demo(
     ] = 3,
     seed: StudySeedOption = 2023,
 ) -> None:
-    """Make a virtual study folder, compare its conditions, and write its report.
+    """Make a virtual study, compare its conditions, write its report.
 
     Each day has PRBS and sinusoidal epochs of 10 s in OFF and DBS on the virtual rig, 80 and 48 in
     all, and ratings. The same as study simulate, compare and report, for a smaller study. What was
@@ -176,7 +180,7 @@ def demo(
       rigidimeter demo
       rigidimeter demo --out small --days 3 --prbs-epochs 3
     """
-    from rigidimeter.cli.comparison_text import short_table
+    from rigidimeter.cli.comparison_text import comparison_blocks
     from rigidimeter.cli.report import write_page
     from rigidimeter.cli.terminal_tables import show
     from rigidimeter.virtual import SHORT_EPOCH_S, short_design
@@ -184,16 +188,18 @@ def demo(
     start_s = time.monotonic()
     _move_aside(out)
     echo(
-        f"A virtual subject, {days} days, OFF and DBS: {2 * days * prbs_epochs} PRBS and "
-        f"{2 * days * sinusoid_epochs} sinusoidal epochs of {SHORT_EPOCH_S:g} s with their rests"
+        f"A virtual subject on {days} days, OFF and DBS: {2 * days * prbs_epochs} PRBS and "
+        f"{2 * days * sinusoid_epochs} sinusoidal epochs of {SHORT_EPOCH_S:g} s"
     )
     _simulated(out, short_design(days, prbs_epochs, sinusoid_epochs), seed)
     found = analyse_study_folder(out, Recordings([out]))
     try:
         page = write_page(found.result, out / "report")
-        show([*short_table(found.result), ""])
-        echo(f"Done in {time.monotonic() - start_s:.0f} s. Open the report in a browser:")
-        echo(str(page.resolve()))
+        show(["", *comparison_blocks(found.result), ""])
+        echo(f"Done in {time.monotonic() - start_s:.0f} s. Open {page.resolve()}")
+        echo(
+            f"Next: rigidimeter compare {out} --full; rigidimeter estimate {out}/sessions/day-1-OFF"
+        )
     finally:
         status = found.say()
     raise typer.Exit(status)

@@ -12,7 +12,7 @@ import math
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import compress, groupby
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,6 +20,8 @@ import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from rigidimeter.core.words import Table as Description
 
 WIDEST = 100
 """Longer lines are hard to read, however wide the terminal."""
@@ -44,7 +46,7 @@ class Table(NamedTuple):
     Parameters
     ----------
     headings : sequence of str
-        A line feed begins a second line, such as that of the unit.
+        A line feed begins a second line, such as that of the unit. None: rows alone.
     rows : sequence
         As many cells as headings; or one text, which stands alone on its line across all columns.
     align : str
@@ -139,13 +141,14 @@ def _print_table(console: Console, table: Table, width: int) -> None:
     from rigidimeter.core.files import visible
 
     rows_of_cells = [row for row in table.rows if not isinstance(row, str)]
-    columns = zip(table.headings, *rows_of_cells, strict=True)
+    named = table.headings or ("",) * len(table.align)
+    columns = zip(named, *rows_of_cells, strict=True)
     filled = [any(cells) or not rows_of_cells for _, *cells in columns]
 
     def shown(cells: Iterable[str]) -> list[str]:
         return [visible(cell, lines=True) for cell in compress(cells, filled)]
 
-    headings, align = shown(table.headings), list(compress(table.align, filled))
+    headings, align = shown(named), list(compress(table.align, filled))
     rows = [row if isinstance(row, str) else shown(row) for row in table.rows]
     columns = zip(headings, *map(shown, rows_of_cells), strict=True)
     widths = _widths(["\n".join(cells) for cells in columns], align, width - table.indent)
@@ -164,7 +167,8 @@ def _print_table(console: Console, table: Table, width: int) -> None:
             grid.add_row(*map(Text, row))
         console.print(Padding.indent(grid, table.indent))
 
-    print_grid([], header=True)
+    if table.headings:
+        print_grid([], header=True)
     for is_text, group in groupby(rows, lambda row: isinstance(row, str)):
         if is_text:
             for text in group:
@@ -182,8 +186,9 @@ def _widths(columns: Sequence[str], align: Sequence[str], room: int) -> list[int
 
     natural = [max(map(cell_len, text.split("\n"))) for text in columns]
     words = [max([_LEAST_WORDS, *map(cell_len, text.split())]) for text in columns]
-    widths = list(natural)
+    widths = unbroken = list(natural)
     for least in (words, [_LEAST_WORDS] * len(columns)):
+        unbroken = list(widths)
         narrowest = [
             min(all_, one) if side == "<" else all_
             for all_, one, side in zip(natural, least, align, strict=True)
@@ -191,29 +196,35 @@ def _widths(columns: Sequence[str], align: Sequence[str], room: int) -> list[int
         while sum(widths) + _GAP * (len(widths) - 1) > room and widths != narrowest:
             foldable = [w if w > n else 0 for w, n in zip(widths, narrowest, strict=True)]
             widths[foldable.index(max(foldable))] -= 1
-    return widths
+    fits = sum(widths) + _GAP * (len(widths) - 1) <= room
+    return widths if fits else unbroken  # too wide whatever is broken
+
+
+def shown_table(table: Description, names: Mapping[str, str]) -> Table:
+    """Return a table as the page describes it, with the interval beside its value.
+
+    Parameters
+    ----------
+    table : core.words.Table
+    names : mapping of str to str
+        What each source is called.
+    """
+    from rigidimeter.core.words import WORDS, shown_below, shown_value
+
+    columns = table.shown_columns(several_sources=len(names) > 1)
+    rows = [
+        tuple(
+            " ".join(
+                filter(None, (shown_value(row.get(c.name), c, names), shown_below(row, c, names)))
+            )
+            for c in columns
+        )
+        for row in table.rows
+    ]
+    align = "".join("<" if c.kind in WORDS else ">" for c in columns)
+    return Table(["\n".join(filter(None, (c.group, c.heading))) for c in columns], rows, align)
 
 
 def number_text(value: float, digits: str = ".2g") -> str:
     """Return a number, or a dash where there is none."""
     return "–" if math.isnan(value) else f"{value:{digits}}"
-
-
-def with_error(value: float, standard_error: float, digits: str) -> str:
-    """Return a number ± its standard error to the same decimal, or alone without an error.
-
-    The error has two digits if they are below 36 and one above, as the Particle Data Group rounds.
-
-    Examples
-    --------
-    >>> with_error(0.136801, 8.7e-05, ".4g"), with_error(4.50012, 0.00281, ".5g")
-    ('0.13680±0.00009', '4.5001±0.0028')
-    """
-    shown = number_text(value, digits)
-    if math.isnan(standard_error):
-        return shown
-    if not 1e-8 < standard_error < 1e4 or not abs(value) < 1e6:
-        return f"{shown}±{standard_error:.2g}"
-    size = math.floor(math.log10(standard_error))
-    decimals = max((1 if standard_error < 3.55 * 10.0**size else 0) - size, 0)
-    return f"{value:.{decimals}f}±{standard_error:.{decimals}f}"

@@ -6,7 +6,7 @@ import math
 from functools import partial
 
 from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.numbers import number
+from rigidimeter.core.words import number
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Claim, near, rounded, within_percent
 from rigidimeter.paper.context import Context
@@ -50,7 +50,7 @@ def total_inertia(context: Context) -> Claim:
     estimated = printed.FIG_4.inertia_kg_m2 + CONTROLLER_INERTIA_KG_M2
     return Claim(
         ours=f"{number(total)} kg·m²",
-        reading="0.0052 is kept as the nominal value, because Eq. 8 is half of it. (The median "
+        reading="0.0052 remains the nominal value, because Eq. 8 is half of it. (The median "
         f"inertia of Sec. 3.5 plus the controller's would be {number(estimated)}.)",
         checks=(rounded("Total inertia", "kg·m²", printed.APP_A_INERTIA_TOTAL, total, 0.0001),),
     )

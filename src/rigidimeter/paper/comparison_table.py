@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.numbers import number
+from rigidimeter.core.words import number
 
 RowVerdict: TypeAlias = Literal["agrees", "differs", "cannot be computed from what was published"]
 

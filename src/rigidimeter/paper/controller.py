@@ -15,9 +15,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rigidimeter.analysis.report.numbers import number
 from rigidimeter.core.settings import ControllerSettings, PrbsSettings, Settings
 from rigidimeter.core.units import deg_from_rad, per_rad_from_per_deg
+from rigidimeter.core.words import number
 from rigidimeter.model import (
     JointDynamics,
     Loop,

@@ -14,9 +14,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from scipy.stats import norm
 
-from rigidimeter.analysis.report.numbers import number, p_value
 from rigidimeter.analysis.statistics import compare_published, effect_from_p, joint_test
 from rigidimeter.analysis.study import RatingsFound
+from rigidimeter.core.words import number, p_value
 from rigidimeter.paper.comparison_table import Bound, Claim, bounded, rounded, within_percent
 from rigidimeter.paper.context import Context
 from rigidimeter.paper.printed import MEASURED, TABLE_1, Measured

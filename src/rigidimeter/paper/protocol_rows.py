@@ -14,10 +14,10 @@ import numpy as np
 
 from rigidimeter.analysis.estimation import scoring_cycles
 from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.numbers import number
 from rigidimeter.analysis.report.sections.perturbation_figure import perturbation, spectrum
 from rigidimeter.core.records import Channel
 from rigidimeter.core.settings import BlockSettings
+from rigidimeter.core.words import number
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Claim, bounded, near, within_percent
 from rigidimeter.paper.context import Context

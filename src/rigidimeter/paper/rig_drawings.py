@@ -16,8 +16,8 @@ from matplotlib.patches import Arc, Circle, FancyBboxPatch, Polygon, Rectangle
 from scipy.constants import g
 
 from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.numbers import number
 from rigidimeter.analysis.report.style import GREY, styled
+from rigidimeter.core.words import number
 from rigidimeter.model import (
     BiquadState,
     admittance,

@@ -17,12 +17,12 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from rigidimeter.analysis.report.numbers import number
 from rigidimeter.analysis.report.page import data_uri, shown_text
 from rigidimeter.analysis.report.style import svg_text
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import json_text, write_text
 from rigidimeter.core.version import __version__
+from rigidimeter.core.words import number
 from rigidimeter.paper import appendix, controller, highpass, rig_drawings, score_rows
 from rigidimeter.paper import printed_effects as effects
 from rigidimeter.paper import protocol_rows as protocol

@@ -24,12 +24,12 @@ from scipy.interpolate import CubicSpline
 from rigidimeter.analysis.estimation import Cycles, score_epoch, scoring_cycles
 from rigidimeter.analysis.estimation.scores import loop_area_j
 from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.numbers import number
 from rigidimeter.analysis.report.sections.torque_angle_loop import loop, loop_limits
 from rigidimeter.analysis.report.style import GREY
 from rigidimeter.core.records import Channel, Epoch, Motion, Score
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.units import rad_from_deg
+from rigidimeter.core.words import number
 from rigidimeter.model import Array, JointDynamics
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Claim, bounded, within_percent

@@ -12,8 +12,8 @@ from functools import partial
 import numpy as np
 
 from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.numbers import number
 from rigidimeter.core.settings import Settings
+from rigidimeter.core.words import number
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Bound, Claim, bounded
 from rigidimeter.paper.context import Context

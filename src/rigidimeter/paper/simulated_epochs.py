@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimeter.analysis.estimation import fit_epochs
-from rigidimeter.analysis.report.numbers import number
 from rigidimeter.core.records import Fit
 from rigidimeter.core.settings import Settings, SubjectSettings, parse_settings
+from rigidimeter.core.words import number
 from rigidimeter.model import Array
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Bound, Claim, bounded, near, within_percent

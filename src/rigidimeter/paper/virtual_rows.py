@@ -13,7 +13,6 @@ import numpy as np
 from rigidimeter.analysis.estimation import Signals, epoch_signals, scoring_cycles
 from rigidimeter.analysis.estimation.bandlimited import zero_phase_band
 from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.numbers import number, p_value
 from rigidimeter.analysis.report.sections.distribution import distribution
 from rigidimeter.analysis.report.sections.torque_angle_loop import loop, loop_limits
 from rigidimeter.analysis.report.style import condition_colours
@@ -25,6 +24,7 @@ from rigidimeter.analysis.study.examples import (
     representative_scores,
 )
 from rigidimeter.analysis.study.rating_table import groupings
+from rigidimeter.core.words import number, p_value
 from rigidimeter.model import Array, ClosedLoopMotion, JointDynamics, closed_loop_motion
 from rigidimeter.paper.comparison_table import Claim
 from rigidimeter.paper.context import Context

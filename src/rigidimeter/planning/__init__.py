@@ -1,16 +1,22 @@
 """The experiment before it runs: perturbations, session order, predicted precision, power."""
 
-from rigidimeter.planning.document import DESIGN_SCHEMA, design_document
-from rigidimeter.planning.epochs_needed import (
+from rigidimeter.planning.days_needed import (
+    ASSUMED,
+    CORRELATION,
+    DAY_CV_PERCENT,
+    EPOCH_CV_PERCENT,
+    HOLM_MEASURES,
     Detection,
-    ExpectedEffect,
+    Needed,
+    Scatter,
     WantedDifference,
+    day_difference_sd,
     detect,
-    epoch_sd,
+    paired_power,
+    pairs_needed,
     planned_epochs,
-    ranksum_power,
-    sample_size,
 )
+from rigidimeter.planning.document import DESIGN_SCHEMA, design_document
 from rigidimeter.planning.joint_bandwidth import (
     APPENDIX_A,
     CONTROLLER_INERTIA_KG_M2,

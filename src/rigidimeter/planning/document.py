@@ -1,4 +1,4 @@
-"""A design as one document of plain values, units in the names (`rigidimeter.design/1`)."""
+"""A design as one document of plain values, units in the names (`rigidimeter.design/2`)."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from dataclasses import asdict
 from typing import Any
 
 from rigidimeter.core.files import plain_values
+from rigidimeter.core.records import PARAMETERS
 from rigidimeter.core.units import rad_from_deg
 from rigidimeter.model import Margins
-from rigidimeter.planning.epochs_needed import Detection
+from rigidimeter.planning.days_needed import HOLM_MEASURES, Detection, Needed
 from rigidimeter.planning.joint_bandwidth import Corner
 from rigidimeter.planning.motion_demand import time_constant_s
 from rigidimeter.planning.overview import Design
@@ -17,7 +18,7 @@ from rigidimeter.planning.perturbations import prbs_period_s
 from rigidimeter.planning.precision import PARAMETER_NAMES, Errors, PredictedPrecision
 from rigidimeter.planning.search import Candidate
 
-DESIGN_SCHEMA = "rigidimeter.design/1"
+DESIGN_SCHEMA = "rigidimeter.design/2"
 
 
 def design_document(design: Design) -> dict[str, Any]:
@@ -157,12 +158,24 @@ def _detection(found: Detection) -> dict[str, Any]:
     return {
         "parameter": found.wanted.parameter,
         "condition": found.condition,
-        "difference": found.effect.difference,
-        "epoch_sd": (found.effect.sd_x, found.effect.sd_y),
-        "cv_percent": found.cv_percent,
-        "epochs_needed": found.needed,
+        "unit": next(one.unit for one in PARAMETERS if one.name.startswith(found.wanted.parameter)),
+        "value": found.value,
+        "difference": found.difference,
         "power": found.power,
-        "powers": found.powers,
-        "planned_epochs": found.planned,
-        "planned_power": found.planned_power,
+        "alpha": found.alpha,
+        "holm_measures": HOLM_MEASURES,
+        "epoch_se": found.epoch_se,
+        "scatter": vars(found.scatter),
+        "needed": [_needed(each) for each in found.needed],
+        "planned": found.planned and _needed(found.planned),
+    }
+
+
+def _needed(found: Needed) -> dict[str, Any]:
+    return {
+        "epochs_a_day": found.epochs,
+        "days_needed": found.days,
+        "days_needed_holm": found.days_holm,
+        "subjects_needed": found.subjects,
+        "day_sd": found.day_sd,
     }

@@ -1,7 +1,7 @@
 """Everything that will be commanded under one set of settings, and what will come of it.
 
 `design` computes it once: the perturbations and their band, the session, what the arm will do, the
-stability of the loop, the standard errors to expect and, where asked for, the epochs needed, a
+stability of the loop, the standard errors to expect and, where asked for, the days needed, a
 better PRBS and a multisine. `rigidimeter design` prints what it returns.
 """
 
@@ -17,11 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.records import readonly
+from rigidimeter.core.records import PARAMETERS, readonly
 from rigidimeter.core.session import Protocol
 from rigidimeter.core.settings import Settings, settings_from
+from rigidimeter.core.words import html_table, one_line, plural
 from rigidimeter.model import JointDynamics, Stability, loop_stability, median_joint
-from rigidimeter.planning.epochs_needed import Detection, WantedDifference, detect, planned_epochs
+from rigidimeter.planning.days_needed import (
+    Detection,
+    Scatter,
+    WantedDifference,
+    detect,
+    planned_epochs,
+)
 from rigidimeter.planning.joint_bandwidth import APPENDIX_A, Corners, Forearm, corners
 from rigidimeter.planning.motion_demand import (
     Demand,
@@ -38,6 +45,10 @@ from rigidimeter.planning.search import Candidate, assess, check_criterion, opti
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from rigidimeter.core.drawing import Axes
+
+_METHODS = ("bound", "iv", "least_squares")
 
 
 @dataclass(frozen=True)
@@ -77,7 +88,7 @@ class Design:
         A sentence for each limit of the guard that a perturbation would pass, and for a sinusoid
         too short for the cycles to be scored; those on stability are in `stability`.
     detections : tuple of Detection
-        Epochs needed for each difference that was asked for.
+        Days, epochs a day and subjects needed for each difference that was asked for.
     criterion : str or None
         Of the search for a better PRBS, if there was one.
     present : Candidate or None
@@ -115,14 +126,75 @@ class Design:
         rows = [
             (condition, method, *getattr(found, method).free)
             for condition, found in self.precision.items()
-            for method in ("bound", "iv", "least_squares")
+            for method in _METHODS
         ]
         columns = ["condition", "method", *(f"{name}_se" for name in PARAMETER_NAMES)]
         return pd.DataFrame(rows, columns=columns).set_index(["condition", "method"])
 
+    def days(self) -> pd.DataFrame:
+        """Return the days and subjects needed, one row a difference and number of epochs a day.
+
+        A number above 1000 is missing.
+        """
+        import pandas as pd
+
+        rows = [
+            (found.wanted.parameter, found.difference, each.epochs[0], *counts)
+            for found in self.detections
+            for each in found.needed
+            for counts in [(each.days, each.days_holm, each.subjects)]
+        ]
+        of = ["parameter", "difference", "epochs_a_day"]
+        needed = ["days_needed", "days_needed_holm", "subjects_needed"]
+        return pd.DataFrame(rows, columns=[*of, *needed]).set_index(of).astype("Int64")
+
+    def plot(self, *, axes: Sequence[Axes] | None = None) -> NDArray[Any]:
+        """Draw the perturbation, its first seconds and complete, and its power spectrum.
+
+        Parameters
+        ----------
+        axes : three matplotlib Axes, optional
+            To draw on; without them a new figure is made.
+
+        Returns
+        -------
+        array of matplotlib Axes, shape (3,)
+        """
+        from rigidimeter.core.drawing import plots
+
+        return plots.plot_design(self, axes)
+
+    def __repr__(self) -> str:
+        """Return the perturbation and what one epoch will tell, as one line."""
+        prbs, stable = self.settings.prbs, all(m.stable for m in self.stability.conditions.values())
+        warned = len(self.warnings) + len(self.stability.warnings)
+        errors = [
+            f"{condition} standard errors of one epoch: "
+            + ", ".join(
+                f"{p.symbol} {se:.2g} {p.unit}"
+                for p, se in zip(PARAMETERS, found.iv.free, strict=True)
+            )
+            for condition, found in self.precision.items()
+        ]
+        return one_line(
+            f"PRBS of {2**prbs.register_bits - 1} chips at {prbs.clock_hz:g} Hz, "
+            f"{prbs.amplitude_nm:g} N·m, {prbs.duration_s:g} s",
+            "" if stable else "the loop is unstable",
+            *errors,
+            plural(warned, "warning") if warned else "",
+        )
+
     def _repr_html_(self) -> str:
         sentences = [*self.warnings, *self.stability.warnings, *self.remarks]
-        table = str(self.table().to_html())
+        heading = ["condition", "method", *(f"{p.symbol}, {p.unit}" for p in PARAMETERS)]
+        rows = [
+            [condition, method, *(f"{se:.2g}" for se in getattr(found, method).free)]
+            for condition, found in self.precision.items()
+            for method in _METHODS
+        ]
+        table = f"<p>Standard errors of one epoch</p>{html_table(heading, rows)}"
+        if self.detections:
+            table += str(self.days().to_html())
         return table + "".join(f"<p>{html.escape(sentence)}</p>" for sentence in sentences)
 
 
@@ -132,6 +204,7 @@ def design(
     differences: Sequence[str] = (),
     power: float = 0.8,
     alpha: float = 0.05,
+    scatter: Mapping[str, Scatter] | None = None,
     search: str | None = None,
     with_multisine: bool = False,
     forearm: Forearm | None = None,
@@ -141,16 +214,18 @@ def design(
     """Compute what will be commanded and what will come of it.
 
     Where the loop is unstable with the joint of a condition, that condition has no standard errors,
-    and there is no search, multisine or number of epochs.
+    and there is no search, multisine or number of days.
 
     Parameters
     ----------
     settings : Settings, path, mapping or None
         None stands for the defaults.
     differences : sequence of str
-        Differences for which to find the epochs needed, such as ``"damping=20%"``.
+        Differences for which to find the days and epochs needed, such as ``"damping=20%"``.
     power, alpha : float
-        Power and level of the rank-sum test for them.
+        Power and level of the test by days for them.
+    scatter : mapping of str to Scatter, optional
+        How much inertia, damping and stiffness vary, by name; without it what is assumed.
     search : {"minimax", "A", "D"}, optional
         Search for a better PRBS by this criterion.
     with_multisine : bool
@@ -210,7 +285,7 @@ def design(
         remarks=remarks,
         warnings=tuple(warnings),
         detections=tuple(
-            detect(chosen, perturbation_nm, difference, power=power, alpha=alpha)
+            detect(chosen, perturbation_nm, difference, scatter=scatter, power=power, alpha=alpha)
             for difference in wanted
             if stable
         ),

@@ -17,12 +17,9 @@ rounded to the next step of the scale and kept within it; B_0 and K_0 are the me
 condition.
 
 Where the numbers come from. The joints are those of the default settings: OFF that of Sec. 3.4, DBS
-13 % less viscous and 18 % less stiff, which is chosen, for the paper prints none. The scatter then
-follows from Table 2: r = z/√N = .35 and .37 with N = 78 + 23 mean that OFF and DBS differ by 0.92
-and 0.98 standard deviations, if the logarithms are normal, so the coefficients of variation between
-epochs are about 15 and 20 %. How much of that lies between days the paper does not say; a third of
-the variance is chosen. So are the scatter of J, the voluntary torque of a subject at rest, and all
-of the examiners.
+13 % less viscous and 18 % less stiff, which is chosen, for the paper prints none. The scatter is
+what `planning.days_needed` assumes, from Table 2. Chosen are the voluntary torque of a subject at
+rest, and all of the examiners.
 """
 
 from __future__ import annotations
@@ -32,6 +29,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rigidimeter.core.settings import Settings, SubjectSettings
+from rigidimeter.planning import DAY_CV_PERCENT, EPOCH_CV_PERCENT
 
 PAPER_RATES: Mapping[str, Any] = {
     "torque": {"rate_hz": 100.0},
@@ -123,12 +121,12 @@ class StudyDesign:
     subject: str
     conditions: tuple[ConditionDesign, ...]
     inertia_kg_m2: float = SubjectSettings().inertia_kg_m2
-    day_inertia_cv_percent: float = 2.0
-    day_damping_cv_percent: float = 9.0
-    day_stiffness_cv_percent: float = 12.0
-    epoch_inertia_cv_percent: float = 2.0
-    epoch_damping_cv_percent: float = 12.0
-    epoch_stiffness_cv_percent: float = 16.0
+    day_inertia_cv_percent: float = DAY_CV_PERCENT["inertia"]
+    day_damping_cv_percent: float = DAY_CV_PERCENT["damping"]
+    day_stiffness_cv_percent: float = DAY_CV_PERCENT["stiffness"]
+    epoch_inertia_cv_percent: float = EPOCH_CV_PERCENT["inertia"]
+    epoch_damping_cv_percent: float = EPOCH_CV_PERCENT["damping"]
+    epoch_stiffness_cv_percent: float = EPOCH_CV_PERCENT["stiffness"]
     examiners: tuple[str, ...] = ("A", "B", "C")
     examiner_sd: float = 0.3
     rating_noise_sd: float = 0.45

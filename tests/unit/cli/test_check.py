@@ -34,7 +34,7 @@ def test_a_flag_does_not_look_whether_an_arm_is_in_hardware(rig, rigidimeter):
     rig.write_text(HARDWARE)
     ran = rigidimeter("check", rig, "--yes")
     assert ran.status == 1
-    assert "is real hardware; somebody must look" in ran.err
+    assert "is real hardware; somebody must check" in ran.err
 
 
 def test_somebody_must_answer(rig, rigidimeter):

@@ -47,7 +47,7 @@ def test_several_columns_are_adjusted_and_compared(compared, tmp_path) -> None:
     assert (one["first"], one["second"], one["paired"]) == ("a", "b", True)
     assert one["low"] > 0  # a separates the groups better than b, from the same rows
     assert two["low"] < 0 < two["high"]  # c as well as a, the other way round
-    assert "Which separates the conditions better" in ran.out
+    assert "p, Holm" in ran.out
     again = compared(path, "--value", "a", "--value", "b", "--value", "c")[1]
     assert again == found
 

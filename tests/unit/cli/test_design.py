@@ -4,17 +4,20 @@ import csv
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import typer
+from tests.unit.virtual.tiny import tiny
 from typer.testing import CliRunner
 
 from rigidimeter.cli.design import design
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings, load_settings
 from rigidimeter.planning import DESIGN_SCHEMA, multisine_nm, prbs_nm, sinusoid
+from rigidimeter.virtual import write_virtual_study
 
 app = typer.Typer()
 app.command()(design)
@@ -27,7 +30,7 @@ def run(*arguments: str) -> str:
 
 
 def test_prints_the_numbers() -> None:
-    words = " ".join(run().split())
+    words = " ".join(run("--full").split())
     for expected in (
         "7 bits (127 chips) at 20 Hz",
         "The wanted band 0.15–10 Hz is covered.",
@@ -47,7 +50,7 @@ def test_prints_the_numbers() -> None:
 
 def test_the_bandwidth_of_another_subject(tmp_path: Path) -> None:
     numbers = tmp_path / "numbers.json"
-    words = " ".join(run("--body-mass", "80", "--json", str(numbers)).split())
+    words = " ".join(run("--full", "--body-mass", "80", "--json", str(numbers)).split())
     assert "body mass 80 kg, forearm 0.15 m: J is the forearm's 0.009 kg·m² with" in words
     assert "as Eq. 8" in words
     bandwidth = json.loads(numbers.read_text())["bandwidth"]
@@ -74,7 +77,7 @@ def test_writes_what_will_be_commanded(tmp_path: Path) -> None:
 
     document = json.loads(numbers.read_text())
     assert document == json.loads((folder / "design.json").read_text())
-    assert document["schema"] == DESIGN_SCHEMA == "rigidimeter.design/1"
+    assert document["schema"] == DESIGN_SCHEMA == "rigidimeter.design/2"
     assert document["prbs"]["covered"] is True
     assert len(document["bandwidth"]["corners"]) == 8
     assert document["protocol"]["total_s"] == 280.0
@@ -89,7 +92,7 @@ def test_settings_change_the_plan_and_bring_warnings(tmp_path: Path) -> None:
         "[margins]\ngain_margin_db = 0.0\nphase_margin_deg = 0.0\n"
         "[guard]\nspeed_limit_deg_s = 100.0\n[sinusoid]\ntaper_s = 0.0\n"
     )
-    text = " ".join(run("--settings", str(settings), "--json", str(numbers)).split())
+    text = " ".join(run("--full", "--settings", str(settings), "--json", str(numbers)).split())
     assert "is not covered" in text
     assert "prbs.clock_hz ≥ 16.6 Hz" in text
     assert "the sinusoid reaches a speed of 125.7 deg/s" in text
@@ -117,13 +120,13 @@ def test_mistakes_are_sentences(tmp_path: Path) -> None:
 
 
 def test_prints_what_is_predicted() -> None:
-    words = " ".join(run().split())
+    words = " ".join(run("--full").split())
     for expected in (
         "subject OFF 28.3 dB 92.1 deg 1472 ms 0.95 stable",
         "worst joint around it 16.2 dB",
         "each of J, B, K from 0.25 to 4 times its value",
-        "iv, 0.1–30 Hz 2.8e-06 (0.062 %) 8.7e-05 (0.064 %) 0.00047 (0.027 %)",
-        "least squares, 3.6e-06 (0.079 %) 9.2e-05 (0.067 %) 0.00055 (0.031 %) passive arm,",
+        "iv, 0.1–30 Hz 0.0028 (0.062 %) 0.000087 (0.064 %) 0.00047 (0.027 %)",
+        "least squares, 0.0036 (0.079 %) 0.000092 (0.067 %) 0.00055 (0.031 %) passive arm,",
         "iv, 4 epochs pooled",
     ):
         assert expected in words
@@ -133,7 +136,7 @@ def test_prints_what_is_predicted() -> None:
 def test_the_subjects_own_torque_biases_least_squares(tmp_path: Path) -> None:
     settings = tmp_path / "rig.toml"
     settings.write_text("[subject.OFF]\nvoluntary_sd_nm = 0.2\n")
-    words = " ".join(run("--settings", str(settings)).split())
+    words = " ".join(run("--full", "--settings", str(settings)).split())
     assert "would bias least squares: J by -43 %, B by -69 %, K by +3 %" in words
 
 
@@ -141,8 +144,8 @@ def test_searches_and_compares(tmp_path: Path) -> None:
     settings, folder = tmp_path / "rig.toml", tmp_path / "planned"
     settings.write_text("[optimise]\nclocks = 2\nbits_low = 7\nbits_high = 7\n")
     text = run(
-        "--settings", str(settings), "--out", str(folder), "--optimise", "--criterion", "D",
-        "--multisine",
+        "--full", "--settings", str(settings), "--out", str(folder), "--optimise", "--criterion",
+        "D", "--multisine",
     )  # fmt: skip
     words = " ".join(text.split())
     assert "Search for a PRBS (2 sequences, criterion D, iv, one epoch)" in words
@@ -170,7 +173,7 @@ def test_an_unstable_loop_is_refused_after_it_is_shown(tmp_path: Path, rigidimet
     settings.write_text("[controller]\ninertia_kg_m2 = 0.0008\ndamping_nm_s_rad = 0.028\n")
     ran = rigidimeter(
         "design", "--settings", settings, "--out", folder, "--optimise", "--multisine",
-        "--detect", "damping=20%",
+        "--detect", "damping=20%", "--full",
     )  # fmt: skip
     assert ran.status == 1
     assert ran.err.startswith("rigidimeter: the loop is unstable with subject OFF: a dist")
@@ -210,3 +213,84 @@ def test_bad_values_of_options_are_sentences(arguments: tuple[str, ...], words: 
 def test_help_needs_no_numerics() -> None:
     code = "import sys, rigidimeter.cli.design; sys.exit('numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_the_first_screen_has_the_perturbation_the_loop_the_errors_and_the_days(tmp_path) -> None:
+    settings, numbers = Path("examples/settings/study.toml"), tmp_path / "numbers.json"
+    wanted = [
+        word
+        for name in ("damping=20%", "stiffness=20%", "inertia=5%")
+        for word in ("--detect", name)
+    ]
+    text = run("--settings", str(settings), *wanted, "--json", str(numbers))
+    lines = text.splitlines()
+    assert len(lines) <= 24
+    assert max(map(len, lines)) <= 80
+    assert lines[0].startswith(
+        "PRBS     ±1 N·m, 127 chips at 20 Hz, 20 s; SD of the angle OFF 4.7°"
+    )
+    assert lines[1] == "loop     stable, margins 28.3 dB and 91.9°; worst joint 16.2 dB and 107°"
+    assert " OFF  4.50 ± 0.16 %  0.137 ± 0.44 %  1.75 ± 0.2 %" in lines
+    (damping, *_) = json.loads(numbers.read_text())["detection"]
+    row = next(line.split() for line in lines if "damping −20 %: days" in line)
+    each = [*damping["needed"], damping["planned"]]
+    assert [int(cell) for cell in row[4:]] == [one["days_needed"] for one in each]
+    assert damping["unit"] == "N·m·s/rad"
+    assert damping["planned"]["epochs_a_day"] == [3, 3]
+    assert "epochs: subject.OFF of the settings; days: Table 2 of the paper" in " ".join(
+        text.split()
+    )
+
+
+def test_without_a_difference_it_names_the_option_that_asks_for_days() -> None:
+    lines = run().splitlines()
+    assert len(lines) < 12
+    assert lines[-1].startswith("--detect damping=20%: the days, epochs and subjects it takes")
+
+
+def test_what_was_searched_has_a_line_each(tmp_path: Path) -> None:
+    settings = tmp_path / "rig.toml"
+    settings.write_text("[optimise]\nclocks = 2\nbits_low = 7\nbits_high = 7\n")
+    words = " ".join(run("--settings", str(settings), "--optimise", "--multisine").split())
+    assert "Best PRBS of 2 (minimax): 7 bits at " in words
+    assert (
+        "Multisine of the same peak torque: standard errors J 1.49, B 1.35, K 1.75 times" in words
+    )
+
+
+def test_the_scatter_comes_from_a_study(tmp_path: Path) -> None:
+    small_study, numbers = tmp_path / "study", tmp_path / "numbers.json"
+    write_virtual_study(small_study, tiny(prbs=4), 1, processes=1)
+    text = run("--detect", "stiffness=20%", "--from", str(small_study), "--json", str(numbers))
+    (found,) = json.loads(numbers.read_text())["detection"]
+    scatter = found["scatter"]
+    assert scatter["source"] == f"{small_study}, 8 epochs, 2 days with both conditions"
+    assert 0 < scatter["between_epochs_percent"] < 60
+    assert not (small_study / "analysis").exists()
+    assert f"stiffness {scatter['between_epochs_percent']:.2g}, " in text
+
+
+def test_a_study_without_days_of_both_conditions_has_half_the_variance(tmp_path: Path) -> None:
+    off, dbs = tiny(prbs=4).conditions
+    apart = replace(tiny(), conditions=(replace(off, days=(1, 2)), replace(dbs, days=(3, 4))))
+    study, numbers = tmp_path / "study", tmp_path / "numbers.json"
+    write_virtual_study(study, apart, 1, processes=1)
+    run("--detect", "damping=20%", "--from", str(study), "--json", str(numbers))
+    (found,) = json.loads(numbers.read_text())["detection"]
+    scatter = found["scatter"]
+    of_days = scatter["between_days_percent"]
+    assert scatter["condition_in_day_percent"] == pytest.approx(of_days * 0.5**0.5)
+    assert "no two days with both conditions" in scatter["source"]
+
+
+def test_a_study_of_one_day_cannot_say_how_days_differ(tmp_path: Path) -> None:
+    one_day = tuple(replace(each, days=(1,)) for each in tiny(prbs=2).conditions)
+    study = tmp_path / "study"
+    write_virtual_study(study, replace(tiny(), conditions=one_day), 1, processes=1)
+    with pytest.raises(UserError, match=r"how much J differs between days is unknown"):
+        run("--detect", "damping=20%", "--from", str(study))
+
+
+def test_a_folder_that_is_no_study_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"--from .*: is no study folder: it has no study\.toml"):
+        run("--detect", "stiffness=20%", "--from", str(tmp_path))

@@ -18,7 +18,8 @@ from rigidimeter.core.files import as_read, as_written, csv_text, read_text_tabl
 RED = "\x1b[31m=1+1"
 
 
-def test_names_reach_terminal_and_table_without_commands(rigidimeter, tmp_path):
+def test_names_reach_terminal_and_table_without_commands(rigidimeter, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "100")  # so that no name is broken
     folder = tmp_path / "\x1b]0;title\x07"
     folder.mkdir()
     rng = np.random.default_rng(1)

@@ -4,6 +4,7 @@ import csv
 import json
 import re
 from dataclasses import replace
+from html import escape, unescape
 
 import numpy as np
 import pytest
@@ -11,8 +12,10 @@ import pytest
 import rigidimeter as rm
 from rigidimeter.analysis.study import Preparation
 from rigidimeter.analysis.study.analysis import analyse_prepared
+from rigidimeter.core.files import plain_values
 from rigidimeter.core.records import Channel
 
+LEVELS = "note|caution|exclude"
 PUSHING = {"OFF": {"voluntary_sd_nm": 0.2}}
 
 
@@ -24,7 +27,7 @@ def shown(simulate, rigidimeter, no_figures, tmp_path):
         session = simulate(epochs=2, subject=PUSHING)
         files = tmp_path / "out.json", tmp_path / "out.csv"
         out = rigidimeter(
-            "estimate", session, "--method", method, "--json", files[0], "--csv", files[1]
+            "estimate", session, "--method", method, "--full", "--json", files[0], "--csv", files[1]
         ).out
         assert (
             rigidimeter("report", session, "--method", method, "--out", tmp_path / "r").status == 0
@@ -56,16 +59,35 @@ def test_every_output_has_every_finding(shown, method):
     } == in_json
     pooled = {(f["level"], f["name"]) for f in document["pooled"]["findings"]}
     kinds = {(level, name) for _, level, name in in_json} | pooled
-    assert set(re.findall(r"^  (\w+), (\w+): ", terminal, re.M)) == kinds
+    assert set(re.findall(rf"^ ({LEVELS}) +(\w+)  ", terminal, re.M)) == kinds
     assert "The checks found nothing" not in page
     for _, name in kinds:
         assert f">{name}<" in page
-    assert ("Checks cast doubt on" in page) == any(level != "note" for level, _ in kinds)
-    for epoch in document["epochs"]:  # below its line stands what casts doubt on it
-        doubts = ", ".join(f["name"] for f in epoch["findings"] if f["level"] != "note")
-        below = re.findall(rf"^  {epoch['epoch']} .*\n((?: {{6}}.*\n)*)", terminal, re.M)
-        said = [" ".join(text.split()) for text in below]
-        assert said == 2 * [f"doubt: {doubts}" if doubts else ""]
+
+
+def test_every_output_says_the_same_words(shown):
+    """Terminal, page, tables, CSV, JSON and Python, for every finding of a recording."""
+    document, rows, terminal, table, page = shown("bandlimited")
+    estimates = rm.estimate(rm.read(document["epochs"][0]["source"]), method="bandlimited")
+    of_python = [(fit.epoch, one) for fit in estimates.fits for one in fit.findings]
+    in_json = [(e["epoch"], f) for e in document["epochs"] for f in e["findings"]]
+    assert [(epoch, plain_values(one.row())) for epoch, one in of_python] == in_json
+    in_table = {(r["epoch"], r["headline"], r["details"], r["remedy"]) for r in table}
+    in_cells = {one for row in rows for one in row["findings"].split(" / ")}
+    for epoch, one in of_python:
+        assert (epoch, one.headline, one.details, one.remedy) in in_table
+        assert f"{one.level}, {one.name}: {one.headline}" in in_cells
+    on_terminal, on_page = " ".join(terminal.split()), " ".join(unescape(page).split())
+    for group in estimates.findings:
+        one = group.finding
+        assert " ".join(group.line.split()) in on_terminal
+        unfolding = (
+            f'<span class="outcome is-{one.level}">{one.level}</span> '
+            f"<strong>{one.name}</strong> {one.headline}; {group.where}</summary> "
+            f"<p>{one.details}</p> <p>{one.remedy}</p>"
+        )
+        assert unfolding in on_page
+        assert escape(one.headline) in estimates._repr_html_()
 
 
 def names_and_levels(preparation, method):

@@ -74,13 +74,13 @@ def test_what_means_no_recording_or_no_epoch_is_refused(tmp_path):
 
 def test_an_estimate_without_the_push_is_the_joint_and_says_why(rigidimeter, tmp_path):
     path, out = write(tmp_path / "one.csv", push_nm=0.05), tmp_path / "estimates.json"
-    ran = rigidimeter("estimate", path, "--leave-out", "32:34 push", "--json", out)
+    ran = rigidimeter("estimate", path, "--leave-out", "32:34 push", "--full", "--json", out)
     assert ran.status == 0, ran.err
     assert "epoch 1: 32 to 34 s are left out: push" in ran.err
-    assert "from 32 to 34 s: push" in " ".join(ran.out.split())
+    assert "left_out 2 s were left out by hand; epoch 1" in " ".join(ran.out.split())
     (epoch,) = json.loads(out.read_text())["epochs"]
     (found,) = (each for each in epoch["findings"] if each["name"] == "left_out")
-    assert "from 32 to 34 s: push" in found["text"]
+    assert "from 32 to 34 s: push" in found["details"]
     assert epoch["stiffness_nm_rad"] == pytest.approx(1.8, rel=0.005)
     assert epoch["inertia_kg_m2"] == pytest.approx(0.005, rel=0.01)
 

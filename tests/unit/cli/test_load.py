@@ -14,6 +14,7 @@ import pytest
 from rigidimeter.analysis.estimation import METHODS
 from rigidimeter.analysis.estimation.diagnostics import CHECKS
 from rigidimeter.analysis.estimation.terms import TERMS
+from rigidimeter.core.findings import KINDS
 
 ROOT = Path(__file__).parents[3]
 HOW_TO = ROOT / "docs" / "how-to" / "add-an-estimator.md"
@@ -25,10 +26,13 @@ ESTIMATOR, CHECK, HARMLESS, TERM = EXAMPLES
 def _forget() -> Iterator[None]:
     """Take out of the lists what a test has loaded."""
     lists: tuple[list[Any], ...] = (METHODS, CHECKS, TERMS)
+    kinds = dict(KINDS)
     known = [each[:] for each in lists]
     yield
     for each, before in zip(lists, known, strict=True):
         each[:] = before
+    KINDS.clear()
+    KINDS.update(kinds)
 
 
 @pytest.fixture
@@ -54,8 +58,8 @@ def recording(tmp_path: Path) -> Path:
 
 def test_the_help_names_it(rigidimeter, estimator):
     named = "robust (least squares in which large residuals count less)"
-    assert named not in " ".join(rigidimeter("estimate", "--help").out.split())
-    ran = rigidimeter("--load", estimator, "estimate", "--help")
+    assert named not in " ".join(rigidimeter("estimate", "--help-all").out.split())
+    ran = rigidimeter("--load", estimator, "estimate", "--help-all")
     assert named in " ".join(ran.out.split())
     assert "bandlimited (least squares" in " ".join(ran.out.split())
 
@@ -82,24 +86,31 @@ def test_estimate_and_report_use_it(rigidimeter, estimator, recording, tmp_path)
 def test_a_check_is_one_entry(rigidimeter, recording, tmp_path):
     (tmp_path / "near_range.py").write_text(CHECK.replace("9.0", "0.001"))
     ran = rigidimeter(
-        "--load", tmp_path / "near_range.py", "estimate", recording, "--json", tmp_path / "e.json"
+        "--load",
+        tmp_path / "near_range.py",
+        "estimate",
+        recording,
+        "--full",
+        "--json",
+        tmp_path / "e.json",
     )
     assert ran.status == 0, ran.err
     (epoch,) = json.loads((tmp_path / "e.json").read_text())["epochs"]
     (found,) = (found for found in epoch["findings"] if found["name"] == "near_range")
-    assert found["level"] == "doubt"
-    assert found["text"].endswith("the sensor may have been at the end of its range")
-    assert "Remedy: use a smaller perturbation" in " ".join(ran.out.split())
+    assert (found["level"], found["unit"]) == ("caution", "N·m")
+    assert found["headline"] == f"The torque reaches {found['value']:.3g} N·m"
+    assert f"caution near_range {found['headline']}" in " ".join(ran.out.split())
+    ran = rigidimeter("--load", tmp_path / "near_range.py", "explain", "near_range")
+    assert "The torque reaches 9.7 N·m." in ran.out
+    assert "Use a smaller perturbation." in ran.out
 
 
-@pytest.mark.parametrize(("where", "level"), [("if case", "doubt"), ("if not case", "note")])
+@pytest.mark.parametrize(("where", "level"), [("if case", "caution"), ("if not case", "note")])
 def test_a_check_may_say_where_its_failure_is_harmless(
     rigidimeter, recording, tmp_path, where, level
 ):
     """The recording has no perturbation, so that only the second of the two says a reason."""
-    check = CHECK.replace("9.0", "0.001").replace(
-        "meaning=", "harmless=harmless,\n        meaning="
-    )
+    check = CHECK.replace("9.0", "0.001").replace("near_range))", "near_range, harmless=harmless))")
     (tmp_path / "near_range.py").write_text(HARMLESS.replace("if case", where) + check)
     out = tmp_path / "e.json"
     ran = rigidimeter("--load", tmp_path / "near_range.py", "estimate", recording, "--json", out)
@@ -112,7 +123,7 @@ def test_a_check_may_say_where_its_failure_is_harmless(
 def test_a_term_of_the_torque_is_one_entry(rigidimeter, recording, tmp_path):
     path = tmp_path / "quintic.py"
     path.write_text(TERM)
-    assert "quintic" in rigidimeter("--load", path, "model", "--help").out
+    assert "quintic" in rigidimeter("--load", path, "model", "--help-all").out
     ran = rigidimeter("--load", path, "model", recording, "--terms", "stiffness,quintic")
     assert ran.status == 0, ran.err
     assert "N·m/rad⁵" in ran.out
@@ -130,7 +141,7 @@ def test_a_term_of_the_torque_is_one_entry(rigidimeter, recording, tmp_path):
 def test_a_file_that_cannot_be_loaded_is_named(rigidimeter, tmp_path, name, text, words):
     if text is not None:
         (tmp_path / name).write_text(text)
-    ran = rigidimeter("--load", tmp_path / name, "estimate", "--help")
+    ran = rigidimeter("--load", tmp_path / name, "estimate", "--help-all")
     assert ran.status == 1
     assert words in ran.err
 
@@ -138,7 +149,7 @@ def test_a_file_that_cannot_be_loaded_is_named(rigidimeter, tmp_path, name, text
 def test_an_interruption_is_one_line(rigidimeter, tmp_path):
     path = tmp_path / "interrupts.py"
     path.write_text("raise KeyboardInterrupt")
-    ran = rigidimeter("--load", path, "estimate", "--help")
+    ran = rigidimeter("--load", path, "estimate", "--help-all")
     assert (ran.status, ran.err.strip()) == (130, "rigidimeter: interrupted")
 
 

@@ -28,7 +28,7 @@ def test_terms_are_fitted_and_written(rigidimeter, joint, tmp_path):
     )  # fmt: skip
     assert ran.status == 0, ran.err
     document = json.loads((tmp_path / "m.json").read_text())
-    assert document["schema"] == "rigidimeter.model/1"
+    assert document["schema"] == "rigidimeter.model/2"
     (epoch,) = document["epochs"]
     assert epoch["band_hz"] == [0.0, 15.0]
     found = {p["term"]: p["value"] for p in epoch["models"][0]["parameters"]}
@@ -99,7 +99,7 @@ def _steps(angle, rng):
     ("torque", "words"),
     [
         (_unrelated, "none of these models"),
-        (_gravity, "the torque was computed from the angle"),
+        (_gravity, "The torque is a function of the angle alone"),
         (_steps, "none of these models"),
     ],
 )
@@ -122,4 +122,5 @@ def test_the_checks_of_an_estimate_are_shown(rigidimeter, joint, tmp_path):
     assert ran.status == 0, ran.err
     (epoch,) = json.loads((tmp_path / "m.json").read_text())["epochs"]
     assert "residual_whiteness" in [finding["name"] for finding in epoch["findings"]]
-    assert "Remedy:" in ran.out
+    headline = epoch["findings"][0]["headline"]
+    assert f"{epoch['findings'][0]['name']} {headline}" in " ".join(ran.out.split())

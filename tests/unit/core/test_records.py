@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 from rigidimeter.analysis.reading import write_estimates_csv
+from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import (
     PARAMETER_VECTORS,
     PARAMETERS,
     Analysis,
     Channel,
-    Finding,
     Fit,
     Outcome,
     Score,
+    grouped,
 )
 
 FIT = Fit(
@@ -50,7 +51,9 @@ def test_fits_are_equal_when_every_number_is():
 
 def analysis(**changes):
     left_out = replace(FIT, epoch="2", outcome=Outcome("excluded", "R² < 0 & worse"))
-    found = Finding("frozen", "exclude", 2.0, 1.0, "angle <hung>", "check the cable")
+    found = Finding(
+        "frozen", "exclude", 2.0, 1.0, facts={"channel": "angle <hung>", "start_s": 3.0}
+    )
     fits = (replace(FIT, findings=(found,)), replace(left_out, findings=(found,)))
     return Analysis(
         **{
@@ -67,7 +70,7 @@ def analysis(**changes):
 
 def test_the_table_has_the_columns_of_the_csv(tmp_path):
     write_estimates_csv(tmp_path / "e.csv", analysis())
-    table = analysis().table()
+    table = analysis().table(full=True)
     assert list(table.columns) == (tmp_path / "e.csv").read_text().splitlines()[0].split(",")
     assert table["stiffness_nm_rad"].tolist() == [3.0, 3.0]
     assert table["outcome"].tolist() == ["included", "excluded"]
@@ -75,22 +78,64 @@ def test_the_table_has_the_columns_of_the_csv(tmp_path):
     assert only_scores.table()["work_j"].tolist() == [0.2]
 
 
+def test_the_table_that_people_read_has_twelve_columns():
+    table = analysis().table()
+    assert list(table.columns) == [
+        "source", "epoch", "condition", "inertia_kg_m2", "inertia_kg_m2_se", "damping_nm_s_rad",
+        "damping_nm_s_rad_se", "stiffness_nm_rad", "stiffness_nm_rad_se", "vaf_percent", "outcome",
+        "findings",
+    ]  # fmt: skip
+    assert table["findings"].tolist() == ["frozen", "frozen"]
+    assert table.equals(analysis().table(full=True)[table.columns[:-1]].assign(findings="frozen"))
+
+
+def test_a_fit_and_an_analysis_are_printed_as_one_line():
+    value, se = np.array([4.59e-3, 0.159, 1.7]), np.array([1.1e-5, 0.0012, 0.013])
+    fit = replace(FIT, band_hz=(0.1, 30.0), vaf_percent=99.61, value=value, se=se)
+    assert repr(fit) == (
+        "J 4.590e-3 ± 0.011e-3 kg·m², B 0.1590 ± 0.0012 N·m·s/rad, K 1.700 ± 0.013 N·m/rad; "
+        "iv, 0.1–30 Hz, VAF 99.6 %; epoch 1 OFF"
+    )
+    failed = Fit("a.csv", "2\n3", "OFF", "iv", Outcome("failed", "too short"))
+    assert repr(failed) == "iv; epoch 2 3 OFF; failed: too short"
+    assert repr(analysis()) == (
+        "2 epochs by iv, 1 included; 1 sinusoid scored; OFF J 1.00 ± 0.10 kg·m², "
+        "B 2.00 ± 0.20 N·m·s/rad, K 3.00 ± 0.30 N·m/rad; findings: frozen"
+    )
+    assert (
+        "<td>1.670\xa0to\xa01.730</td>"
+        in replace(fit, low=np.array([0, 0, 1.67]), high=np.array([1, 1, 1.73]))._repr_html_()
+    )
+
+
 def test_findings_of_one_check_are_told_once():
-    ((first, fits),) = analysis().findings
-    assert first.name == "frozen"
+    ((found, fits, where),) = analysis().findings
+    assert found.name == "frozen"
     assert [fit.epoch for fit in fits] == ["1", "2"]
+    assert where == "both epochs"
+
+
+def test_a_group_names_its_epochs_and_the_one_that_shows_it_most():
+    fits = [
+        replace(FIT, epoch=str(i), findings=(Finding("gravity", "note", v, 1.0),) if v else ())
+        for i, v in enumerate((2.0, 2.0, 9.0, 0.0, 2.0), 1)
+    ]
+    (group,) = grouped(fits, ())
+    assert (group.finding.value, group.where) == (9.0, "epochs 1–3, 5, most in epoch 3")
+    assert group.line == f"note  gravity  {group.finding.headline}; {group.where}"
 
 
 def test_a_notebook_shows_estimates_with_intervals_and_what_was_found():
-    page = analysis()._repr_html_()
-    assert "K (N·m/rad)" in page
-    assert "3 [2.4, 3.6]" in page
+    page = analysis()._repr_html_().replace("\N{NO-BREAK SPACE}", " ")
+    assert "<th>K, N·m/rad</th>" in page
+    assert "<td>3.00 ± 0.30</td>" in page
+    assert "<td>3.00 ± 0.30 (2.40 to 3.60)</td>" in page
     assert "all epochs" in page
-    assert "check the cable" in page
+    assert "Check the sensor&#x27;s cable" in page
     assert "angle &lt;hung&gt;" in page
     assert "R² &lt; 0 &amp; worse" in page
     assert "<hung>" not in page
-    assert "work (J)" in page
+    assert "<th>work, J</th>" in page
     many = analysis(fits=(FIT,) * 50, fixed_inertia=(FIT,) * 50)
     assert "The first 20 of 50 epochs." in many._repr_html_()
 

@@ -27,6 +27,7 @@ def test_an_unstable_loop_has_no_precision() -> None:
     assert found.detections == ()
     assert found.table().empty
     assert "is unstable" in found._repr_html_()
+    assert "; the loop is unstable; " in repr(found)
 
 
 def test_a_condition_without_errors_has_a_remark() -> None:
@@ -66,3 +67,16 @@ def test_its_table_holds_the_predicted_standard_errors() -> None:
     assert tuple(row) == expected.iv.free
     assert list(row.index) == ["inertia_kg_m2_se", "damping_nm_s_rad_se", "stiffness_nm_rad_se"]
     assert "least_squares" in found._repr_html_()
+    assert repr(found).startswith("PRBS of 127 chips at 20 Hz, 1 N·m, 20 s; OFF standard errors")
+    assert f"K {expected.iv.free[2]:.2g} N·m/rad" in repr(found)
+    assert "\n" not in repr(found)
+
+
+def test_the_days_needed_are_a_table() -> None:
+    found = design(Settings(), differences=["damping=20%", "stiffness=0.01"])
+    days = found.days()
+    needed = found.detections[0].needed
+    assert list(days.loc["damping", "days_needed"]) == [each.days for each in needed]
+    assert list(days.loc["damping", "subjects_needed"]) == [each.subjects for each in needed]
+    assert days.loc["stiffness"].isna().all(axis=None)  # 0.6 % takes more than 1000 days
+    assert "days_needed_holm" in found._repr_html_()

@@ -118,7 +118,7 @@ def _estimate(source: str, epochs: Sequence[PreparedEpoch]) -> Delay:
             return replace(
                 found,
                 remark="not corrected: without the recorded perturbation a reflex, or torque that "
-                "something but the robot adds, looks like a delay",
+                "something but the robot adds, resembles a delay",
             )
         if abs(total_s) < max(SIGNIFICANT * error_s, LEAST_S):
             return replace(found, remark="not corrected: not significantly different from zero")

@@ -18,7 +18,10 @@ from functools import lru_cache, partial
 import numpy as np
 from scipy import signal
 
-from rigidimeter.analysis.estimation.closedloop.as_sampled import InertiaDoubt, inertia_doubt
+from rigidimeter.analysis.estimation.closedloop.as_sampled import (
+    InertiaUncertainty,
+    inertia_uncertainty,
+)
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
     driven_behind,
     torque_filter_of,
@@ -194,9 +197,9 @@ def _motion(
     return angle, velocity, acceleration
 
 
-def _doubt(prepared: PreparedEpoch, signals: Signals) -> InertiaDoubt:
+def _uncertainty(prepared: PreparedEpoch, signals: Signals) -> InertiaUncertainty:
     """Return how far a fit hangs on the drive between the samples and on steps of the motion."""
-    doubt, settings = inertia_doubt(prepared, signals), prepared.settings.estimation
+    uncertainty, settings = inertia_uncertainty(prepared, signals), prepared.settings.estimation
 
     def smooth(channel: Channel) -> Array:
         lowpass, _ = _filters(*signals.band_hz, _to_stamps(channel.mean_rate_hz))
@@ -205,7 +208,7 @@ def _doubt(prepared: PreparedEpoch, signals: Signals) -> InertiaDoubt:
     moved = moved_by_steps(
         prepared.epoch, signals, lambda epoch: bandlimited_signals(epoch, settings), smooth
     )
-    return doubt._replace(away=doubt.away + moved / abs(signals.solution.values[0]))
+    return uncertainty._replace(away=uncertainty.away + moved / abs(signals.solution.values[0]))
 
 
 BANDLIMITED = Method(
@@ -213,7 +216,7 @@ BANDLIMITED = Method(
     title="least squares, all signals through one zero-phase band",
     needs=(),
     methods_text="by least squares of signals that passed one zero-phase filter",
-    fit=partial(fit_least_squares, "bandlimited", bandlimited_signals, _doubt),
+    fit=partial(fit_least_squares, "bandlimited", bandlimited_signals, _uncertainty),
     signals=bandlimited_signals,
     intervals_text=INTERVALS_TEXT,
     pooled_text=POOLED_TEXT,

@@ -22,7 +22,6 @@ that does not change, so its scatter shows how large that is.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
@@ -30,13 +29,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy import special, stats
 
+from rigidimeter.analysis.estimation.found import found
 from rigidimeter.analysis.estimation.signals import Array
-from rigidimeter.core.records import PARAMETERS, Finding, Fit
+from rigidimeter.core.findings import Fact, Finding
+from rigidimeter.core.records import PARAMETERS, Fit
 from rigidimeter.core.settings import DiagnosticsSettings
 
 FEWEST_EPOCHS = 3
 NAME = "varying_between_epochs"
-LEAST_P = 1e-6
+TREND_P = 0.05
 INERTIA, STIFFNESS = 0, 2
 
 
@@ -123,31 +124,57 @@ def between_epochs(
         return None
     half = np.array([fit.high - fit.low for fit in fits]) / 2
     degrees = _degrees(half / errors)
-    found = [scatter(j, values[:, j], errors[:, j], degrees[:, j]) for j in range(3)]
+    scatters = [scatter(j, values[:, j], errors[:, j], degrees[:, j]) for j in range(3)]
     most = settings.max_varying_percent
     if by_perturbation:
-        ranked = sorted(found, key=lambda one: one.p)
+        ranked = sorted(scatters, key=lambda one: one.p)
         sure = []
         for left, one in zip(range(3, 0, -1), ranked, strict=True):  # Holm 1979
             if not one.p * left < settings.varying_chance:
                 break
             sure.append(one)
     else:
-        K, J = found[STIFFNESS], found[INERTIA]
+        K, J = scatters[STIFFNESS], scatters[INERTIA]
         sure = [K] if K.p < settings.varying_chance and K.percent > J.percent else []
     large = sorted((one for one in sure if one.percent > most), key=lambda one: -one.percent)
     if not large:
         return None
-    return Finding(
+    first, *others = large
+    labels, about = [fit.epoch for fit in fits], PARAMETERS[first.parameter]
+    low, high = int(np.argmin(first.drawn)), int(np.argmax(first.drawn))
+    trend_percent, trend_p = first.trend()
+    facts: dict[str, Fact] = {
+        "symbol": about.symbol,
+        "size_unit": about.unit,
+        "low": float(first.drawn[low]),
+        "low_at": f"epoch {labels[low]}",
+        "high": float(first.drawn[high]),
+        "high_at": f"epoch {labels[high]}",
+        "sd": first.sd,
+        "trend_percent": trend_percent,
+        "trend_p": trend_p,
+        "trend": "" if trend_p >= TREND_P else _trend(trend_percent),
+        "others": also([PARAMETERS[one.parameter].symbol for one in others]),
+    }
+    return found(
         NAME,
-        settings.levels.varying_between_epochs,
-        large[0].percent,
+        settings,
+        first.percent,
         most,
-        "; ".join(_sentence(one, most) for one in large)
-        + f" (at most {most:g} %): the pooled estimate is a mean over a joint that was not the "
-        "same in all epochs",
-        "look at the epochs in order; state the scatter between them beside the mean",
+        p=first.p,
+        epochs=tuple(labels),
+        condition=fits[0].condition,
+        facts=facts,
     )
+
+
+def also(symbols: Sequence[str]) -> str:
+    """Return which of J, B and K change too, to end a sentence."""
+    return f"; {' and '.join(symbols)} too" if symbols else ""
+
+
+def _trend(percent: float) -> str:
+    return f", {'rising' if percent > 0 else 'falling'} by {abs(percent):.0f} % over the epochs"
 
 
 def _degrees(ratio: Array) -> Array:
@@ -161,54 +188,3 @@ def _quantiles() -> tuple[Array, Array]:
     """Return degrees of freedom and Student's quantile for 95 % at each."""
     known = np.geomspace(1.0, 1e4, 400)
     return known, np.asarray(special.stdtrit(known, 0.975))
-
-
-def _sentence(one: Scatter, most: float) -> str:
-    _, symbol, unit, _ = PARAMETERS[one.parameter]
-    low, high = int(np.argmin(one.drawn)), int(np.argmax(one.drawn))
-    trend_percent, trend_p = one.trend()
-    trend = (
-        f"{'rising' if trend_percent > 0 else 'falling'} by {abs(trend_percent):.0f} % "
-        f"from the first to the last ({p_text(trend_p)})"
-        if trend_p < 0.05
-        else "without a trend"
-    )
-    return (
-        f"{symbol} goes from {one.drawn[low]:.3g} {unit} in the {_ordinal(low)} epoch to "
-        f"{one.drawn[high]:.3g} {unit} in the {_ordinal(high)}, a range of "
-        f"{in_full(one.percent, '.0f', limit=most)} % of the mean, SD {one.sd:.2g} {unit} "
-        f"beyond the errors, by chance {p_text(one.p)}, {trend}"
-    )
-
-
-def p_text(p: float) -> str:
-    """Return a probability as text, a small one as a limit: no assumption is as good as that."""
-    return f"p = {p:.2g}" if p >= LEAST_P else f"p < {LEAST_P:g}"
-
-
-def in_full(value: float, spec: str = ".2g", *, limit: float = math.nan) -> str:
-    """Return a number rounded as `spec` says, without a power of ten for a large one.
-
-    With more digits where it would read as the limit that is shown beside it, and is not.
-
-    Examples
-    --------
-    >>> in_full(104.2), in_full(7.36), in_full(-290.0, "+.2g"), in_full(2e-9)
-    ('104', '7.4', '-290', '2e-09')
-    >>> in_full(15.2, limit=15.0), in_full(99.98, ".0f", limit=100.0), in_full(15.0, limit=15.0)
-    ('15.2', '99.98', '15')
-    """
-    text = format(value, spec)
-    for digits in range(3, 18):  # 17 tell any two numbers apart
-        if value == limit or not math.isclose(float(text), limit, rel_tol=1e-14):
-            break
-        text = format(value, f".{digits}g")
-    whole = "e+" in text and abs(value) < 1e6
-    return format(value, f"{'+' if '+' in spec else ''}.0f") if whole else text
-
-
-def _ordinal(index: int) -> str:
-    number = index + 1
-    endings = {1: "st", 2: "nd", 3: "rd"}
-    teens = 10 < number % 100 < 20
-    return f"{number}{'th' if teens else endings.get(number % 10, 'th')}"

@@ -19,12 +19,13 @@ from rigidimeter.analysis.estimation.terms import (
     fit_models,
     wideband_signals,
 )
-from rigidimeter.core.records import Finding, Fit
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import Fit
 from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE
 
 REFUSING = ("conditioning",)
-"""Checks that forbid a choice of terms though an estimate only is in doubt: where J, B and K cannot
-be told apart, further terms cannot either."""
+"""Checks that forbid a choice of terms though an estimate only needs caution: where J, B
+and K cannot be told apart, further terms cannot either."""
 
 
 class EpochModels(NamedTuple):
@@ -148,5 +149,5 @@ def _refused(fit: Fit) -> str:
         return f"none of these models is recommended for this epoch: {fit.outcome.reason}"
     for finding in fit.findings:
         if finding.name in REFUSING:
-            return f"none of these models is recommended for this epoch: {finding.text}"
+            return f"none of these models is recommended for this epoch: {finding.headline}"
     return ""

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import fft
 
-from rigidimeter.analysis.estimation.closedloop.as_sampled import NONE, InertiaDoubt
+from rigidimeter.analysis.estimation.closedloop.as_sampled import NONE, InertiaUncertainty
 from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother
 from rigidimeter.analysis.estimation.linear_solution import solve
 from rigidimeter.analysis.estimation.method_record import Progress
@@ -51,7 +51,7 @@ class _Kept(NamedTuple):
 
     fit: Fit
     signals: Signals
-    doubt: InertiaDoubt
+    uncertainty: InertiaUncertainty
 
 
 def fit_inertia_damping_stiffness(
@@ -122,7 +122,7 @@ def fit_inertia_damping_stiffness(
 def fit_least_squares(
     method: str,
     signals_of: SignalsOf,
-    doubt_of: Callable[[PreparedEpoch, Signals], InertiaDoubt],
+    uncertainty_of: Callable[[PreparedEpoch, Signals], InertiaUncertainty],
     epochs: Sequence[PreparedEpoch],
     inertia_kg_m2: float | None = None,
     progress: Progress = lambda _: None,
@@ -132,8 +132,8 @@ def fit_least_squares(
 ) -> tuple[list[Fit], list[Fit]]:
     """Fit every epoch, and all epochs of a condition put one after the other.
 
-    `signals_of` prepares the signals of an epoch, and `doubt_of` says how far its fit hangs on what
-    the drive did between the samples; for the rest see `method_record.FitEpochs`.
+    `signals_of` prepares the signals of an epoch, and `uncertainty_of` says how far its fit depends
+    on what the drive did between the samples; for the rest see `method_record.FitEpochs`.
     """
     fits = []
     free = inertia_kg_m2 is None
@@ -147,19 +147,19 @@ def fit_least_squares(
             outcome = unusable(epoch, str(error))
             fits.append(Fit(epoch.source, epoch.label, epoch.condition, method, outcome))
         else:
-            doubt = doubt_of(prepared, signals) if free else NONE
+            uncertainty = uncertainty_of(prepared, signals) if free else NONE
             fit = replace(
-                _widened(found, doubt.away),
+                _widened(found, uncertainty.away),
                 source=epoch.source,
                 epoch=epoch.label,
                 condition=epoch.condition,
                 method=method,
                 outcome=after_fit(epoch, found.r_squared, found.condition_number),
-                findings=doubt.findings,
+                findings=uncertainty.findings,
             )
             fits.append(fit)
             if fit.outcome.included:
-                kept.setdefault(epoch.condition, []).append(_Kept(fit, signals, doubt))
+                kept.setdefault(epoch.condition, []).append(_Kept(fit, signals, uncertainty))
         progress(1.0)
     groups = list(kept.items()) if pooled else []
     if len(groups) > 1:
@@ -174,7 +174,7 @@ def _pooled(
     white: bool,
 ) -> Fit:
     """Return the fit to all epochs of a condition, put one after the other."""
-    fits, parts, doubts = zip(*members, strict=True)
+    fits, parts, uncertainties = zip(*members, strict=True)
     first = parts[0]
     together = replace(
         first,
@@ -186,8 +186,8 @@ def _pooled(
     )
     found = fit_inertia_damping_stiffness(together, inertia_kg_m2, white=white)
     return replace(
-        _widened(found, doubts[0].away),
-        findings=doubts[0].findings,
+        _widened(found, uncertainties[0].away),
+        findings=uncertainties[0].findings,
         source=", ".join(dict.fromkeys(member.source for member in fits)),
         epoch="pooled",
         condition=condition,

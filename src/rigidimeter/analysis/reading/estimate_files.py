@@ -9,6 +9,7 @@ from typing import Any
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import csv_text, plain_values, read_json, write_json, write_text
+from rigidimeter.core.findings import finding_from
 from rigidimeter.core.records import (
     BAND_VECTORS,
     PARAMETER_VECTORS,
@@ -17,14 +18,15 @@ from rigidimeter.core.records import (
     Analysis,
     BandEstimate,
     Delay,
-    Finding,
     Fit,
     Outcome,
     Score,
     readonly,
 )
 
-ESTIMATES_SCHEMA = "rigidimeter.estimates/1"
+ESTIMATES_SCHEMA = "rigidimeter.estimates/2"
+READ_SCHEMAS = (ESTIMATES_SCHEMA, "rigidimeter.estimates/1")
+"""In the first a finding was a text with its threshold."""
 
 _PARAMETERS = tuple(parameter.name for parameter in PARAMETERS)
 
@@ -73,7 +75,7 @@ def read_estimates(path: Path) -> Analysis:
     """
     document = read_json(path)
     schema = document.get("schema") if isinstance(document, dict) else None
-    if schema != ESTIMATES_SCHEMA:
+    if schema not in READ_SCHEMAS:
         raise UserError(f"{path}: schema is {schema!r}; expected {ESTIMATES_SCHEMA!r}")
     try:
         method = str(document["method"])
@@ -110,7 +112,7 @@ def _read_outcome(row: Mapping[str, Any], numbers: Sequence[str]) -> Outcome:
 
 def _fit_row(fit: Fit) -> dict[str, Any]:
     band = list(fit.band_hz) if all(map(math.isfinite, fit.band_hz)) else None
-    findings = [vars(finding) for finding in fit.findings]
+    findings = [finding.row() for finding in fit.findings]
     return fit.row() | {"band_hz": band, "findings": findings}
 
 
@@ -137,22 +139,8 @@ def _fit(row: Mapping[str, Any], method: str) -> Fit:
         outcome=_read_outcome(row, _PARAMETERS),
         n_samples=int(row["n_samples"]),
         band_hz=(float(low), float(high)),
-        findings=tuple(_read_finding(found) for found in row["findings"]),
+        findings=tuple(finding_from(found) for found in row["findings"]),
         **numbers,
-    )
-
-
-def _read_finding(row: Mapping[str, Any]) -> Finding:
-    level = row["level"]
-    if level not in ("note", "doubt", "exclude"):
-        raise ValueError(f"finding level {level!r}")
-    return Finding(
-        str(row["name"]),
-        level,
-        _number(row["value"]),
-        _number(row["threshold"]),
-        str(row["text"]),
-        str(row["remedy"]),
     )
 
 

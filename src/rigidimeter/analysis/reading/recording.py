@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from html import escape
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from statistics import median
+from typing import TYPE_CHECKING, Any
 
 from rigidimeter.analysis.reading.channels.joining import join_tables, joined_options, offset_notice
 from rigidimeter.analysis.reading.channels.mapping_file import merged, read_mapping
@@ -22,6 +25,12 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import noted_digests
 from rigidimeter.core.records import Epoch, Notice, Task
 from rigidimeter.core.settings import Settings, load_settings, settings_from
+from rigidimeter.core.words import html_table, one_line, plural, short_names
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rigidimeter.core.drawing import Axes
 
 _RECORDED_WITH = ("controller", "guard", "prbs", "sinusoid", "rig")
 _ANALYSED_WITH = ("estimation", "scores")
@@ -58,6 +67,80 @@ class Recording:
     def failed(self) -> bool:
         """Whether something that was asked for could not be read."""
         return any(notice.level == "error" for notice in self.notices)
+
+    def plot(
+        self,
+        epoch: int = 0,
+        *,
+        span_s: float | None = 7.0,
+        axes: Sequence[Axes] | None = None,
+    ) -> NDArray[Any]:
+        """Draw perturbation, torque and angle of one epoch as recorded, not filtered.
+
+        The velocity is drawn if there is no angle. Angles are in degrees.
+
+        Parameters
+        ----------
+        epoch : int
+            Place in `epochs`.
+        span_s : float or None
+            How much is drawn, in s from the start of the epoch; None for all of it.
+        axes : matplotlib Axes, optional
+            To draw on, one for each channel; without them a new figure is made.
+
+        Returns
+        -------
+        array of matplotlib Axes, shape (number of channels,)
+
+        Raises
+        ------
+        IndexError
+            If there is no such epoch.
+        """
+        from rigidimeter.core.drawing import plots
+
+        return plots.plot_recording(self, epoch, span_s, axes)
+
+    def __repr__(self) -> str:
+        """Return what was read as one line."""
+        named = [path.name or str(path) for path in self.paths]
+        more = f" and {len(named) - 3} more" if len(named) > 3 else ""
+        counts = Counter(epoch.condition for epoch in self.epochs)
+        length_s, rate_hz = _length_and_rate(self.epochs)
+        return one_line(
+            f"{', '.join(named[:3])}{more}",
+            f"{plural(len(self.epochs), 'epoch')} of {length_s} s at {rate_hz} samples/s",
+            ", ".join(f"{name} {count}" for name, count in counts.items() if name),
+            ", ".join(dict.fromkeys(name for epoch in self.epochs for name in epoch.channels)),
+            plural(len(self.notices), "notice") if self.notices else "",
+        )
+
+    def _repr_html_(self) -> str:
+        """Return a table with a row for each source and condition, and the notices."""
+        parts: dict[tuple[str, str], list[Epoch]] = {}
+        for epoch in self.epochs:
+            parts.setdefault((epoch.source, epoch.condition), []).append(epoch)
+        names = short_names(source for source, _ in parts)
+        rows = [
+            [
+                *(names[source], condition, str(len(own))),
+                *(*_length_and_rate(own), ", ".join(own[0].channels)),
+            ]
+            for (source, condition), own in parts.items()
+        ]
+        heading = ["recording", "condition", "epochs", "length, s", "samples/s", "channels"]
+        notices = [f"<p>{escape(f'{one.level}: {one.text}')}</p>" for one in self.notices]
+        return "\n".join([html_table(heading, rows), *notices])
+
+
+def _length_and_rate(epochs: Iterable[Epoch]) -> tuple[str, str]:
+    """Return the median length in s and the median rate in samples/s of the fastest channel."""
+    longest = [max(epoch.channels.values(), key=len) for epoch in epochs if epoch.channels]
+    stamped = [channel for channel in longest if len(channel) > 1]
+    if not stamped:
+        return "–", "–"
+    length_s = median(float(one.time_s[-1] - one.time_s[0]) + 1 / one.rate_hz for one in stamped)
+    return f"{length_s:.3g}", f"{median(one.rate_hz for one in stamped):.4g}"
 
 
 def read(
@@ -126,7 +209,7 @@ def read(
         The paths are parts of one recording, such as torque and motion, each with its clock.
     clock_offset : float or "found", optional
         With `join`, what is added to the clocks of the second and later paths, in s; ``"found"``:
-        estimated from torque and motion, and said with its error.
+        estimated from torque and motion, and reported with its error.
     settings : Settings, path or mapping, optional
         Settings for the analysis, or a TOML file of them. Default: those with which the first
         session folder was recorded, else the built-in ones.

@@ -8,25 +8,27 @@ from typing import TYPE_CHECKING
 from rigidimeter.core.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from rigidimeter.analysis.report.contents import Column, Figure, Section, Table, paragraph
+    from rigidimeter.analysis.report.contents import Figure, Section, paragraph
     from rigidimeter.analysis.report.make_report import report
+    from rigidimeter.analysis.report.page import shown_tables, source_names
     from rigidimeter.analysis.report.sections import SECTIONS
 
 __all__ = [
     "SECTIONS",
-    "Column",
     "Figure",
     "Section",
-    "Table",
     "paragraph",
     "report",
+    "shown_tables",
+    "source_names",
 ]
 
 __getattr__ = lazy_names(
     __name__,
     {
-        "contents": ("Column", "Figure", "Section", "Table", "paragraph"),
+        "contents": ("Figure", "Section", "paragraph"),
         "make_report": ("report",),
+        "page": ("shown_tables", "source_names"),
         "sections": ("SECTIONS",),
     },
 )

@@ -1,107 +1,16 @@
-"""What a section of the report is made of: text, tables, figures.
-
-The rows of a table are unrounded. Its CSV has all of their values; the page shows some, rounded.
-"""
+"""What a section of the report is made of: text, tables, figures."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 from markupsafe import Markup
 from matplotlib.figure import Figure as Drawing
 
 from rigidimeter.analysis.study import StudyResult
-
-Kind = Literal[
-    "text",
-    "label",
-    "check",
-    "reason",
-    "source",
-    "condition",
-    "outcome",
-    "count",
-    "number",
-    "p",
-    "percent",
-    "setting",
-]
-
-INTERVAL = "[95\N{NO-BREAK SPACE}%\N{NO-BREAK SPACE}interval]"
-"""What the heading of a column with `ends` says after the quantity."""
-
-
-@dataclass(frozen=True)
-class Column:
-    """A column of a table on the page.
-
-    Attributes
-    ----------
-    name : str
-        The key of its values in the rows.
-    heading : str
-    kind : str
-        How values are shown.
-    ends : (str, str) or None
-        The keys of the ends of this number's interval, which is shown below the number.
-    page_factor : float
-        The page shows the number times this, in the unit that the heading states.
-    digits : int
-        Significant digits that the page shows of a number.
-    group : str
-        Neighbouring columns of one group share a heading above their own.
-    below : str
-        The key of a second value, which is shown in brackets below the first.
-    """
-
-    name: str
-    heading: str
-    kind: Kind = "number"
-    ends: tuple[str, str] | None = None
-    page_factor: float = 1.0
-    digits: int = 4
-    group: str = ""
-    below: str = ""
-
-
-SESSION = (
-    Column("subject", "Subject", "label"),
-    Column("day", "Day", "label"),
-    Column("condition", "Condition", "condition"),
-)
-"""Columns of whatever belongs to a session of a study."""
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table of the report, also written to ``tables/NAME.csv``.
-
-    Attributes
-    ----------
-    name : str
-        Of the file. Two tables of one name show different columns of the same rows.
-    title : str
-    columns : tuple of Column
-        What the page shows; none for a table that is written as a file only.
-    rows : sequence of mappings
-        Unrounded values by name with unit; the file has all of them. All rows have the same keys.
-    note : str or Markup
-        Below the table on the page, where it has rows.
-    empty : str
-        What the page says in place of a table without rows; a section of nothing else is not shown.
-    folding : bool
-        A long table, which the reader can fold away.
-    """
-
-    name: str
-    title: str
-    columns: tuple[Column, ...]
-    rows: Sequence[Mapping[str, Any]]
-    note: str = ""
-    empty: str = ""
-    folding: bool = False
+from rigidimeter.core.words import Table
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,11 @@ import json
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from rigidimeter.analysis.report.numbers import amount, condition_name, number, short_names
 from rigidimeter.analysis.study import StudyResult
 from rigidimeter.analysis.study.drawing import epoch_traces
 from rigidimeter.analysis.study.drawn_signals import EpochTrace
 from rigidimeter.core.records import Fit, Score
+from rigidimeter.core.words import amount, condition_name, number, short_names
 
 Trace = dict[str, Any]
 
@@ -19,7 +19,7 @@ def page_traces(result: StudyResult) -> dict[tuple[str, str], Trace]:
     """Return what the page shows of each epoch that was fitted or scored, by source and label."""
     analysis = result.analysis
     names = short_names(epoch.source for epoch in result.epochs)
-    results: list[Fit | Score] = [*analysis.scores, *(analysis.fixed_inertia or analysis.fits)]
+    results: list[Fit | Score] = [*analysis.scores, *analysis.fits]
     by_name = {(one.source, one.epoch): one for one in results}
     return {
         (trace.source, trace.epoch): _trace(trace, by_name[trace.source, trace.epoch], names)

@@ -6,7 +6,6 @@ import base64
 import functools
 import hashlib
 import itertools
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
@@ -16,17 +15,16 @@ import jinja2
 from markupsafe import Markup
 
 from rigidimeter.analysis.report import first_screen
-from rigidimeter.analysis.report.contents import Block, Column, Figure, Section, Table
+from rigidimeter.analysis.report.contents import Block, Figure, Section
 from rigidimeter.analysis.report.epoch_traces import page_traces, traces_json
 from rigidimeter.analysis.report.inline_svg import inline_svg
-from rigidimeter.analysis.report.numbers import interval, number, p_value, short_names
 from rigidimeter.analysis.report.sections import SECTIONS
 from rigidimeter.analysis.report.sections.methods_prose import methods_prose
 from rigidimeter.analysis.report.style import svg_text
-from rigidimeter.analysis.report.verdict_text import verdict
-from rigidimeter.analysis.study import StudyResult, traffic_light
+from rigidimeter.analysis.study import StudyResult, lead, traffic_light
 from rigidimeter.core.files import csv_text, visible
 from rigidimeter.core.version import __version__
+from rigidimeter.core.words import Column, Table, short_names, shown_below, shown_value
 
 Contents = Sequence[tuple[Section, Sequence[Block]]]
 """The sections of a result, each with its text, tables and figures."""
@@ -145,20 +143,31 @@ def _mark(result: StudyResult) -> str:
     return "some of the data are virtual" if virtual else ""
 
 
-def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> str:
-    """Return the page as text, with its style inside, and the figures that `svg` has by name."""
+def shown_tables(result: StudyResult) -> list[Table]:
+    """Return the tables that the page shows, in its order."""
+    blocks = itertools.chain.from_iterable(blocks for _, blocks in contents(result))
+    return [block for block in blocks if isinstance(block, Table) and _is_shown(block)]
+
+
+def source_names(result: StudyResult) -> dict[str, str]:
+    """Return what each source is called in tables, as short as keeps them apart."""
     analysis = result.analysis
     sources = [epoch.source for epoch in result.epochs]
     sources += [fit.source for fit in (*analysis.fits, *analysis.fixed_inertia)]
-    names = short_names([*sources, *(score.source for score in analysis.scores)])
+    return short_names([*sources, *(score.source for score in analysis.scores)])
+
+
+def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> str:
+    """Return the page as text, with its style inside, and the figures that `svg` has by name."""
+    names = source_names(result)
     light = traffic_light(result)
     traces = page_traces(result)
     script = _script() if traces else ""
     return _template().render(
         result=result,
-        show=lambda value, column: _shown(value, column, names),
-        below=lambda row, column: _below(row, column, names),
-        shown_columns=lambda table: _shown_columns(table, len(names) > 1),
+        show=lambda value, column: shown_value(value, column, names),
+        below=lambda row, column: shown_below(row, column, names),
+        shown_columns=lambda table: table.shown_columns(several_sources=len(names) > 1),
         # The style is this package's own file and needs no escaping.
         css=Markup("\n".join([_text("page.css"), *([_plot(".min.css")] if traces else [])])),
         parts=parts(made),
@@ -166,12 +175,8 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
         traces=Markup(traces_json(traces.values())) if traces else "",
         script=Markup(script),
         script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii"),
-        verdict=verdict(result),
-        strips=[
-            (pair, first_screen.tested_words(pair), rows)
-            for pair in (result, *result.further_pairs)
-            if (rows := first_screen.strip(pair))
-        ],
+        lead=lead(result),
+        strips=first_screen.strips(result),
         precision=first_screen.precision_tables(result),
         light=light,
         screen=first_screen,
@@ -240,39 +245,6 @@ def data_uri(svg: str) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode("ascii")
 
 
-def _shown(value: Any, column: Column, names: Mapping[str, str]) -> str:
-    """Return a value as the page prints it."""
-    if value is None or value == "":
-        return "(no condition)" if column.kind == "condition" else "–"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if column.kind == "source":
-        return names.get(str(value), str(value))
-    if column.kind == "p":
-        return p_value(value)
-    if column.kind == "percent":
-        return "–" if math.isnan(value) else f"{100 * value:.0f} %"
-    if isinstance(value, float):
-        if column.kind == "setting":
-            return f"{value:g}"
-        return number(value * column.page_factor, column.digits)
-    return str(value)
-
-
-def _shown_columns(table: Table, several_sources: bool) -> list[Column]:
-    """Return the columns of a table without those that would say nothing.
-
-    A column of reasons is left out if all are empty, and that of sources if there is only one.
-    """
-    by_epoch = any(column.name == "epoch" for column in table.columns)
-    return [
-        column
-        for column in table.columns
-        if (column.kind != "reason" or any(row.get(column.name) for row in table.rows))
-        and (column.kind != "source" or several_sources or not by_epoch)
-    ]
-
-
 def _heads(columns: Iterable[Column]) -> list[tuple[str, list[Column]]]:
     """Return the columns by their groups; each column without a group by itself."""
     found: list[tuple[str, list[Column]]] = []
@@ -280,19 +252,3 @@ def _heads(columns: Iterable[Column]) -> list[tuple[str, list[Column]]]:
         own = list(members)
         found += [(group, own)] if group else [("", [column]) for column in own]
     return found
-
-
-def _below(row: Mapping[str, Any], column: Column, names: Mapping[str, str]) -> str:
-    """Return what is shown below a value: the second value of its column, or its interval.
-
-    A value that was held has no interval.
-    """
-    if column.below:
-        second = row.get(column.below)
-        return "" if second in (None, "") else f"({_shown(second, column, names)})"
-    if column.ends is None:
-        return ""
-    low, high = (row.get(name) for name in column.ends)
-    if not isinstance(low, float) or not isinstance(high, float) or not low < high:
-        return ""
-    return interval(low * column.page_factor, high * column.page_factor, column.digits)

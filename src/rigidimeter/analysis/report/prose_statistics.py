@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from rigidimeter.analysis.report.method_words import method_title
-from rigidimeter.analysis.report.numbers import condition_name, plural, series
 from rigidimeter.analysis.report.references import Cited
 from rigidimeter.analysis.study import RATING, StudyResult
+from rigidimeter.core.words import condition_name, plural, series
 
 OFFSETS = {"condition in day": "condition within a day", "subject/day": "day within a subject"}
 """How sentences call what has an offset of its own in a mixed model, where not by its name."""

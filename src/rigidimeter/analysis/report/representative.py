@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 
-from rigidimeter.analysis.report.numbers import short_names
 from rigidimeter.analysis.study import StudyResult
 from rigidimeter.core.records import Epoch, Fit, Score
+from rigidimeter.core.words import short_names
 
 
 def place(result: StudyResult, one: Fit | Score) -> str:

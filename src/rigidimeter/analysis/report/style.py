@@ -32,7 +32,7 @@ GREY = "#555555"
 INK = "#1C1C1C"
 WARN = "#8A3B00"
 _BY_NAME = {"OFF": "#D55E00", "DBS": "#0072B2"}
-_OTHERS = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+OTHERS = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = "osD^vP*X"
 _GOLDEN = 0.6180339887498949
 
@@ -103,7 +103,7 @@ def condition_colours(conditions: Iterable[str]) -> dict[str, str]:
     """Return a colour for each condition: OFF and DBS their own, others in order."""
     names = list(dict.fromkeys(conditions))
     others = [name for name in names if name not in _BY_NAME]
-    free = {name: _OTHERS[i % len(_OTHERS)] for i, name in enumerate(others)}
+    free = {name: OTHERS[i % len(OTHERS)] for i, name in enumerate(others)}
     return {name: _BY_NAME.get(name) or free[name] for name in names}
 
 
@@ -141,8 +141,20 @@ def spread(count: int, reach: float) -> NDArray[np.float64]:
 
 def plain_ticks(*axes: Axis) -> None:
     """Label the ticks of logarithmic axes with plain numbers."""
+
+    def plain(value: float, _: object) -> str:
+        return np.format_float_positional(value, 4, trim="-", fractional=False)
+
     for axis in axes:
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_major_formatter(FuncFormatter(plain))
+
+
+def legend_above(axes: Axes) -> None:
+    """Write the legend above the axes, on lines of four."""
+    axes.legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, handletextpad=0.4, borderpad=0.1,
+        fontsize=8, frameon=False,
+    )  # fmt: skip
 
 
 def note(axes: Axes, text: str) -> None:

@@ -9,6 +9,7 @@ from rigidimeter.analysis.statistics.contrasts import (
     joint_test,
     pairwise,
 )
+from rigidimeter.analysis.statistics.day_components import DayComponents, day_components
 from rigidimeter.analysis.statistics.day_levels import (
     PartiallyPaired,
     SubjectEpochs,

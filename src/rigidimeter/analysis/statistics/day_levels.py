@@ -41,6 +41,10 @@ Days = dict[str, tuple[list[float], list[float]]]
 """Of each day the values of x and those of y."""
 SubjectEpochs = dict[str, Days]
 """Of each subject."""
+Weights = tuple[dict[str, float], dict[str, float]]
+"""Of each unit in the mean of x and in that of y; those of a mean sum to one."""
+DayWeights = tuple[dict[tuple[str, str], float], dict[tuple[str, str], float]]
+"""The same of each day of each subject."""
 _MIN_SUBJECTS = 3
 """With fewer subjects that have both conditions, their days are what is compared."""
 
@@ -196,7 +200,7 @@ def _df(parts: list[_Part]) -> float:
 class Tested(NamedTuple):
     """A difference of two means with its standard error and degrees of freedom, and the test.
 
-    `unit` is what was compared: ``day`` or ``subject``.
+    `unit` is what was compared: ``day`` or ``subject``; `weights` are those of the days.
     """
 
     estimate: float
@@ -205,11 +209,14 @@ class Tested(NamedTuple):
     words: str
     mean_x: float
     mean_y: float
-    unit: str = "day"
+    unit: str
+    weights: DayWeights
 
 
-def test_by_levels(epochs: SubjectEpochs, names: tuple[str, str]) -> Tested:
+def test_by_levels(epochs: SubjectEpochs, names: tuple[str, str], day: str) -> Tested:
     """Return the difference of x and y, called by these names, tested by days or subjects.
+
+    `day` is what a day is called.
 
     Raises
     ------
@@ -217,8 +224,8 @@ def test_by_levels(epochs: SubjectEpochs, names: tuple[str, str]) -> Tested:
         If a condition has one day (or one subject), or they do not vary.
     """
     if len(epochs) == 1:
-        (days,) = epochs.values()
-        return _of_days(days, names)
+        ((subject, days),) = epochs.items()
+        return _of_days(subject, days, names, day)
     means = {subject: _means(own) for subject, own in epochs.items()}
     levels = {
         subject: (_mean([x for x, _ in own.values()]), _mean([y for _, y in own.values()]))
@@ -228,12 +235,13 @@ def test_by_levels(epochs: SubjectEpochs, names: tuple[str, str]) -> Tested:
     left_out = f", {_count(len(levels) - len(both), 'subject')} with one condition left out"
     remark = left_out if len(both) < len(levels) else ""
     if not both or len(both) >= _MIN_SUBJECTS:
-        tested = _of_units(both or levels, "subject", names)
-        return tested._replace(words=tested.words + remark) if both else tested
+        compared, of_subjects, words = _of_units(both or levels, "subject", names)
+        words += remark * bool(both)
+        return _tested(compared, words, "subject", _by_days(of_subjects, epochs))
     found = []
     for subject in both:
         try:
-            found.append(_of_days(epochs[subject], names))
+            found.append(_of_days(subject, epochs[subject], names, day))
         except ValueError as error:
             raise ValueError(
                 f"subject {subject}: {error} (with three subjects or more that have both "
@@ -244,17 +252,24 @@ def test_by_levels(epochs: SubjectEpochs, names: tuple[str, str]) -> Tested:
     df = variances.sum() ** 2 / np.sum(variances**2 / [each.df for each in found])
     tests = "; ".join(f"{subject}: {each.words}" for subject, each in zip(both, found, strict=True))
     words = (
-        f"mean of {_count(n, 'subject')}, each by its days ({tests}){remark}; no conclusion on "
+        f"mean of {_count(n, 'subject')}, each by its {day}s ({tests}){remark}; no conclusion on "
         "other subjects"
     )
     mean_x = math.fsum(each.mean_x for each in found) / n
     mean_y = math.fsum(each.mean_y for each in found) / n
-    return Tested(mean_x - mean_y, math.sqrt(variances.sum()), float(df), words, mean_x, mean_y)
+    weights: DayWeights = {}, {}
+    for each in found:
+        for own, of_days in zip(weights, each.weights, strict=True):
+            own.update({day: weight / n for day, weight in of_days.items()})
+    se = math.sqrt(variances.sum())
+    return Tested(mean_x - mean_y, se, float(df), words, mean_x, mean_y, day, weights)
 
 
-def _of_days(days: Days, names: tuple[str, str]) -> Tested:
+def _of_days(subject: str, days: Days, names: tuple[str, str], called: str) -> Tested:
     """Test the days of one subject; two days agree by chance, so their epochs bound the error."""
-    tested = _of_units(_means(days), "day", names)
+    compared, weights, words = _of_units(_means(days), called, names)
+    x, y = ({(subject, day): weight for day, weight in own.items()} for own in weights)
+    tested = _tested(compared, words, called, (x, y))
     if min(sum(len(by[k]) > 0 for by in days.values()) for k in (0, 1)) > 2:
         return tested
     smallest = math.sqrt(sum(_variance_of_epochs(days, k) for k in (0, 1)))
@@ -262,6 +277,22 @@ def _of_days(days: Days, names: tuple[str, str]) -> Tested:
         return tested
     words = f"{tested.words}, with the standard error of the epochs alone, which is larger"
     return tested._replace(se=smallest, words=words)
+
+
+def _tested(found: PartiallyPaired, words: str, unit: str, weights: DayWeights) -> Tested:
+    return Tested(
+        found.estimate, found.se, found.df, words, found.mean_x, found.mean_y, unit, weights
+    )
+
+
+def _by_days(weights: Weights, epochs: SubjectEpochs) -> DayWeights:
+    """Return the weights of days that count alike within each subject."""
+    found: DayWeights = {}, {}
+    for k, of_subjects in enumerate(weights):
+        for subject, weight in of_subjects.items():
+            days = [day for day, values in epochs[subject].items() if values[k]]
+            found[k].update({(subject, day): weight / len(days) for day in days})
+    return found
 
 
 def _variance_of_epochs(days: Days, k: int) -> float:
@@ -280,8 +311,14 @@ def _means(days: Days) -> dict[str, tuple[float, float]]:
 
 def _of_units(
     values: Mapping[str, tuple[float, float]], unit: str, names: tuple[str, str]
-) -> Tested:
-    """Test units by their values in x and in y, NaN for a condition that one does not have."""
+) -> tuple[PartiallyPaired, Weights, str]:
+    """Compare units by their values in x and in y, NaN for a condition that one does not have.
+
+    Returns
+    -------
+    (PartiallyPaired, Weights, str)
+        The last is the test in words.
+    """
     table = np.array(list(values.values()))
     has = ~np.isnan(table)
     if len(table) == 1:
@@ -303,8 +340,14 @@ def _of_units(
         raise ValueError(
             f"the means of the {unit}s do not vary, so there is no error to test against"
         ) from None
-    words = _in_words(found, int(both.sum()), unit, names)
-    return Tested(found.estimate, found.se, found.df, words, found.mean_x, found.mean_y, unit)
+    weights: Weights = {}, {}
+    alone = (found.weight_x, found.n_x), (found.weight_y, found.n_y)
+    for k, (weight, n) in enumerate(alone):
+        for key, has_both, known in zip(values, both, has[:, k], strict=True):
+            if known:
+                paired = has_both and found.n_both
+                weights[k][key] = (1 - weight) / found.n_both if paired else weight / n
+    return found, weights, _in_words(found, int(both.sum()), unit, names)
 
 
 def _in_words(found: PartiallyPaired, both: int, unit: str, names: tuple[str, str]) -> str:

@@ -6,17 +6,17 @@ Epochs of one day share what the day was like, so they are no independent draws.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import t as t_distribution
 
 from rigidimeter.analysis.statistics.contrasts import interval_of
-from rigidimeter.analysis.statistics.day_levels import SubjectEpochs, test_by_levels
+from rigidimeter.analysis.statistics.day_components import day_components
+from rigidimeter.analysis.statistics.day_levels import DayWeights, SubjectEpochs, test_by_levels
 from rigidimeter.analysis.statistics.ranks import exact_ranksum
 from rigidimeter.analysis.statistics.summary import checked_sample
 
@@ -58,6 +58,8 @@ class DayDifference:
         The means that `estimate` is the difference of.
     unit : str
         What was compared: ``day``, or ``subject`` where there were enough.
+    weights : pair of mappings from (str, str) to float
+        Of the mean of each day, by subject and day, in `mean_x` and in `mean_y`.
     """
 
     estimate: float = math.nan
@@ -78,6 +80,7 @@ class DayDifference:
     mean_x: float = math.nan
     mean_y: float = math.nan
     unit: str = "day"
+    weights: DayWeights = field(default=({}, {}), repr=False)
 
     @property
     def few(self) -> str:
@@ -102,6 +105,7 @@ def day_difference(
     y_subjects: Sequence[str] | None = None,
     names: tuple[str, str] = ("x", "y"),
     confidence: float = 0.95,
+    called: str = "day",
 ) -> DayDifference:
     """Estimate and test the mean of x less that of y, with days as what was sampled.
 
@@ -118,6 +122,8 @@ def day_difference(
         Of the conditions, for the words.
     confidence : float
         Of the interval.
+    called : str
+        What a day is called, such as ``recording`` where days are not known.
 
     Raises
     ------
@@ -159,7 +165,7 @@ def day_difference(
     for k, columns in enumerate(zip(samples, subjects, days, strict=True)):
         for value, subject, day in zip(*columns, strict=True):
             epochs.setdefault(subject, {}).setdefault(day, ([], []))[k].append(float(value))
-    tested = test_by_levels(epochs, names)
+    tested = test_by_levels(epochs, names, called)
     estimate, se, df = tested.estimate, tested.se, tested.df
     low, high = interval_of(estimate, se, df, confidence)
     have = [sum(len(by[k]) > 0 for own in epochs.values() for by in own.values()) for k in (0, 1)]
@@ -175,7 +181,7 @@ def day_difference(
         n_days_x=have[0],
         n_days_y=have[1],
         p_days=_p_of_medians(epochs),
-        day_share=_day_share(epochs),
+        day_share=day_components(epochs).day_share,
         offsets=tuple(name for name, there in parts if there),
         confidence=confidence,
         n_days_both=both,
@@ -183,6 +189,7 @@ def day_difference(
         mean_x=tested.mean_x,
         mean_y=tested.mean_y,
         unit=tested.unit,
+        weights=tested.weights,
     )
 
 
@@ -191,28 +198,6 @@ def day_medians(values: ArrayLike, days: Sequence[str]) -> dict[str, float]:
     sample = np.asarray(values, dtype=np.float64)
     labels = np.asarray(days, dtype=object)
     return {str(day): float(np.median(sample[labels == day])) for day in dict.fromkeys(days)}
-
-
-def _day_share(epochs: SubjectEpochs) -> float:
-    """Return σ_d²/(σ_d² + σ²) by mean squares between and within the days of each condition."""
-    between = within = size = 0.0
-    df_between = df_within = 0
-    for own, k in itertools.product(epochs.values(), (0, 1)):
-        days = [np.array(by[k]) for by in own.values() if by[k]]
-        if not days:
-            continue
-        n = np.array([day.size for day in days])
-        means = np.array([day.mean() for day in days])
-        between += float(n @ (means - n @ means / n.sum()) ** 2)
-        within += sum(float(np.sum((day - day.mean()) ** 2)) for day in days)
-        size += n.sum() - n @ n / n.sum()
-        df_between += n.size - 1
-        df_within += int(n.sum()) - n.size
-    if not df_between or not df_within or not between + within:
-        return math.nan
-    residual = within / df_within
-    of_days = max((between / df_between - residual) * df_between / size, 0.0)
-    return of_days / (of_days + residual)
 
 
 def _p_of_medians(epochs: SubjectEpochs) -> float:

@@ -20,8 +20,9 @@ from rigidimeter.analysis.study.conclusions import (
     conclude,
     conclusion_rows,
 )
+from rigidimeter.analysis.study.day_scatter import DayScatter, day_scatter
+from rigidimeter.analysis.study.difference_rows import DifferenceRow, difference_rows
 from rigidimeter.analysis.study.differences import Difference
-from rigidimeter.analysis.study.doubted_epochs import doubt_sentence
 from rigidimeter.analysis.study.measures import RATING, Measure, Observation, conditions
 from rigidimeter.analysis.study.provenance import provenance
 from rigidimeter.analysis.study.rating_relation import Relation, agreement, relations
@@ -29,6 +30,7 @@ from rigidimeter.analysis.study.ratings_found import RatingMean, RatingsFound
 from rigidimeter.analysis.study.reached_precision import (
     WANTED_PERCENT,
     Precision,
+    condition_precisions,
     precisions,
     precisions_untested,
 )
@@ -41,6 +43,7 @@ from rigidimeter.analysis.study.results import (
     StudyResult,
 )
 from rigidimeter.analysis.study.sensitivity import method_caveats
+from rigidimeter.analysis.study.statements import Statements, lead, statements
 from rigidimeter.analysis.study.study_analysis import analyse_study, estimate_study, read_study
 from rigidimeter.analysis.study.tables import (
     comparison_document,

@@ -123,8 +123,8 @@ def _edited(
                 edited[name] = _free(folder, f"{name}.edited")
                 how = "was changed by hand after it was written" if digest else "was there already"
                 said.append(
-                    f"{ANALYSIS}/{name} {how}; it is written again, and the one that was there is "
-                    f"kept as {edited[name]}"
+                    f"{ANALYSIS}/{name} {how}; it is written again; the previous one is "
+                    f"stored as {edited[name]}"
                 )
     return edited
 

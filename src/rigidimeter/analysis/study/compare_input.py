@@ -74,7 +74,7 @@ def compare(
     session : str, optional
         The table's column whose labels the bootstrap resamples; by default each row.
     key : path, optional
-        The blinding key of a study folder that is kept elsewhere.
+        The blinding key of a study folder that is stored elsewhere.
     settings : Settings, path or mapping, optional
         Of a study folder, instead of those that its first session was recorded with.
     method : str

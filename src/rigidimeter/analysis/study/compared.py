@@ -130,6 +130,7 @@ def _tested(c: Comparison) -> dict[str, Any]:
 
 def _days(c: Comparison) -> dict[str, Any]:
     row: dict[str, Any] = asdict(c.days) if c.days is not None else {}
+    row.pop("weights", None)
     row["days_reference"], row["days_other"] = row.pop("n_days_x"), row.pop("n_days_y")
     row["days_both"] = row.pop("n_days_both")
     row["mean_reference"], row["mean_other"] = row.pop("mean_x"), row.pop("mean_y")

@@ -50,7 +50,7 @@ def compare_analysis(
 ) -> StudyResult:
     """Compare two conditions of an analysis in J, B, K, impulse and work.
 
-    B and K are those with the inertia held. Every epoch counts as one observation. Without names
+    Every epoch counts as one observation. Without names
     the first condition that `conditions` gives is compared with each other one; an analysis with
     one condition gives its summaries and no test.
 
@@ -280,8 +280,11 @@ def day_tests(
     return tuple(done)
 
 
-def day_test(comparison: Comparison) -> DayDifference:
-    """Compare the two conditions by days; where that cannot be done, a remark says why."""
+def day_test(comparison: Comparison, called: str = "day") -> DayDifference:
+    """Compare the two conditions by days; where that cannot be done, a remark says why.
+
+    `called` is what a day is called.
+    """
     x, y = (comparison.of(name) for name in comparison.pair)
     days = len({o.unit for o in x}), len({o.unit for o in y})
     if min(len(x), len(y)) < FEWEST_FOR_TEST:
@@ -295,6 +298,7 @@ def day_test(comparison: Comparison) -> DayDifference:
             x_subjects=[o.subject for o in x],
             y_subjects=[o.subject for o in y],
             names=(comparison.reference, comparison.other),
+            called=called,
         )
     except (ValueError, ArithmeticError) as error:
         return no_days(*days, str(error))

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from rigidimeter.analysis.statistics import holm
 from rigidimeter.analysis.study.compared import Comparison, measure_names
+from rigidimeter.analysis.study.days_to_decide import days_to_decide
 from rigidimeter.analysis.study.differences import Difference, simulated_difference
 from rigidimeter.analysis.study.objections import hidden, negligible, objections, untested
 from rigidimeter.analysis.study.results import StudyResult
@@ -36,7 +37,11 @@ class Conclusion:
     reason : str
         A clause; empty where the test is the whole reason.
     difference : Difference
-        Of the test, with both values.
+        With both values, and the intervals of the measurement and of the test.
+    test : str
+        The test in words, such as ``paired t-test of 5 days``; empty without one.
+    days_to_decide : int or None
+        Where there are too few days: how many would show a difference of 20 %.
     simulated : Difference or None
         What a virtual study simulated.
     """
@@ -47,6 +52,8 @@ class Conclusion:
     p: float = math.nan
     reason: str = ""
     simulated: Difference | None = None
+    test: str = ""
+    days_to_decide: int | None = None
 
 
 @dataclass(frozen=True)
@@ -100,19 +107,22 @@ def conclude(result: StudyResult) -> Conclusions | None:
         c = test.comparison
         verdict: Verdict
         if math.isnan(p):
-            verdict, reason = "cannot be decided", untested(c, result, moved) or test.remark
+            verdict, reason = "cannot be decided", untested(c, result) or test.remark
         elif p < LEVEL and (reason := negligible(c, result)):
             verdict = "no difference shown"
         elif p < LEVEL:
             reason = next(objections(test, basis, result, moved), "")
-            verdict = "not supported" if reason else "lower" if test.sign > 0 else "higher"
+            verdict = "not supported" if reason else "lower" if test.sign < 0 else "higher"
         elif reason := too_few(test, basis, with_p):
             verdict = "cannot be decided"
         else:
             few = c.days.few if c.days is not None and basis == "days" else ""
             verdict, reason = "no difference shown", hidden(c, result) or few
         simulated = simulated_difference(c, result.conditions)
-        found.append(Conclusion(c, verdict, test.difference, p, reason, simulated))
+        wanted = days_to_decide(c) if math.isnan(p) else None
+        found.append(
+            Conclusion(c, verdict, test.difference, p, reason, simulated, test.words, wanted)
+        )
     ordered = tuple(sorted(found, key=lambda one: one.comparison.measure.place))
     return Conclusions(basis, ordered, with_p)
 
@@ -129,7 +139,9 @@ def conclusion_rows(result: StudyResult) -> list[dict[str, Any]]:
             **one.difference.row(),
             "p_holm": one.p,
             "tested_by": concluded.basis,
+            "test": one.test,
             "reason": one.reason,
+            "days_to_decide": one.days_to_decide,
             "caveat": caveats.get(one.comparison.measure.name, ""),
             **({} if one.simulated is None else _simulated_row(one.simulated)),
         }
@@ -143,6 +155,6 @@ def _simulated_row(found: Difference) -> dict[str, float]:
     return {
         "simulated_reference": found.reference,
         "simulated_other": found.other,
-        "simulated_estimate": found.estimate,
-        "simulated_percent": found.percent[0],
+        "simulated_difference": found.estimate,
+        "simulated_difference_percent": found.percent[0],
     }

@@ -1,15 +1,22 @@
-"""The two values of a measure, and their difference as the test that counts has it.
+"""The two values of a measure, and their difference: as it was measured, and as it was tested.
 
-    per cent = 100 · difference / value in the reference
+    difference = other − reference          per cent = 100 · difference / reference
 
-The value in the reference is taken as known, so that an interval in per cent excludes zero where
-the one in units does. It does not hold the uncertainty of that value.
+Both values are means with the weights of the test: value = Σ w_e x_e over epochs, Σ w_e = 1. What
+was measured holds for these recordings alone. With half the 95 % interval h_e of each epoch,
+
+    half the interval of the difference = √(Σ w_e² h_e²) over the epochs of both conditions
+
+and never less than what the instrument is accurate to. The test adds what differs between days, or
+subjects. In per cent the value in the reference is taken as known, so that an interval excludes
+zero where the one in units does.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -18,10 +25,15 @@ from rigidimeter.analysis.study.compared import Comparison
 from rigidimeter.analysis.study.measures import Observation
 from rigidimeter.analysis.study.results import Condition
 
+ACCURACY = 0.001
+"""As a share: the mean error of J, B and K of relaxed epochs is below it (accuracy.md)."""
+
+Three = tuple[float, float, float]
+
 
 @dataclass(frozen=True)
 class Difference:
-    """Two conditions in one measure, in its unit; differences are reference − other.
+    """Two conditions in one measure, in its unit; differences are other − reference.
 
     Attributes
     ----------
@@ -30,6 +42,8 @@ class Difference:
     reference, other : float
     estimate, low, high, p : float
         Of the test, with its 95 % interval; an interval and p of NaN where there is no test.
+    measured_half : float
+        Half the 95 % interval of the measurement alone; NaN of measures without one.
     ratio : bool
         Whether a per cent has a meaning: not for scores of a scale, nor if the reference is not
         positive.
@@ -42,55 +56,77 @@ class Difference:
     low: float = math.nan
     high: float = math.nan
     p: float = math.nan
+    measured_half: float = math.nan
     ratio: bool = True
 
     @property
-    def percent(self) -> tuple[float, float, float]:
-        """Difference and interval in per cent of the reference; NaN where it has no meaning."""
-        scale = 100 / self.reference if self.ratio and self.reference > 0 else math.nan
-        return self.estimate * scale, self.low * scale, self.high * scale
+    def tested(self) -> Three:
+        """Estimate and interval of the test."""
+        return self.estimate, self.low, self.high
 
     @property
-    def side(self) -> Literal["lower", "higher", "the same"]:
-        """How the other condition compares with the reference."""
-        if not self.estimate:
-            return "the same"
-        return "lower" if self.estimate > 0 else "higher"
+    def measured(self) -> Three:
+        """Estimate and interval of the measurement."""
+        half = self.measured_half
+        return self.estimate, self.estimate - half, self.estimate + half
+
+    def in_percent(self, sizes: Three) -> Three:
+        """Return a difference and its interval in % of the reference; NaN if without a meaning."""
+        scale = 100 / self.reference if self.ratio and self.reference > 0 else math.nan
+        estimate, low, high = sizes
+        return estimate * scale, low * scale, high * scale
+
+    @property
+    def percent(self) -> Three:
+        """Estimate and interval of the test in % of the reference; NaN if without a meaning."""
+        return self.in_percent(self.tested)
+
+    @property
+    def measured_percent(self) -> Three:
+        """Estimate and interval of the measurement in % of the reference."""
+        return self.in_percent(self.measured)
 
     def row(self) -> dict[str, Any]:
         """Return all numbers as documents and tables have them."""
-        percent, low, high = self.percent
+        ends = ("", "_low", "_high")
         return {
             "centre": self.centre,
             "value_reference": self.reference,
             "value_other": self.other,
-            "estimate": self.estimate,
-            "low": self.low,
-            "high": self.high,
-            "percent": percent,
-            "percent_low": low,
-            "percent_high": high,
+            **dict(zip((f"difference{end}" for end in ends), self.tested, strict=True)),
+            **dict(zip((f"difference_percent{end}" for end in ends), self.percent, strict=True)),
+            **dict(zip(("measured_low", "measured_high"), self.measured[1:], strict=True)),
+            **dict(
+                zip(
+                    ("measured_percent_low", "measured_percent_high"),
+                    self.measured_percent[1:],
+                    strict=True,
+                )
+            ),
             "p": self.p,
         }
 
 
 def by_units(c: Comparison, found: DayDifference | None) -> Difference:
-    """Return the difference that a test by days found, or by recordings in their place.
+    """Return the difference of a test by days, or by recordings in their place.
 
-    Without a test it is that of the means over days, or recordings, and has no interval.
+    Without a test it is that of the means over days, or recordings, and has no interval of a test.
     """
     ratio = c.measure.origin != "ratings"
     if found is None or math.isnan(found.p):
-        first, second = (_mean_of_units(c.of(name)) for name in c.pair)
-        return Difference("mean", first, second, first - second, ratio=ratio)
+        of_days = [_alike(c.of(name)) for name in c.pair]
+        first, second = (_mean(c.of(name), own) for name, own in zip(c.pair, of_days, strict=True))
+        half = _measured_half(c, of_days)
+        return Difference("mean", first, second, second - first, measured_half=half, ratio=ratio)
     return Difference(
         "mean",
         found.mean_x,
         found.mean_y,
-        found.estimate,
-        found.low,
-        found.high,
+        -found.estimate,
+        -found.high,
+        -found.low,
         found.p,
+        _measured_half(c, found.weights),
         ratio,
     )
 
@@ -99,9 +135,9 @@ def by_values(c: Comparison) -> Difference:
     """Return the medians of a table's values, and the shift of the rank-sum test."""
     first, second = (c.summaries[name].median for name in c.pair)
     if c.test is None:
-        return Difference("median", first, second, first - second)
+        return Difference("median", first, second, second - first)
     t = c.test
-    return Difference("median", first, second, t.shift, t.shift_low, t.shift_high, t.p)
+    return Difference("median", first, second, -t.shift, -t.shift_high, -t.shift_low, t.p)
 
 
 def simulated_difference(c: Comparison, conditions: Iterable[Condition]) -> Difference | None:
@@ -110,12 +146,38 @@ def simulated_difference(c: Comparison, conditions: Iterable[Condition]) -> Diff
     first, second = (known.get(name) for name in c.pair)
     if first is None or second is None:
         return None
-    return Difference("median", first, second, first - second, ratio=c.measure.origin != "ratings")
+    return Difference("median", first, second, second - first, ratio=c.measure.origin != "ratings")
 
 
-def _mean_of_units(observations: Iterable[Observation]) -> float:
-    units: dict[tuple[str, str], list[float]] = {}
-    for o in observations:
-        units.setdefault((o.subject, o.day), []).append(o.value)
-    means = [math.fsum(values) / len(values) for values in units.values()]
-    return math.fsum(means) / len(means) if means else math.nan
+Weights = Mapping[tuple[str, str], float]
+
+
+def _alike(observations: Iterable[Observation]) -> Weights:
+    """Return the same weight for each day."""
+    days = dict.fromkeys((o.subject, o.day) for o in observations)
+    return {day: 1 / len(days) for day in days}
+
+
+def _mean(observations: Iterable[Observation], of_days: Weights) -> float:
+    each = list(_weighted(observations, of_days))
+    return math.fsum(weight * o.value for weight, o in each) if each else math.nan
+
+
+def _weighted(
+    observations: Iterable[Observation], of_days: Weights
+) -> list[tuple[float, Observation]]:
+    """Return each epoch with its weight; days that do not count are left out."""
+    counting = [o for o in observations if (o.subject, o.day) in of_days]
+    counts = Counter((o.subject, o.day) for o in counting)
+    return [(of_days[o.subject, o.day] / counts[o.subject, o.day], o) for o in counting]
+
+
+def _measured_half(c: Comparison, weights: Iterable[Weights]) -> float:
+    each = [
+        one for name, own in zip(c.pair, weights, strict=True) for one in _weighted(c.of(name), own)
+    ]
+    if not each or c.measure.origin != "fits":
+        return math.nan
+    half = math.sqrt(math.fsum((weight * (o.high - o.low) / 2) ** 2 for weight, o in each))
+    size = math.fsum(weight * abs(o.value) for weight, o in each) / 2
+    return max(half, ACCURACY * size)

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from rigidimeter.analysis.study.compared import Comparison
-from rigidimeter.core.records import Analysis, Finding, Fit
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import Analysis, Fit
 
 OF_SUBJECT = ("tremor", "voluntary_torque", "active_movement", "emg_activity", "loop_bias")
 """Checks of the subject's own torque."""
@@ -47,22 +48,11 @@ class Doubt:
 def doubts(analysis: Analysis) -> tuple[Doubt, ...]:
     """Return which checks cast doubt on epochs that count, those of most epochs first."""
     counting = [fit for fit in analysis.fits if fit.outcome.included]
-    of_epochs = Counter(name for fit in counting for name in fit.doubts)
-    of_pool = {name for fit in analysis.pooled for name in fit.doubts}
+    of_epochs = Counter(name for fit in counting for name in fit.cautions)
+    of_pool = {name for fit in analysis.pooled for name in fit.cautions}
     names = [name for name, _ in of_epochs.most_common()]
     names += sorted(of_pool - of_epochs.keys())
     return tuple(Doubt(name, of_epochs[name], len(counting)) for name in names)
-
-
-def doubt_sentence(analysis: Analysis) -> list[str]:
-    """Return the sentence on doubts that goes with whatever is concluded; nothing without any."""
-    parts = [
-        f"{doubt.check} in {doubt.epochs} of {doubt.counting} epochs"
-        if doubt.epochs
-        else f"{doubt.check} in all epochs together"
-        for doubt in doubts(analysis)
-    ]
-    return [f"Checks cast doubt on J, B or K: {', '.join(parts)}."] if parts else []
 
 
 def doubted_epochs(c: Comparison, analysis: Analysis) -> Doubted:
@@ -97,8 +87,8 @@ def carried(c: Comparison, doubted: Doubted) -> str:
         carry = sum((o.source, o.epoch) in doubted for o in of)
         parts.append(f"{carry} of {len(of)} epochs in {condition or 'no condition'}")
     others = len(counts) - 1
-    more = f" (and {others} other check{'s' if others > 1 else ''})" if others else ""
-    return f"{in_words(first)}{more} casts doubt on {' and '.join(parts)}"
+    more = f" (or {others} other finding{'s' if others > 1 else ''})" if others else ""
+    return f"{in_words(first)}{more} in {' and '.join(parts)}"
 
 
 def in_words(check: str) -> str:
@@ -108,5 +98,5 @@ def in_words(check: str) -> str:
 
 def _counts(finding: Finding, *, of_score: bool) -> bool:
     if of_score:
-        return finding.name in OF_SUBJECT and bool(finding.remedy)
+        return finding.name in OF_SUBJECT
     return finding.level != "note" and finding.name not in ALIKE_IN_BOTH

@@ -39,7 +39,7 @@ def channel_facts(result: StudyResult) -> tuple[tuple[ChannelFacts, ...], ...]:
 def epoch_traces(result: StudyResult) -> Iterator[EpochTrace]:
     """Yield what the page shows of each epoch that was fitted or scored, each once."""
     analysis = result.analysis
-    results: list[Fit | Score] = [*(analysis.fixed_inertia or analysis.fits), *analysis.scores]
+    results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
     seen: set[tuple[str, str]] = set()
     prepared = prepared_epochs(result) if result.prepared else {}
     for one in results:

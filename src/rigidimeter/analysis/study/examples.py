@@ -34,14 +34,8 @@ def representatives(
 
 
 def representative_fits(result: StudyResult) -> list[Fit]:
-    """Return for each condition the included fit with the median stiffness, what is compared first.
-
-    From the fits at fixed inertia, whose damping and stiffness the report compares; from the free
-    fits if there are none.
-    """
-    analysis = result.analysis
-    fixed = representatives(result, analysis.fixed_inertia, lambda fit: fit.stiffness_nm_rad)
-    return fixed or representatives(result, analysis.fits, lambda fit: fit.stiffness_nm_rad)
+    """Return for each condition the included fit with the median stiffness."""
+    return representatives(result, result.analysis.fits, lambda fit: fit.stiffness_nm_rad)
 
 
 def representative_scores(result: StudyResult) -> list[Score]:

@@ -31,7 +31,7 @@ class Measure:
     name: str
     title: str
     unit: str
-    origin: Literal["fits", "fixed_inertia", "scores", "ratings", "column"]
+    origin: Literal["fits", "scores", "ratings", "column"]
 
     def results(self, analysis: Analysis) -> Sequence[Fit | Score]:
         """Return the fits or scores that hold this measure."""
@@ -44,6 +44,12 @@ class Measure:
     def label(self) -> str:
         """Title and unit, for axes and headings."""
         return f"{self.title} ({self.unit})" if self.unit else self.title
+
+    @property
+    def short(self) -> str:
+        """A word for tables and lists: ``K``, ``impulse``, ``rating``."""
+        word = self.title.split()[-1] if self.origin != "column" else self.title
+        return word if len(word) == 1 or self.origin == "column" else word.lower()
 
     @property
     def place(self) -> int:
@@ -59,12 +65,12 @@ class Measure:
 
 MEASURES = (
     Measure("inertia_kg_m2", "Inertia J", "kg·m²", "fits"),
-    Measure("damping_nm_s_rad", "Viscous damping B", "N·m·s/rad", "fixed_inertia"),
-    Measure("stiffness_nm_rad", "Stiffness K", "N·m/rad", "fixed_inertia"),
+    Measure("damping_nm_s_rad", "Viscous damping B", "N·m·s/rad", "fits"),
+    Measure("stiffness_nm_rad", "Stiffness K", "N·m/rad", "fits"),
     Measure("impulse_nm_s", "Angular impulse", "N·m·s", "scores"),
     Measure("work_j", "Work", "J", "scores"),
 )
-"""Inertia is from the first stage; damping and stiffness are from the second, at fixed inertia."""
+"""J, B and K are those of one fit. The paper's second stage, with J held, is in `sensitivity`."""
 
 RATING = Measure("rating", "Examiners' rating", "points", "ratings")
 """Scores less the offsets of their examiners."""

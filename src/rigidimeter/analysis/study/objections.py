@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from datetime import date
 
 from rigidimeter.analysis.estimation import method_named
@@ -24,7 +23,11 @@ from rigidimeter.analysis.study.ratings_found import RatingsFound
 from rigidimeter.analysis.study.ratings_model import rated_one_condition, without_examiners
 from rigidimeter.analysis.study.results import StudyResult
 from rigidimeter.analysis.study.tested import LEVEL, Basis, Test, by_days, tested_again
-from rigidimeter.core.records import Finding, Fit
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import Fit
+
+SHARE_THAT_HIDES = 0.1
+"""Of the epochs of a condition: so many with a caution can hide a difference."""
 
 SHARE_OF_INERTIA = 0.5
 """Of a measure's relative difference: if that of the inertia is larger, the joint or the contact
@@ -51,12 +54,12 @@ def objections(
     c = test.comparison
     if result.ratings is not None and c.measure.origin == "ratings":
         yield from _one_sided(test, result.ratings)
-    if c.measure.origin in ("fits", "fixed_inertia", "scores"):
+    if c.measure.origin in ("fits", "scores"):
         yield from _of_degrees(inertia)
         yield from _of_epochs(test, basis, result)
         yield from _of_conditions(test, result)
         if inertia is not None:
-            yield from _of_inertia(test, basis, result, inertia)
+            yield from _of_inertia(test, result, inertia)
     if basis == "recordings":
         yield (
             "which recordings are of one day is not known, and a day may move all of them alike; "
@@ -69,22 +72,28 @@ def objections(
 def hidden(c: Comparison, result: StudyResult) -> str:
     """Return what can hide a difference that was not found; empty without any."""
     said = ""
-    if doubted := doubted_epochs(c, result.analysis):
+    doubted = doubted_epochs(c, result.analysis)
+    shares = [
+        sum((o.source, o.epoch) in doubted for o in own) / len(own)
+        for own in map(c.of, c.pair)
+        if own
+    ]
+    if max(shares, default=0.0) >= SHARE_THAT_HIDES:
         said = carried(c, doubted)
     elif result.ratings is not None and c.measure.origin == "ratings":
         said = _who_rated_one(rated_one_condition(result.ratings))
     return f"{said}, which can hide a difference" if said else ""
 
 
-def untested(c: Comparison, result: StudyResult, inertia: Comparison | None) -> str:
-    """Return why a condition has no values, where the recordings or the inertia say so."""
+def untested(c: Comparison, result: StudyResult) -> str:
+    """Return why a condition has no values, where the recordings say so."""
     read = {session.condition for session in result.sessions}
     for name in c.pair:
         lost = [out for out in result.left_out if out.condition == name]
         if lost and name not in read:
             which = "the recording" if len(lost) == 1 else f"all {len(lost)} recordings"
             return f"{which} in {name} could not be used: {lost[0].reason}"
-    return next(_of_degrees(inertia), "") if c.measure.origin == "fixed_inertia" else ""
+    return ""
 
 
 def negligible(c: Comparison, result: StudyResult) -> str:
@@ -93,7 +102,7 @@ def negligible(c: Comparison, result: StudyResult) -> str:
     How the joint moves between the samples is known to `max_between_samples_percent` alone.
     """
     allowed = result.settings.diagnostics.max_between_samples_percent
-    if c.measure.origin not in ("fits", "fixed_inertia"):
+    if c.measure.origin != "fits":
         return ""
     size = 100.0 * _relative(*(c.summaries[name].median for name in c.pair))
     if size > allowed:
@@ -131,7 +140,7 @@ def _of_conditions(test: Test, result: StudyResult) -> Iterator[str]:
         return
     doubted = doubted_epochs(c, result.analysis)
     epochs = f"; {carried(c, doubted)}" if doubted else ""
-    yield f"{in_words(names[0])} casts doubt on all epochs of a condition together{epochs}"
+    yield f"{in_words(names[0])} in all epochs of a condition together{epochs}"
 
 
 def _bias(c: Comparison, fit: Fit, finding: Finding) -> float:
@@ -163,31 +172,15 @@ def _of_degrees(inertia: Comparison | None) -> Iterator[str]:
         )
 
 
-def _of_inertia(
-    test: Test, basis: Basis, result: StudyResult, inertia: Comparison
-) -> Iterator[str]:
+def _of_inertia(test: Test, result: StudyResult, inertia: Comparison) -> Iterator[str]:
     """Yield that the inertia differs, as far as that may have made the difference.
 
     What makes another inertia, such as a unit or torque of the subject, changes B and K in
-    proportion. And a J held at one value that is not that of both conditions moves B and K by far
-    more: then the difference has to be there with J free as well.
+    proportion.
     """
     c = test.comparison
     of_inertia = _relative(*(inertia.summaries[name].median for name in inertia.pair))
-    free = test
-    if c.measure.origin == "fixed_inertia":
-        values = {
-            (fit.source, fit.epoch): float(getattr(fit, c.measure.name))
-            for fit in result.analysis.fits
-        }
-        with_free = [replace(o, value=values[o.source, o.epoch]) for o in c.observations]
-        free = tested_again(c, with_free, basis)
-        if not free.agrees(test):
-            yield (
-                f"{_differs(inertia)}; held at one value for both conditions it moves B and K, and "
-                f"with J free {free.said}"
-            )
-    medians = (free.comparison.summaries[name].median for name in c.pair)
+    medians = (c.summaries[name].median for name in c.pair)
     if c is inertia or of_inertia > SHARE_OF_INERTIA * _relative(*medians):
         doubted = doubted_epochs(c, result.analysis)
         cause = "the posture, the contact with the robot, a unit, or the subject's own torque was "
@@ -205,7 +198,7 @@ def _cleared(test: Test, result: StudyResult) -> bool:
         row.measure.name == test.comparison.measure.name
         and method_named(row.method).uses_perturbation
         and (row.p if math.isnan(row.p_day) else row.p_day) < LEVEL
-        and row.shift * test.sign > 0
+        and row.shift * test.sign < 0  # the shift is reference − other
         for row in result.sensitivity
     )
 
@@ -236,8 +229,9 @@ def _in_order(c: Comparison) -> Iterator[str]:
     later = {_later(*both) for both in days.values() if all(both)}
     if len(later) == 1 and (last := later.pop()) is not None:
         yield (
-            f"all days in {c.pair[last]} came after all days in {c.pair[1 - last]}, and a change "
-            "with time would look the same; days in turn, or with both conditions, tell them apart"
+            f"all days in {c.pair[last]} came after all days in {c.pair[1 - last]}, and a "
+            "change with time would have the same effect; alternate days, or days with both "
+            "conditions, separate them"
         )
 
 

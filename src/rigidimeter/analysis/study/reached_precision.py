@@ -98,12 +98,20 @@ def precisions_untested(result: StudyResult) -> dict[str, tuple[Precision, ...]]
     concluded = conclude(result)
     if concluded is None or concluded.tested:
         return {}
+    found = condition_precisions(result)
+    return {name: found[name] for name in (result.reference, result.other) if name in found}
+
+
+def condition_precisions(result: StudyResult) -> dict[str, tuple[Precision, ...]]:
+    """Return each measure of each condition, from its epochs alone."""
     analysis, found = result.analysis, {}
-    for name in (result.reference, result.other):
+    by_condition, _ = split_pooled(analysis)
+    for name in result.condition_names or ("",):
         own = replace(
             analysis,
             fits=tuple(fit for fit in analysis.fits if fit.condition == name),
             scores=tuple(score for score in analysis.scores if score.condition == name),
+            pooled=(by_condition[name],) if name in by_condition else (),
         )
         found[name] = _of_epochs(own, name)
     return {name: each for name, each in found.items() if each}

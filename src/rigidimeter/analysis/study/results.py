@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.statistics import (
@@ -17,9 +17,21 @@ from rigidimeter.analysis.study.measures import Measure
 from rigidimeter.analysis.study.ratings_found import RatingsFound
 from rigidimeter.core.records import Analysis, Epoch, Fit, Notice, Score
 from rigidimeter.core.settings import Settings
+from rigidimeter.core.words import html_table, interval_text, one_cell, one_line, with_error
 
 if TYPE_CHECKING:
     import pandas as pd
+    from numpy.typing import NDArray
+
+    from rigidimeter.analysis.study.statements import Statements
+    from rigidimeter.core.drawing import Axes
+
+_READ = (
+    *("measure", "unit", "reference", "other", "n_reference", "n_other"),
+    *("median_reference", "median_other", "shift", "shift_low", "shift_high"),
+    *("p_holm", "days_p_holm"),
+)
+"""The columns of a table that is read by people."""
 
 
 @dataclass(frozen=True)
@@ -231,15 +243,109 @@ class StudyResult:
         """Return the comparison of a measure by its stored name."""
         return next((each for each in self.comparisons if each.measure.name == measure), None)
 
-    def table(self) -> pd.DataFrame:
-        """Return the comparisons as a pandas table, a row for each measure."""
+    @property
+    def statements(self) -> Statements | None:
+        """What was measured, tested and concluded, in words; None of one condition alone."""
+        from rigidimeter.analysis.study.statements import statements
+
+        return statements(self)
+
+    def table(self, *, full: bool = False) -> pd.DataFrame:
+        """Return the comparisons as a pandas table, a row for each measure.
+
+        Parameters
+        ----------
+        full : bool
+            All columns of ``rigidimeter compare --csv``. Otherwise measure, unit and conditions,
+            the number of values and their median in each, the shift (reference − other) with its
+            95 % interval, p of the rank-sum test after Holm and, of a study, p by days after Holm.
+        """
         import pandas as pd
 
-        return pd.DataFrame(comparison_rows((*self.comparisons, *self.further)))
+        found = pd.DataFrame(comparison_rows((*self.comparisons, *self.further)))
+        return found if full else found[[name for name in _READ if name in found.columns]]
+
+    def plot(
+        self, measures: Sequence[str] | None = None, *, axes: Sequence[Axes] | None = None
+    ) -> NDArray[Any]:
+        """Draw every value of each measure by condition.
+
+        A point with its 95 % interval is an epoch, the bar beside the points goes from the lower to
+        the upper quartile, the diamond is the median, and the open square the estimate of all
+        epochs of the condition together. Above are p and effect size of the rank-sum test, for
+        which all values are independent: conclusions on a study go by its days.
+
+        Parameters
+        ----------
+        measures : sequence of str, optional
+            Stored names, such as ``"stiffness_nm_rad"``. Default: all but ratings.
+        axes : matplotlib Axes, optional
+            To draw on, one for each measure; without them a new figure is made.
+
+        Returns
+        -------
+        array of matplotlib Axes, shape (number of measures,)
+
+        Raises
+        ------
+        ValueError
+            If a measure was not compared.
+        """
+        from rigidimeter.core.drawing import plots
+
+        return plots.plot_result(self, measures, axes)
+
+    def plot_days(self, measure: str = "stiffness_nm_rad", *, ax: Axes | None = None) -> Axes:
+        """Draw a measure day by day: every value a point, and each day's median and quartiles.
+
+        A line joins the medians of a day that has both conditions.
+
+        Raises
+        ------
+        ValueError
+            If the measure was not compared, or days are not known, as they are of a study folder.
+        """
+        from rigidimeter.core.drawing import plots
+
+        return plots.plot_days(self, measure, ax)
+
+    def plot_effects(self, *, ax: Axes | None = None) -> Axes:
+        """Draw the effect size r of each measure with its 95 % interval.
+
+        Raises
+        ------
+        ValueError
+            If no measure was tested.
+        """
+        from rigidimeter.core.drawing import plots
+
+        return plots.plot_effects(self, ax)
+
+    def __repr__(self) -> str:
+        """Return the medians of both conditions in each measure as one line."""
+        shown = []
+        for c in self.comparisons:
+            found = [c.summaries[name] for name in c.pair if name in c.summaries]
+            medians = " and ".join(with_error(s.median, math.nan) for s in found)
+            shown.append(one_line(c.measure.title, medians, c.measure.unit, joint=" "))
+        pair = " and ".join(name for name in (self.reference, self.other) if name)
+        medians = f"medians: {', '.join(shown)}" if shown else ""
+        return one_line(self.title, pair, medians)
 
     def _repr_html_(self) -> str:
-        columns = ["title", "unit", "median_reference", "median_other", "shift", "shift_low",
-                   "shift_high", "p", "p_holm", "r", "days_p", "days_p_holm"]  # fmt: skip
-        shown = self.table().reindex(columns=columns).dropna(axis="columns", how="all")
-        heading = f"{self.title}: {self.reference} − {self.other}".strip(": ")
-        return f"<p>{escape(heading)}</p>{shown.to_html(index=False, float_format='{:.4g}'.format)}"
+        """Return the medians, their shift with its 95 % interval, and p after Holm."""
+        every = (*self.comparisons, *self.further)
+        p = ["p_holm", "days_p_holm"] if any(c.days is not None for c in every) else ["p_holm"]
+        rows = []
+        for c, row in zip(every, comparison_rows(every), strict=True):
+            known = {name: math.nan if value is None else value for name, value in row.items()}
+            medians = [known[f"median_{side}"] for side in ("reference", "other")]
+            rows.append(
+                [c.measure.label, c.reference, c.other]
+                + [with_error(number, math.nan) for number in (*medians, known["shift"])]
+                + [one_cell(interval_text(known["shift_low"], known["shift_high"]))]
+                + [f"{known.get(name, math.nan):.3g}".replace("nan", "–") for name in p]
+            )
+        heading = ["measure", "reference", "other", "median of reference", "median of other"]
+        heading += ["shift, reference − other", "95\xa0% interval", "p", "p by days"]
+        return f"<p>{escape(self.title)}</p>\n{html_table(heading[: 7 + len(p)], rows)}"

@@ -17,8 +17,8 @@ from rigidimeter.core.records import Analysis, Fit, Notice
 _INERTIA, _DAMPING, _STIFFNESS = MEASURES[:3]
 _STAGES: Mapping[Measure, tuple[Literal["fixed", "free"], ...]] = {
     _INERTIA: ("free",),
-    _DAMPING: ("fixed", "free"),
-    _STIFFNESS: ("fixed", "free"),
+    _DAMPING: ("free", "fixed"),
+    _STIFFNESS: ("free", "fixed"),
 }
 
 
@@ -35,14 +35,14 @@ def sensitivity_rows(
 ) -> tuple[list[SensitivityRow], list[Notice]]:
     """Return one row for each measure, method and stage; a method that cannot says why.
 
-    Rows are in the order of measures, then of methods, with J fixed before J free.
+    Rows are in the order of measures, then of methods, with J free before J held at its median.
 
     Parameters
     ----------
     analyses : mapping of str to Analysis
         By method.
     chosen : str
-        The method of the study's own conclusion, with B and K at fixed inertia.
+        The method of the study's own conclusion, with J free.
     sessions : mapping of str to SessionEntry
         By source.
     pair : (str, str)
@@ -61,7 +61,7 @@ def sensitivity_rows(
         for method, analysis in usable.items():
             for inertia in stages:
                 fits = analysis.fixed_inertia if inertia == "fixed" else analysis.fits
-                used = method == chosen and inertia == stages[0]
+                used = method == chosen and inertia == "free"
                 found = rank_test(observed(measure, fits, pair, sessions))
                 p_day = day_test(found).p
                 rows.append(_row(found, method, inertia, p_day, used))

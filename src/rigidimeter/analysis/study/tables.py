@@ -23,10 +23,11 @@ from rigidimeter.analysis.study.ratings_found import (
 )
 from rigidimeter.analysis.study.reached_precision import precision_rows
 from rigidimeter.analysis.study.results import StudyResult
+from rigidimeter.analysis.study.statements import lead, statements
 from rigidimeter.analysis.study.traffic_light import traffic_light
 from rigidimeter.core.files import csv_text, plain_values
 
-COMPARISON_SCHEMA = "rigidimeter.comparison/2"
+COMPARISON_SCHEMA = "rigidimeter.comparison/3"
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -50,6 +51,12 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
         "method_reason": analysis.method_reason,
         "inertia_kg_m2": analysis.inertia_kg_m2,
         "inertia_by_subject": result.several_subjects,
+        "lead": lead(result),
+        "statements": [
+            {"reference": pair.reference, "other": pair.other, **said._asdict()}
+            for pair in (result, *result.further_pairs)
+            if (said := statements(pair)) is not None
+        ],
         "conclusion": result_table(result, "conclusion"),
         "quality": None if light is None else light.row(),
         "comparisons": [
@@ -180,14 +187,14 @@ def _estimates(result: StudyResult) -> Iterator[dict[str, Any]]:
         low_hz, high_hz = one.pop("band_hz") or (None, None)
         findings = one.pop("findings")
         found = [finding["name"] for finding in findings]
-        doubts = dict.fromkeys(f["name"] for f in findings if f["level"] != "note")
+        cautions = dict.fromkeys(f["name"] for f in findings if f["level"] != "note")
         beside = {name: two[name] for name in ("outcome", "reason", *_numbers(two))}
         yield (
             whose.get(one["source"], {})
             | one
             | {"band_low_hz": low_hz, "band_high_hz": high_hz}
             | {"n_findings": len(found), "findings": ", ".join(found)}
-            | {"doubts": ", ".join(doubts)}
+            | {"cautions": ", ".join(cautions)}
             | {f"fixed_inertia_{name}": value for name, value in beside.items()}
         )
 

@@ -36,14 +36,17 @@ class Test:
     difference : Difference
         With an interval and p of NaN where there is no test, for the reason in `remark`.
     sign : float
-        That of reference − other.
+        That of other − reference.
     remark : str
+    words : str
+        The test, such as ``paired t-test of 5 days``.
     """
 
     comparison: Comparison
     difference: Difference
     sign: float = 0.0
     remark: str = ""
+    words: str = ""
 
     @property
     def p(self) -> float:
@@ -80,19 +83,19 @@ def basis_of(compared: Sequence[Comparison]) -> Basis:
 def tested(c: Comparison, basis: Basis) -> Test:
     """Return the test of a comparison."""
     if basis == "values":
-        found = by_values(c)
-        return Test(c, found, c.test.z) if c.test is not None else Test(c, found, remark=c.remark)
+        if c.test is None:
+            return Test(c, by_values(c), remark=c.remark)
+        counts = " and ".join(f"{c.summaries[name].n} values of {name}" for name in c.pair)
+        return Test(c, by_values(c), -c.test.z, words=f"rank-sum test of {counts}")
     if basis == "recordings":
         by_source = replace(c, observations=tuple(replace(o, day=o.source) for o in c.observations))
-        days = day_test(by_source)
-        remark = days.remark.replace("days", "recordings").replace("day", "recording")
-        return Test(c, by_units(by_source, days), days.estimate, remark)
+        return by_days(by_source, day_test(by_source, "recording"))
     return by_days(c, c.days) if c.days is not None else Test(c, by_units(c, None), remark=c.remark)
 
 
 def by_days(c: Comparison, found: DayDifference) -> Test:
     """Return a test by days as the test of a comparison."""
-    return Test(c, by_units(c, found), found.estimate, found.remark)
+    return Test(c, by_units(c, found), -found.estimate, found.remark, found.test)
 
 
 def tested_again(c: Comparison, observations: Sequence[Observation], basis: Basis) -> Test:

@@ -15,7 +15,7 @@ from rigidimeter.analysis.study.analysis import Preparation
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import Epoch
 
-MODEL_SCHEMA = "rigidimeter.model/1"
+MODEL_SCHEMA = "rigidimeter.model/2"
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def _epoch_values(found: ModelledEpoch) -> dict[str, Any]:
         "reason": epoch.closed.reason,
         "band_hz": list(found.models.band_hz),
         "clock": found.clock,
-        "findings": [vars(finding) for finding in found.models.findings],
+        "findings": [finding.row() for finding in found.models.findings],
     }
     if found.compared:
         chosen = compared.recommended

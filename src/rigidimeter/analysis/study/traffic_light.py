@@ -12,7 +12,8 @@ from typing import Any, Literal
 from rigidimeter.analysis.study.conclusions import conclude
 from rigidimeter.analysis.study.doubted_epochs import ALIKE_IN_BOTH, Doubt, doubts
 from rigidimeter.analysis.study.results import StudyResult
-from rigidimeter.core.records import Finding, Fit, Score
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import Fit, Score
 
 Level = Literal["good", "caution", "poor"]
 
@@ -62,14 +63,14 @@ def traffic_light(result: StudyResult) -> TrafficLight | None:
         return None
     counting = {(one.source, one.epoch) for one in estimates if one.outcome.included}
     doubted = {
-        (fit.source, fit.epoch) for fit in analysis.fits if fit.outcome.included and fit.doubts
+        (fit.source, fit.epoch) for fit in analysis.fits if fit.outcome.included and fit.cautions
     }
     found = [one for one in doubts(analysis) if not _harmless(one, result)]
     most_serious = found[0] if found else None
     finding = None if most_serious is None else _first(most_serious.check, result)
     concluded = conclude(result)
     unsupported = () if concluded is None else concluded.of("not supported")
-    text = finding.text if finding else unsupported[0].reason if unsupported else ""
+    text = finding.headline if finding else unsupported[0].reason if unsupported else ""
     if result.left_out and not text:
         n_out = len({out.path for out in result.left_out})
         text = f"{n_out} of the study's recordings could not be used"

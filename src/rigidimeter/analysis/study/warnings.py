@@ -20,7 +20,7 @@ def analysis_warnings(analysis: Analysis) -> tuple[Notice, ...]:
 
 def _misfit(analysis: Analysis) -> tuple[Notice, ...]:
     return tuple(
-        Notice("warning", f"{fit.condition or 'all epochs'}: {finding.text}; {finding.remedy}")
+        Notice("warning", f"{fit.condition or 'all epochs'}: {finding.headline}. {finding.remedy}")
         for fit in analysis.pooled
         for finding in fit.findings
         if finding.level != "note"
@@ -70,7 +70,7 @@ def _wrong_sign(analysis: Analysis) -> tuple[Notice, ...]:
     if negative:
         text = (
             f"B or K is negative in {len(negative)} {of_all}: something but the robot may have "
-            "pushed, or the channels are delayed relative to each other; look at R² "
+            "pushed, or the channels are delayed relative to each other; check R² "
             "before using them"
         )
         return (Notice("warning", text),)

@@ -3,7 +3,12 @@
 Every name ends in its unit. Arrays are float64 and read-only once inside a record.
 """
 
-from rigidimeter.core.records.analysis_record import WEIGHT_IN_STIFFNESS, Analysis
+from rigidimeter.core.records.analysis_record import (
+    WEIGHT_IN_STIFFNESS,
+    Analysis,
+    FindingGroup,
+    grouped,
+)
 from rigidimeter.core.records.epochs import (
     CHANNEL_UNITS,
     LATE_TICK,
@@ -26,8 +31,6 @@ from rigidimeter.core.records.estimates import (
     STATISTICS,
     BandEstimate,
     Delay,
-    Finding,
     Fit,
     Score,
-    Three,
 )

@@ -3,26 +3,53 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rigidimeter.core.findings import SERIOUS_FIRST, Finding, epochs_text
 from rigidimeter.core.records.estimates import (
     FIT_NUMBERS,
     PARAMETERS,
     BandEstimate,
     Delay,
-    Finding,
     Fit,
     Score,
 )
+from rigidimeter.core.words import (
+    html_table,
+    interval_text,
+    one_cell,
+    one_line,
+    plural,
+    short_names,
+    with_error,
+)
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import pandas as pd
+    from numpy.typing import NDArray
+
+    from rigidimeter.core.drawing import Axes
 
 _MAX_SHOWN = 20
 """Epochs shown one by one; of more only the first are."""
+
+_READ = (
+    "source",
+    "epoch",
+    "condition",
+    *(p.name + ending for p in PARAMETERS for ending in ("", "_se")),
+    "vaf_percent",
+    "outcome",
+)
+"""The columns of a table that is read by people; what the checks found is the last."""
+MOST_SOURCES = 3
+"""The epochs of a finding are named where they are of at most so many recordings."""
 
 
 WEIGHT_IN_STIFFNESS = (
@@ -32,10 +59,82 @@ WEIGHT_IN_STIFFNESS = (
 
 
 class FindingGroup(NamedTuple):
-    """What one check found, in one or more epochs: the first finding, and the fits of all."""
+    """What one check found, with one level, in one or more epochs.
 
-    first: Finding
+    Attributes
+    ----------
+    finding : Finding
+        The one that is furthest from its limit.
+    fits : tuple of Fit
+        All that carry it, in the order of reading: of epochs, and to all epochs together.
+    where : str
+        The epochs in words.
+    """
+
+    finding: Finding
     fits: tuple[Fit, ...]
+    where: str
+
+    @property
+    def line(self) -> str:
+        """Level, name, headline and epochs in one line."""
+        one = self.finding
+        return f"{one.level}  {one.name}  {one.headline}; {self.where}"
+
+
+def grouped(fits: Sequence[Fit], pooled: Sequence[Fit]) -> tuple[FindingGroup, ...]:
+    """Return what fits carry, once for each check and level, the most serious first.
+
+    Parameters
+    ----------
+    fits : sequence of Fit
+        Of epochs.
+    pooled : sequence of Fit
+        To all epochs of a condition, and of all of them.
+    """
+    carried: dict[tuple[str, str], list[tuple[Fit, Finding]]] = {}
+    for fit in (*fits, *pooled):
+        for finding in fit.findings:
+            carried.setdefault((finding.name, finding.level), []).append((fit, finding))
+    groups = []
+    for members in carried.values():
+        _, worst = max(members, key=lambda each: _beyond(each[1]))
+        where = _where(members, worst, fits)
+        groups.append(FindingGroup(worst, tuple(fit for fit, _ in members), where))
+    return tuple(sorted(groups, key=lambda group: SERIOUS_FIRST.index(group.finding.level)))
+
+
+def _beyond(finding: Finding) -> float:
+    beyond = abs(finding.value - finding.limit)
+    return beyond if math.isfinite(beyond) else -1.0
+
+
+def _where(members: Sequence[tuple[Fit, Finding]], worst: Finding, fits: Sequence[Fit]) -> str:
+    """Return which epochs show it, and which one most where they differ."""
+    own = [(fit, finding) for fit, finding in members if fit.epoch != "pooled"]
+    if not own:
+        conditions = dict.fromkeys(fit.condition for fit, _ in members if fit.condition)
+        return "all epochs together" + (f" in {' and '.join(conditions)}" if conditions else "")
+    sources = list(dict.fromkeys(fit.source for fit in fits))
+
+    def of(found: Iterable[Fit]) -> str:
+        by_source: dict[str, list[str]] = {}
+        for fit in found:
+            by_source.setdefault(fit.source, []).append(fit.epoch)
+        return "; ".join(
+            epochs_text(labels) + (f" of {PurePath(source).name}" if len(sources) > 1 else "")
+            for source, labels in by_source.items()
+        )
+
+    where = of(fit for fit, _ in own)
+    if len(own) == len(fits) > 1:
+        where = "both epochs" if len(fits) == 2 else f"all {len(fits)} epochs"
+    elif len({fit.source for fit, _ in own}) > MOST_SOURCES:
+        where = f"{len(own)} of {len(fits)} epochs"
+    if len({finding.headline for _, finding in own}) > 1:
+        most = [fit for fit, finding in own if finding == worst]
+        where += f", most in {of(most[:1])}" if most else ""
+    return where
 
 
 @dataclass(frozen=True)
@@ -62,20 +161,15 @@ class Analysis:
 
     @property
     def findings(self) -> tuple[FindingGroup, ...]:
-        """What the checks found: for each check and level the epochs, in the order of reading."""
-        groups: dict[tuple[str, str], tuple[Finding, list[Fit]]] = {}
-        for fit in (*self.fits, *self.pooled):
-            for finding in fit.findings:
-                _, fits = groups.setdefault((finding.name, finding.level), (finding, []))
-                fits.append(fit)
-        return tuple(FindingGroup(first, tuple(fits)) for first, fits in groups.values())
+        """What the checks found: for each check and level the epochs, the most serious first."""
+        return grouped(self.fits, self.pooled)
 
     @property
     def weight_in_stiffness(self) -> str:
         """What K holds of the limb's weight, as a sentence without its stop; empty without fits."""
         if not self.fits:
             return ""
-        if any(group.first.name == "gravity" for group in self.findings):
+        if any(group.finding.name == "gravity" for group in self.findings):
             return f"{WEIGHT_IN_STIFFNESS}; the note `gravity` of each epoch gives K without it"
         return f"{WEIGHT_IN_STIFFNESS}; set diagnostics.gravity_nm to have K without it too"
 
@@ -102,73 +196,168 @@ class Analysis:
             )
         return rows or [score.row() for score in self.scores]
 
-    def table(self) -> pd.DataFrame:
-        """Return `rows` as a table, with the columns of ``rigidimeter estimate --csv``."""
+    def table(self, *, full: bool = False) -> pd.DataFrame:
+        """Return a row for each fitted epoch, or for each score of an analysis of sinusoids alone.
+
+        Parameters
+        ----------
+        full : bool
+            All columns of ``rigidimeter estimate --csv``. Otherwise source, epoch and condition,
+            J, B and K with their standard errors, the VAF in %, the outcome, and the names of the
+            findings that are more than a note.
+
+        Returns
+        -------
+        pandas.DataFrame
+        """
         import pandas as pd
 
-        return pd.DataFrame(self.rows())
+        if full or not self.fits:
+            return pd.DataFrame(self.rows())
+        rows = [
+            {name: row[name] for name in _READ} | {"findings": ", ".join(fit.cautions)}
+            for fit, row in zip(self.fits, self.rows(), strict=True)
+        ]
+        return pd.DataFrame(rows)
+
+    def plot(self, *, axes: Sequence[Axes] | None = None) -> NDArray[Any]:
+        """Draw J, B and K of every epoch in the order of recording, each with its 95 % interval.
+
+        A hollow point does not count; a cross at the bottom is an epoch without numbers. The line
+        and its band are the estimate of all epochs of a condition together. Of an analysis of
+        sinusoids alone, impulse and work are drawn.
+
+        Parameters
+        ----------
+        axes : three (of sinusoids two) matplotlib Axes, optional
+            To draw on; without them a new figure is made.
+
+        Returns
+        -------
+        array of matplotlib Axes, shape (3,) or (2,)
+
+        Raises
+        ------
+        ValueError
+            If there is no epoch.
+        """
+        from rigidimeter.core.drawing import plots
+
+        return plots.plot_estimates(self, axes)
+
+    def plot_torque(
+        self,
+        recording: Any,
+        epoch: int = 0,
+        *,
+        span_s: float | None = 7.0,
+        axes: Sequence[Axes] | None = None,
+    ) -> NDArray[Any]:
+        """Draw measured and modelled torque of one epoch, what the model leaves, and its terms.
+
+        Parameters
+        ----------
+        recording : Recording
+            The one that was estimated, since an analysis does not hold the signals.
+        epoch : int
+            Place in `fits`, as in the index of `table()`.
+        span_s : float or None
+            How much is drawn, in s from the first fitted sample; None for all of it.
+        axes : five matplotlib Axes, optional
+            To draw on; without them a new figure is made.
+
+        Returns
+        -------
+        array of matplotlib Axes, shape (5,)
+
+        Raises
+        ------
+        IndexError
+            If there is no such epoch.
+        ValueError
+            If the epoch has no numbers, or is not in the recording.
+        """
+        from rigidimeter.core.drawing import plots
+
+        return plots.plot_torque(self, recording, epoch, span_s, axes)
+
+    def __repr__(self) -> str:
+        """Return how many epochs there are, and what each condition gives, as one line."""
+        included = sum(fit.outcome.included for fit in self.fits)
+        fitted = f"{plural(len(self.fits), 'epoch')} by {self.method}, {included} included"
+        scored = f"{plural(len(self.scores), 'sinusoid')} scored"
+        several = len({fit.condition for fit in self.fits}) > 1
+        pooled = [fit for fit in self.pooled if fit.condition or not several]
+        of_each = [
+            one_line(
+                fit.condition,
+                ", ".join(
+                    f"{p.symbol} {with_error(value, se)} {p.unit}"
+                    for p, value, se in zip(PARAMETERS, fit.value, fit.se, strict=True)
+                ),
+                joint=" ",
+            )
+            for fit in pooled
+        ]
+        found = dict.fromkeys(g.finding.name for g in self.findings if g.finding.level != "note")
+        return one_line(
+            fitted if self.fits else "",
+            scored if self.scores else "",
+            *of_each,
+            f"findings: {', '.join(found)}" if found else "",
+        )
 
     def _repr_html_(self) -> str:
         """Return J, B and K with their 95 % intervals, what the checks found, and the scores."""
         reason = f": {self.method_reason}" if self.method_reason else ""
+        results: tuple[Fit | Score, ...] = (*self.fits, *self.scores)
+        names = short_names(one.source for one in results)
         parts = [f"<p>{escape(f'Method {self.method}{reason}.')}</p>"]
         if self.fits:
             heading = ["epoch", "condition"]
-            heading += [f"{p.symbol} ({p.unit}) [95\xa0% interval]" for p in PARAMETERS]
+            heading += [f"{p.symbol}, {p.unit}" for p in PARAMETERS]
             shown = [*self.fits[:_MAX_SHOWN], *self.pooled]
-            heading += ["R²", "outcome", "doubted by"]
-            parts.append(_table(heading, [_fit_row(fit) for fit in shown]))
+            heading += ["VAF, %", "outcome", "findings"]
+            parts.append(html_table(heading, [_fit_row(fit, names) for fit in shown]))
+            parts.append("<p>J, B and K ± one standard error; all epochs: 95\xa0% intervals.</p>")
         if len(self.fits) > _MAX_SHOWN:
             parts.append(f"<p>The first {_MAX_SHOWN} of {len(self.fits)} epochs.</p>")
         if self.findings:
-            rows = []
-            for first, fits in self.findings:
-                where = "all together"
-                if fits[0].epoch != "pooled":
-                    where = f"{fits[0].source}, {fits[0].epoch}"
-                if len(fits) > 1:
-                    where = f"{len(fits)}, first {where}"
-                rows.append([first.level, where, first.text, first.remedy])
+            rows = [
+                [one.level, one.name, one.headline, where, one.details, one.remedy]
+                for one, _, where in self.findings
+            ]
+            heading = ["level", "finding", "", "epochs", "details", "remedy"]
             parts.append("<p>What the checks found:</p>")
-            parts.append(_table(["level", "epochs", "finding in the first", "remedy"], rows))
+            parts.append(html_table(heading, rows))
         if self.scores:
             rows = [
                 [
-                    f"{s.source}, {s.epoch}",
+                    f"{names[s.source]}, {s.epoch}",
                     s.condition,
-                    _number(s.impulse_nm_s),
-                    _number(s.work_j),
+                    with_error(s.impulse_nm_s, 0.0),
+                    with_error(s.work_j, 0.0),
                     f"{s.outcome.kind} {s.outcome.reason}",
                 ]
                 for s in self.scores[:_MAX_SHOWN]
             ]
-            heading = ["epoch", "condition", "impulse (N·m·s)", "work (J)", "outcome"]
-            parts.append(_table(heading, rows))
+            heading = ["epoch", "condition", "impulse, N·m·s", "work, J", "outcome"]
+            parts.append(html_table(heading, rows))
         return "\n".join(parts)
 
 
 def _in_a_cell(finding: Finding) -> str:
-    return f"{finding.level}, {finding.name}: {finding.text}"
+    return f"{finding.level}, {finding.name}: {finding.headline}"
 
 
-def _fit_row(fit: Fit) -> list[str]:
-    intervals = [
-        f"{_number(value)} [{_number(low)}, {_number(high)}]" if math.isfinite(value) else "–"
-        for value, low, high in zip(fit.value, fit.low, fit.high, strict=True)
+def _fit_row(fit: Fit, names: Mapping[str, str]) -> list[str]:
+    pooled = fit.epoch == "pooled"
+    numbers = [
+        one_cell(with_error(value, se))
+        + (f" ({one_cell(interval_text(low, high))})" if pooled else "")
+        for value, se, low, high in zip(fit.value, fit.se, fit.low, fit.high, strict=True)
     ]
-    name = "all epochs" if fit.epoch == "pooled" else f"{fit.source}, {fit.epoch}"
+    name = "all epochs" if pooled else f"{names[fit.source]}, {fit.epoch}"
     outcome = f"{fit.outcome.kind} {fit.outcome.reason}"
-    doubts = ", ".join(fit.doubts)
-    return [name, fit.condition, *intervals, _number(fit.r_squared), outcome, doubts]
-
-
-def _number(value: float) -> str:
-    return f"{value:.4g}" if math.isfinite(value) else "–"
-
-
-def _table(heading: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
-    head = "".join(f"<th>{escape(cell)}</th>" for cell in heading)
-    body = "".join(
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
-    )
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    vaf = "–" if math.isnan(fit.vaf_percent) else f"{fit.vaf_percent:.1f}"
+    return [name, fit.condition, *numbers, vaf, outcome, ", ".join(fit.cautions)]

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from html import escape
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.core.findings import Finding, Three
 from rigidimeter.core.records.epochs import Outcome, readonly
+from rigidimeter.core.words import html_table, interval_text, one_cell, one_line, with_error
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rigidimeter.core.drawing import Axes
 
 
 class Parameter(NamedTuple):
@@ -43,37 +51,8 @@ FIT_NUMBERS = (
 SCORE_NUMBERS = ("impulse_nm_s", "work_j", "frequency_hz", "n_cycles")
 """The numbers of a score, as files and tables name them."""
 
-Three = tuple[float, float, float]
-
 BAND_VECTORS = {"value": "", "change": "_change", "change_se": "_change_se", "p": "_p"}
 """What is known of each parameter, and how the names of it end in files and tables."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What one check found in an epoch.
-
-    Parameters
-    ----------
-    name : str
-        The check, as the settings name it.
-    level : {"note", "doubt", "exclude"}
-        `note` says what is; `doubt` asks for a look before the numbers are used; `exclude` says
-        that they mean nothing.
-    value, threshold : float
-        What was found and where it would change sides, in the unit that the text states.
-    text : str
-        Value, threshold and meaning in words.
-    remedy : str
-        What to do about it; empty where nothing is wrong.
-    """
-
-    name: str
-    level: Literal["note", "doubt", "exclude"]
-    value: float
-    threshold: float
-    text: str
-    remedy: str
 
 
 class _Entry:
@@ -183,15 +162,79 @@ class Fit:
     def __hash__(self) -> int:
         return hash((self.source, self.epoch, self.condition, self.method, self.outcome))
 
+    def __repr__(self) -> str:
+        """Return J, B and K with their standard errors, and how they were found, as one line."""
+        numbers = ", ".join(
+            f"{p.symbol} {with_error(value, se)} {p.unit}"
+            for p, value, se in zip(PARAMETERS, self.value, self.se, strict=True)
+            if math.isfinite(value)
+        )
+        return one_line(numbers, self.words)
+
+    @property
+    def words(self) -> str:
+        """Method, band, VAF, epoch, outcome and findings, as one line."""
+        low, high = self.band_hz
+        band = f"{low:.3g}–{high:.3g} Hz" if math.isfinite(high) else ""
+        vaf = f"VAF {self.vaf_percent:.1f} %" if math.isfinite(self.vaf_percent) else ""
+        label = "all epochs" if self.epoch == "pooled" else f"epoch {self.epoch}"
+        outcome = f"{self.outcome.kind}: {self.outcome.reason}" * (not self.outcome.included)
+        found = f"findings: {', '.join(self.cautions)}" if self.cautions else ""
+        return one_line(
+            one_line(self.method, band, vaf, joint=", "),
+            one_line(label, self.condition, joint=" "),
+            outcome,
+            found,
+        )
+
+    def _repr_html_(self) -> str:
+        """Return J, B and K with their standard errors and 95 % intervals as a table."""
+        rows = [
+            [
+                f"{p.symbol}, {p.title}",
+                *(one_cell(with_error(value, se)), one_cell(interval_text(low, high))),
+                p.unit,
+            ]
+            for p, value, se, low, high in zip(
+                PARAMETERS, self.value, self.se, self.low, self.high, strict=True
+            )
+        ]
+        table = html_table(["", "estimate ± standard error", "95\xa0% interval", "unit"], rows)
+        return f"{table}\n<p>{escape(self.words)}</p>"
+
     @property
     def names(self) -> tuple[str, ...]:
         """The names of the parameters, in the order of the vectors."""
         return tuple(parameter.name for parameter in PARAMETERS)
 
     @property
-    def doubts(self) -> tuple[str, ...]:
-        """The names of the checks that cast doubt on it, or exclude it."""
+    def cautions(self) -> tuple[str, ...]:
+        """The names of the findings that are more than a note."""
         return tuple(dict.fromkeys(one.name for one in self.findings if one.level != "note"))
+
+    def plot(self, *, axes: Sequence[Axes] | None = None) -> NDArray[Any]:
+        """Draw J, B and K in pairs, with their 95 % intervals and the 95 % ellipse of each pair.
+
+        A fit does not hold the torque: measured beside modelled torque is drawn by
+        `Analysis.plot_torque`, which is given the recording.
+
+        Parameters
+        ----------
+        axes : three matplotlib Axes, optional
+            To draw on; without them a new figure is made.
+
+        Returns
+        -------
+        array of matplotlib Axes, shape (3,)
+
+        Raises
+        ------
+        ValueError
+            If the fit has no numbers.
+        """
+        from rigidimeter.core.drawing import plots
+
+        return plots.plot_fit(self, axes)
 
     def row(self) -> dict[str, Any]:
         """Return the names and numbers of the fit, as files and tables have them."""

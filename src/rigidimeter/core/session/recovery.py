@@ -156,10 +156,10 @@ def _refuse_closed(folder: Path, files: SessionFiles, stream_ended: bool) -> Non
     if files.ended:
         what = f"{SAMPLES} is damaged or cut after byte {stream.stop}"
         if stream_ended:
-            what = f"{EVENTS} does not end with a whole line"
+            what = f"{EVENTS} does not end with a complete line"
         raise UserError(
             f"{folder}: the session is closed ({files.ended['outcome']}), but {what}; nothing was "
-            "changed, and what is whole can be read as it is. `recover --force` moves what follows "
+            "changed, and what is complete can be read. `recover --force` moves what follows "
             "to a file beside it"
         )
     if log.damaged:

@@ -6,7 +6,6 @@ from rigidimeter.core.settings.estimation_settings import (
     DiagnosticLevels,
     DiagnosticsSettings,
     EstimationSettings,
-    Level,
     OnlineSettings,
     ScoreSettings,
 )

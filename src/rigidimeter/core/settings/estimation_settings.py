@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar, Literal
+from typing import Any, ClassVar
 
+from pydantic import create_model
+
+from rigidimeter.core.findings import KINDS, Level, default_level
 from rigidimeter.core.settings.section import Section, quantity
 
 USABLE_FRACTION_OF_RATE = 0.4
@@ -12,8 +15,6 @@ USABLE_FRACTION_OF_RATE = 0.4
 
 FEWEST_LINES = 8
 """Spectral lines that a band must hold for a fit of J, B and K."""
-
-Level = Literal["note", "doubt", "exclude"]
 
 
 class EstimationSettings(Section):
@@ -64,55 +65,23 @@ class ScoreSettings(Section):
         return min(self.cycles, math.floor(length_s * frequency_hz + 1e-6))
 
 
-class DiagnosticLevels(Section):
-    """What a check that fails does: leave a note, mark the epoch as doubtful, or exclude it.
+_LEVELS: Any = {kind.name: (Level, kind.level) for kind in KINDS.values()}
 
-    The names are those of the findings.
+
+class DiagnosticLevels(create_model("Levels", __base__=Section, **_LEVELS)):  # type: ignore[misc]
+    """What a check that fails does: leave a note, ask for caution, or exclude the epoch.
+
+    The names and defaults are those of the kinds of findings.
 
     By default a check excludes the epoch if it shows that a channel did not measure or that the
     numbers are meaningless. A negative or unlikely parameter does not: leaving out epochs because
     of their result shifts the median of the others.
     """
 
-    conditioning: Level = "doubt"
-    coherence: Level = "doubt"
-    band_share: Level = "doubt"
-    imposed_sinusoid: Level = "exclude"
-    computed_torque: Level = "exclude"
-    static_torque: Level = "exclude"
-    residual_whiteness: Level = "note"
-    residual_perturbation: Level = "doubt"
-    lack_of_fit: Level = "doubt"
-    band_sensitivity: Level = "doubt"
-    between_samples: Level = "doubt"
-    held_out_vaf: Level = "exclude"
-    missing_term: Level = "doubt"
-    r_squared: Level = "doubt"
-    voluntary_torque: Level = "doubt"
-    tremor: Level = "doubt"
-    active_movement: Level = "doubt"
-    loop_bias: Level = "doubt"
-    emg_activity: Level = "doubt"
-    varying_with_time: Level = "doubt"
-    varying_with_angle: Level = "doubt"
-    varying_with_phase: Level = "doubt"
-    varying_between_epochs: Level = "note"
-    saturation: Level = "exclude"
-    frozen: Level = "exclude"
-    left_out: Level = "note"
-    lost_samples: Level = "exclude"
-    gravity: Level = "note"
-    velocity_scale: Level = "exclude"
-    velocity_delay: Level = "doubt"
-    torque_delay: Level = "doubt"
-    velocity_shape: Level = "doubt"
-    missed_ticks: Level = "doubt"
-    guard_limited: Level = "doubt"
-    position_limit: Level = "doubt"
-    negative_parameters: Level = "doubt"
-    implausible_parameters: Level = "doubt"
-    controller_misfit: Level = "doubt"
-    unstable_loop: Level = "doubt"
+    def of(self, name: str) -> Level:
+        """Return the level of a finding; of a check from outside the package that of its kind."""
+        level: Level = getattr(self, name, default_level(name))
+        return level
 
 
 class DiagnosticsSettings(Section):

@@ -55,6 +55,9 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
 }
 """By table, the name that a key had and the one that it has."""
 
+OLDER_LEVEL, LEVEL = "doubt", "caution"
+"""What a value of [diagnostics.levels] was called, and what it is."""
+
 SHOWN = 3
 """So many keys are named: a recorded session has all of them."""
 
@@ -83,6 +86,12 @@ def with_new_names(values: Mapping[str, Any], source: str) -> tuple[dict[str, An
             if old in given:
                 found.append(f"{table}.{old} is now {table}.{new}")
         renamed[table] = {names.get(key, key): value for key, value in given.items()}
+    diagnostics = renamed.get("diagnostics")
+    levels = diagnostics.get("levels") if isinstance(diagnostics, Mapping) else None
+    if isinstance(levels, Mapping) and any(level == OLDER_LEVEL for level in levels.values()):
+        found.append(f'"{OLDER_LEVEL}" in diagnostics.levels is now "{LEVEL}"')
+        kept = {key: LEVEL if level == OLDER_LEVEL else level for key, level in levels.items()}
+        renamed["diagnostics"] = {**renamed["diagnostics"], "levels": kept}
     if not found:
         return renamed, ""
     more = f", and {len(found) - SHOWN} more" if len(found) > SHOWN else ""

@@ -72,9 +72,9 @@ def _after_power(loop: ControlLoop, rig: Rig) -> str:
         work_j += reading.torque_nm * (angle_rad - before_rad)
         moved_rad, before_rad = max(moved_rad, abs(angle_rad - began_rad)), angle_rad
     if rig.powered:
-        why = f"{WATCHED_S:g} s after it was told to switch its power off the drive has not said so"
+        why = f"the drive has not reported within {WATCHED_S:g} s that its power is off"
     elif moved_rad > limit_rad and work_j > 0.0:
         why = f"the drive moved the joint by {deg_from_rad(moved_rad):.1f} deg with its power off"
     else:
         return ""
-    return f"{why}: keep hands off the joint, press the emergency stop, and look at its wiring"
+    return f"{why}: keep hands off the joint, press the emergency stop, and check its wiring"

@@ -22,8 +22,8 @@ REMEDIES: dict[Cause, str] = {
     Cause.TORQUE_NOT_FINITE: _CABLE,
     Cause.MOTION_NOT_FINITE: "check the encoder's cable and plug, then `rigidimeter check`",
     Cause.COMMAND_NOT_FINITE: "please report this with the session folder: the program is wrong",
-    Cause.POSITION_LIMIT_EXCEEDED: "when the session has ended and the drive has said that its "
-    "power is off, move the arm back by hand; if it was not there, the encoder jumped: "
+    Cause.POSITION_LIMIT_EXCEEDED: "when the session has ended and the drive has reported that "
+    "its power is off, move the arm back by hand; if it was not there, the encoder jumped: "
     "`rigidimeter check`",
     Cause.MOTION_STALE: "check the drive's connection, or raise the limit if the drive answers "
     "more slowly than that",
@@ -34,10 +34,9 @@ REMEDIES: dict[Cause, str] = {
     Cause.TORQUE_STATUS: _CABLE,
     Cause.TORQUE_PACKETS: "connect the sensor to a network port of its own, without a switch",
     Cause.SENSOR_CHANGED: "restore the sensor's units and calibration, or commission the rig anew",
-    Cause.NOT_FOLLOWING: "look for slip at the coupling and for a drive limit below the guard's; "
+    Cause.NOT_FOLLOWING: "check for slip at the coupling and for a drive limit below the guard's; "
     "then `rigidimeter check`",
-    Cause.OVERSPEED: "look at the drive's tuning and at what moves the joint; then "
-    "`rigidimeter check`",
+    Cause.OVERSPEED: "check the drive's tuning and what moves the joint; then `rigidimeter check`",
     Cause.TORQUE_HIGH: _PUSH,
     Cause.TORQUE_TOO_HIGH: _PUSH,
     Cause.POWER_HIGH: _PUSH,
@@ -61,8 +60,8 @@ REMEDIES: dict[Cause, str] = {
     Cause.SIGNAL: "continue the session with `rigidimeter run --resume`",
     Cause.STAMP_AHEAD: "check the clock that the driver stamps with, the latency that the rig "
     "file states for this device, and the rate that the device states",
-    Cause.MOVED_AT_REST: "look for a drive that does not hold, a brake, or a hand on the rig; then "
-    "`rigidimeter check`",
+    Cause.MOVED_AT_REST: "check for a drive that does not hold, a brake, or a hand on the rig; "
+    "then `rigidimeter check`",
     Cause.VELOCITY_WRONG: "check sign, unit and scale of the velocity that the drive reports: "
     "`rigidimeter commission`",
     Cause.TORQUE_SILENT: f"{_CABLE}; if the sensor is in order, the drive is faster than "

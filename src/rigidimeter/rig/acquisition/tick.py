@@ -66,9 +66,9 @@ class TickResult(NamedTuple):
     limit_time_s: float
     cause: Cause
     limited_ticks: int
-    late_ticks: int = 0
-    missed_ticks: int = 0
-    interrupted: bool = False
+    late_ticks: int
+    missed_ticks: int
+    interrupted: bool
 
 
 class ControlLoop:
@@ -95,6 +95,7 @@ class ControlLoop:
     inertia_kg_m2: float
     damping_nm_s_rad: float
     admittances: list[Admittance]
+    sample: Sample  # of the last tick
 
     def __init__(
         self,
@@ -133,7 +134,6 @@ class ControlLoop:
         self.limited_ticks = 0
         self.limit_time_s = math.nan
         self.angle_rad = 0.0
-        self.sample: Sample | None = None
         self.stop: StopReport | None = None
 
     @property
@@ -201,7 +201,7 @@ def run_ticks(
     while k < n:
         k = run_tick(loop, epoch, k, command, n - 1) + 1
         if loop.guard.reaction > known:
-            if loop.stop is None and loop.sample is not None:  # of several causes the first
+            if loop.stop is None:  # of several causes the first
                 loop.stop = report_stop(latched_tick(loop, loop.sample))
                 loop.latched(loop.stop, loop.sample.time_s)
             break

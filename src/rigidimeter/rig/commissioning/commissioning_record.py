@@ -57,7 +57,7 @@ MUST_PASS = (
 
 A_PERSON_TELLS = (
     "mechanical stops",
-    "the joint moved as said",
+    "the joint moved as described",
     "emergency stop",
     "hardware enable drops the power",
     "stays stopped after the release",

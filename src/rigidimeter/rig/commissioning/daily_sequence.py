@@ -44,7 +44,7 @@ DELAY_NUMBER = "torque_after_motion_s"
 """The delay in the numbers of a commissioning record."""
 
 SPREAD = 0.8
-NEW, FIRST = "told with --new-reference", "first check since the rig was commissioned"
+NEW, FIRST = "given by --new-reference", "first check since the rig was commissioned"
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Compared:
     def known(self, commissioning_digest: str) -> KnownInertia | None:
         """Return what the inertia must be; None where nothing is known yet."""
         if self.known_inertia_kg_m2 is not None:
-            return KnownInertia(self.known_inertia_kg_m2, 0.0, "as told")
+            return KnownInertia(self.known_inertia_kg_m2, 0.0, "as given")
         reference = self.valid_reference(commissioning_digest)
         if reference is None or self.new:
             return None

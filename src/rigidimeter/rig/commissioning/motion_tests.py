@@ -113,7 +113,7 @@ def swing_checks(result: TrialResult, settings: Settings) -> tuple[list[RigCheck
             math.degrees(found.worst_rad),
             "deg",
             settings.guard.following_limit_deg,
-            "tune the drive's loop, or look for slip and for a limit inside the drive",
+            "tune the drive's loop, or check for slip and for a limit inside the drive",
         ),
     ]
     return checks, found
@@ -140,7 +140,7 @@ def torque_sign(
         )
         return impossible(name, limit, why), work_j
     remedy = (
-        f"the {seen.strongest} looks negative, so torque and angle have opposite signs: turn the "
+        f"the {seen.strongest} is negative, so torque and angle have opposite signs: turn the "
         "sign of the one that is wrong in the rig file; with it the loop would run away"
     )
     words = (
@@ -203,7 +203,7 @@ def drift_check(readings: Readings, limit_deg: float) -> RigCheck:
         moved,
         "deg",
         limit_deg,
-        "the drive must come up at rest: look for an old target, or an offset of its input",
+        "the drive must come up at rest: check for an old target, or an offset of its input",
     )
 
 

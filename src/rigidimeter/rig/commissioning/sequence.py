@@ -148,7 +148,7 @@ def _swing(setup: Setup, found: CheckResults) -> bool:
         return False
     seen = ask_operator(
         operator,
-        "the joint moved as said",
+        "the joint moved as described",
         f"Did the joint move first toward positive angles, by about {limits.swing_deg:g} deg, then "
         "as far to the other side, and back?",
         "turn sign, or put right the counts per turn, in the rig file",

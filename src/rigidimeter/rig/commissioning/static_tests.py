@@ -97,8 +97,8 @@ def rate_checks(
             bool(usual_s >= -AHEAD_S and oldest_s <= stale_s),
             f"{with_unit(usual_s, 's')}, at most {with_unit(oldest_s, 's')}",
             f"above 0, at most {with_unit(stale_s, 's')}",
-            "a stamp must be the time of the loop's clock at which the sample was taken: look at "
-            "the clock that the driver takes it from, and at the rate that the device states",
+            "a stamp must be the time of the loop's clock at which the sample was taken: check "
+            "the clock that the driver takes it from, and the rate that the device states",
         ),
         above(
             f"{role} samples",
@@ -127,7 +127,7 @@ def lost_check(
     bad = sum(count for name, count in gone.items() if name.endswith(BAD_COUNTS))
     percent = 100.0 * bad / received if received else (100.0 if bad else 0.0)
     worst = ", ".join(f"{n} {c}" for n, c in gone.items() if c and n.endswith(BAD_COUNTS))
-    remedy = f"look at cables, switches and other traffic ({worst})"
+    remedy = f"check cables, switches and other traffic ({worst})"
     return below("lost or damaged messages", percent, "%", limit_percent, remedy)
 
 
@@ -153,7 +153,7 @@ def noise_checks(readings: Readings, settings: Settings) -> list[RigCheck]:
             float(len(values)),
             "1",
             MIN_VALUES,
-            "a torque that never changes is no measurement: look at sensor, amplifier and cable",
+            "a torque that never changes is no measurement: check sensor, amplifier and cable",
         ),
         below(
             "torque step",
@@ -167,7 +167,7 @@ def noise_checks(readings: Readings, settings: Settings) -> list[RigCheck]:
             float(np.std(torque, ddof=1)) if len(torque) > 1 else math.inf,
             "N·m",
             zeroing.noise_limit_nm,
-            "nobody may touch the rig meanwhile; look at shielding, cable and drive noise, or "
+            "nobody may touch the rig meanwhile; check shielding, cable and drive noise, or "
             "raise zeroing.noise_limit_nm",
         ),
         below(
@@ -175,7 +175,7 @@ def noise_checks(readings: Readings, settings: Settings) -> list[RigCheck]:
             float(np.abs(np.mean(torque))) if len(torque) else math.inf,
             "N·m",
             zeroing.bias_limit_nm,
-            "take the load off and zero the sensor, or look at its calibration",
+            "take the load off and zero the sensor, or check its calibration",
         ),
     ]
 

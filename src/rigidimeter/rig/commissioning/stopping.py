@@ -114,7 +114,7 @@ def emergency_stop_checks(setup: Setup) -> list[RigCheck]:
     reported = after != before or result.cause is Cause.DRIVE_LOST
     seen = result.cause in REPORTS and reported
     words = result.cause.sentence if result.cause is not Cause.NONE else f"nothing in {wait_s:g} s"
-    remedy = "the emergency stop must take the drive's power away: look at its wiring"
+    remedy = "the emergency stop must take the drive's power away: check its wiring"
     checks = [yes(STOP, seen, words, limits_of[STOP], remedy)]
     if not seen:
         return [*checks, *none_of((POWER, RELEASE), "the emergency stop was not seen")]
@@ -152,7 +152,7 @@ def _command_stopped_rig(setup: Setup) -> Readings:
 def _stayed(name: str, readings: Readings) -> RigCheck:
     angle = readings.angle_rad[np.isfinite(readings.angle_rad)]
     moved = math.degrees(float(np.ptp(angle))) if len(angle) else 0.0
-    remedy = "a stopped drive must wait for an operator: look at its automatic restart"
+    remedy = "a stopped drive must wait for an operator: check its automatic restart"
     return below(name, moved, "deg", MAX_DEG, remedy)
 
 
@@ -168,7 +168,7 @@ def _again(setup: Setup) -> RigCheck:
     except DeviceError as error:
         return yes(AGAIN, False, "refused", limit, str(error))
     good = result.cause is Cause.NONE
-    return yes(AGAIN, good, result.cause.sentence, limit, "look at how the drive's fault is reset")
+    return yes(AGAIN, good, result.cause.sentence, limit, "check how the drive's fault is reset")
 
 
 def _reset(rig: Rig) -> None:

@@ -48,7 +48,7 @@ def sign_check(answer: TorqueAnswer, cause: Cause) -> RigCheck:
         words = stopped_for(cause)
     if cause is Cause.TORQUE_SIGN or CERTAIN * error < -J:
         remedy = (
-            "the inertia looks negative, so torque and angle have opposite signs: sensor, cable or "
+            "the inertia is negative, so torque and angle have opposite signs: sensor, cable or "
             "sign in the rig file were changed; with it the loop would run away"
         )
     else:
@@ -99,8 +99,8 @@ def delay_check(answer: TorqueAnswer, expected_s: float | None, settings: Settin
     good = abs(answer.delay_s - expected_s) <= allowed_s
     limit = f"{with_unit(expected_s, 's')} ± {with_unit(allowed_s, 's')}, as commissioned"
     remedy = (
-        "the torque arrives later or earlier than the margins were computed for: look at the "
-        "sensor's filter and at the network, or commission again"
+        "the torque arrives later or earlier than the margins were computed for: check the "
+        "sensor's filter and the network, or commission again"
     )
     return RigCheck(
         DELAY,

@@ -263,9 +263,8 @@ def require_no_power(setup: Setup) -> None:
     """
     if setup.rig.powered:
         raise DeviceError(
-            f"drive: {POWER_OFF_S:g} s after it was told to take the power away it has not said "
-            "that it has none; keep hands off the joint, press the emergency stop, and look at the "
-            "wiring to the drive"
+            f"drive: it has not reported within {POWER_OFF_S:g} s that its power is off; keep "
+            "hands off the joint, press the emergency stop, and check the wiring to the drive"
         )
 
 

@@ -31,6 +31,7 @@ from dataclasses import dataclass
 from statistics import NormalDist, median
 
 from rigidimeter.core.settings import OnlineSettings
+from rigidimeter.core.words import with_error
 from rigidimeter.rig.acquisition.processes import LiveEstimate
 
 MAX_PART = 0.5
@@ -79,9 +80,7 @@ class LiveValue:
         """The value with its interval and unit, or why there is none."""
         if not self.settled:
             return f"{self.symbol} {self.why_not}"
-        # As many digits as the interval gives: two of its half width.
-        digits = max(0, 1 - math.floor(math.log10(self.half_width))) if self.half_width > 0 else 4
-        return f"{self.symbol} {self.value:.{digits}f} ± {self.half_width:.{digits}f} {self.unit}"
+        return f"{self.symbol} {with_error(self.value, self.half_width)} {self.unit}"
 
 
 def settling_s(settings: OnlineSettings) -> float:
@@ -155,7 +154,7 @@ def caution(
     alone_kg_m2 : float
         J of what the rig has beyond the sensor, 0 if not known.
     """
-    check = "look at the torque sensor and its cable, and type `rigidimeter check`"
+    check = "check the torque sensor and its cable, and type `rigidimeter check`"
     usual_nm = median([one.step_nm for one in before if one.step_nm > 0.0] or [math.inf])
     if now.step_nm > STEPS * usual_nm:
         times = f"{now.step_nm / usual_nm:.1f} times as much from tick to tick as in those before"

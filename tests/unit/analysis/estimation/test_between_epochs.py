@@ -67,15 +67,18 @@ def test_a_stiffness_that_differs_by_a_fifth_is_found_with_its_range():
     found = [between_epochs(drawn(rng, 10, (0, 0, 0.2)), True, SETTINGS) for _ in range(50)]
     assert all(finding is not None for finding in found)
     assert np.mean([finding.value for finding in found]) == pytest.approx(42.0, abs=5.0)
-    assert all(f.text.startswith("K goes from 1.") for f in found)
-    assert "without a trend" in found[0].text
+    assert {finding.facts["symbol"] for finding in found} == {"K"}
+    assert all(1.0 < finding.facts["low"] < finding.facts["high"] for finding in found)
+    assert found[0].facts["trend"] == ""
 
 
 def test_a_trend_is_named():
     rising = fits(TRUTH * (1 + np.outer(np.linspace(-0.2, 0.2, 10), [0, 0, 1])))
     finding = between_epochs(rising, True, SETTINGS)
-    assert "rising by 40 % from the first to the last" in finding.text
-    assert "1.41 N·m/rad in the 1st epoch" in finding.text
+    assert finding.facts["trend_percent"] == pytest.approx(40.0, abs=1.0)
+    assert finding.facts["trend"] == ", rising by 40 % over the epochs"
+    assert finding.facts["low"] == pytest.approx(1.41, abs=0.01)
+    assert len(finding.epochs) == 10
 
 
 def test_what_bends_the_inertia_as_much_bends_least_squares():

@@ -60,10 +60,10 @@ def test_a_motion_that_cannot_tell_j_from_k_gets_no_recommendation():
     assert "none of these models" in compared.reason
 
 
-def test_a_subject_who_pushes_is_a_doubt_of_models_though_iv_would_not_be_biased():
+def test_a_subject_who_pushes_asks_for_caution_with_models_though_iv_would_not_be_biased():
     """Least squares fits the models: what the subject's torque does to them is not harmless."""
     prepared = prepared_of(subject={"voluntary_nm": 0.2})
     findings = {one.name: one for one in model_epoch(prepared, [JBK]).findings}
-    assert findings["voluntary_torque"].level == "doubt"
+    assert findings["voluntary_torque"].level == "caution"
     assert "loop_bias" in findings
-    assert not any("not biased" in one.text for one in findings.values())
+    assert not any("not biased" in one.details for one in findings.values())

@@ -78,7 +78,7 @@ def test_a_torque_at_the_end_of_its_range_for_a_second_is_left_out():
     assert fit.value == pytest.approx(TRUTH, rel=0.01)
     found = finding(fit, "saturation")
     assert found.level == "note"
-    assert "from 8 to 8.09 s and from 8.2 to 8.29 s" in found.text
+    assert found.facts["spans"] == "from 8 to 8.09 s and from 8.2 to 8.29 s"
 
 
 def test_a_short_rest_in_a_long_recording_excludes_nothing():
@@ -104,7 +104,7 @@ def test_too_little_that_is_left_excludes():
     assert "leaves 2 s; at least 3 s are needed" in fit.outcome.reason
 
 
-@pytest.mark.parametrize("level", ["note", "doubt"])
+@pytest.mark.parametrize("level", ["note", "caution"])
 def test_what_is_not_to_be_excluded_is_left_in(level):
     settings = parse_settings({"diagnostics": {"levels": {"frozen": level}}})
     epoch = hung(an_epoch(), "torque_nm", 8.0, 9.0)

@@ -9,9 +9,20 @@ from numpy.testing import assert_equal
 
 from rigidimeter.analysis.reading import read_estimates, write_estimates_csv, write_estimates_json
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.records import Analysis, BandEstimate, Delay, Finding, Fit, Outcome, Score
+from rigidimeter.core.findings import Effect, Finding
+from rigidimeter.core.records import Analysis, BandEstimate, Delay, Fit, Outcome, Score
 
-FOUND = Finding("coherence", "doubt", 0.3, 0.5, "the coherence is 0.3", "ask the subject to relax")
+FOUND = Finding(
+    "tremor",
+    "caution",
+    8.0,
+    3.0,
+    "%",
+    epochs=("1", "2"),
+    condition="OFF",
+    effect=Effect((-4.0, -2.0, 0.0), (-1.5, -0.5, 0.0)),
+    facts={"frequency_hz": 4.6, "amplitude_nm": 0.3, "stands_out": 12.0},
+)
 GOOD = Fit(
     "a.csv", "1", "OFF", "bandlimited", Outcome(),
     value=(0.0045, 0.13, 1.7), se=(1e-5, 1e-3, 0.02), low=(0.00448, 0.128, 1.66),
@@ -66,7 +77,7 @@ def test_what_stiffness_holds_of_the_weight_is_said(tmp_path):
 def test_the_document_has_the_published_keys(tmp_path):
     write_estimates_json(tmp_path / "e.json", ANALYSIS)
     document = json.loads((tmp_path / "e.json").read_text())
-    assert document["schema"] == "rigidimeter.estimates/1"
+    assert document["schema"] == "rigidimeter.estimates/2"
     assert document["method"] == "bandlimited"
     assert document["epochs"][0].keys() >= {
         "source", "epoch", "condition", "outcome", "reason", "inertia_kg_m2", "inertia_kg_m2_se",
@@ -85,7 +96,18 @@ def test_the_document_has_the_published_keys(tmp_path):
     assert list(document["pooled"]["conditions"]) == ["OFF", "DBS"]
     assert document["delays"][0]["delay_s"] == 0.007
     assert document["delays"][1]["delay_s"] is None
-    assert document["epochs"][0]["findings"][0]["remedy"] == "ask the subject to relax"
+    (finding,) = document["epochs"][0]["findings"]
+    assert (finding["value"], finding["unit"], finding["limit"], finding["p"]) == (
+        8.0,
+        "%",
+        3.0,
+        None,
+    )
+    assert finding["effect"] == {
+        "percent": [-4.0, -2.0, 0.0],
+        "half_intervals": [-1.5, -0.5, 0.0],
+    }
+    assert finding["headline"] == "Torque oscillates at 4.6 Hz with 0.3 N·m"
     half = document["sensitivity"][1]
     assert (half["part"], half["high_hz"]) == ("first half", 30.0)
     assert half["inertia_kg_m2"] == 0.0046
@@ -103,6 +125,29 @@ def test_one_condition_is_pooled_once(tmp_path):
 def test_estimates_are_read_back_equal(tmp_path):
     write_estimates_json(tmp_path / "e.json", ANALYSIS)
     assert_equal(asdict(read_estimates(tmp_path / "e.json")), asdict(ANALYSIS))
+
+
+def test_findings_of_the_schema_before_are_read(tmp_path):
+    write_estimates_json(tmp_path / "e.json", ANALYSIS)
+    document = json.loads((tmp_path / "e.json").read_text())
+    older = {
+        "name": "coherence",
+        "level": "doubt",
+        "value": 0.3,
+        "threshold": None,
+        "text": "the coherence is 0.3",
+        "remedy": "ask the subject to relax",
+    }
+    document["schema"] = "rigidimeter.estimates/1"
+    document["epochs"][0]["findings"] = [older]
+    (tmp_path / "e.json").write_text(json.dumps(document))
+    (finding,) = read_estimates(tmp_path / "e.json").fits[0].findings
+    assert (finding.name, finding.level, finding.value) == ("coherence", "caution", 0.3)
+    assert math.isnan(finding.limit)
+    assert (finding.details, finding.remedy) == (
+        "the coherence is 0.3.",
+        "ask the subject to relax",
+    )
 
 
 def test_the_table_has_a_row_an_epoch_in_full_precision(tmp_path):
@@ -129,7 +174,7 @@ def test_scores_alone_give_the_table_of_scores(tmp_path):
         ("{", "not valid JSON"),
         ("[]", "schema is None"),
         ('{"schema": "other/1"}', "schema is 'other/1'"),
-        ('{"schema": "rigidimeter.estimates/1", "method": "x"}', "not a complete"),
+        ('{"schema": "rigidimeter.estimates/2", "method": "x"}', "not a complete"),
         ("[" * 100_000, "nested more than 32 deep"),
     ],
 )

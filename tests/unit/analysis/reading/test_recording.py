@@ -35,6 +35,12 @@ def test_a_file_alone(tmp_path):
     assert {(epoch.condition, epoch.task) for epoch in recording.epochs} == {("OFF", "prbs")}
     assert recording.paths == (path,)
     assert not recording.failed
+    assert repr(recording).startswith(
+        "a.csv; 2 epochs of 1 s at 100 samples/s; OFF 2; torque_nm, angle_rad"
+    )
+    assert "\n" not in repr(recording)
+    shown = recording._repr_html_()
+    assert f"<td>{path.name}</td><td>OFF</td><td>2</td><td>1</td><td>100</td>" in shown
 
 
 def test_options_reach_the_file(tmp_path):

@@ -315,7 +315,7 @@ def sensitivity_row(
         test.p,
         test.r,
         p_day,
-        method == "iv" and inertia == ("free" if measure.name == "inertia_kg_m2" else "fixed"),
+        method == "iv" and inertia == "free",
     )
 
 

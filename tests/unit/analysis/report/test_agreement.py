@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from statistics import fmean, stdev
 from typing import Any
 
 import pytest
@@ -13,13 +14,25 @@ from tests.unit.analysis.report.cohorts import Design, made_study
 from tests.unit.analysis.report.parsed_page import ParsedPage
 
 from rigidimeter.analysis.reading import estimates_document
-from rigidimeter.analysis.report import SECTIONS
+from rigidimeter.analysis.report import SECTIONS, shown_tables
 from rigidimeter.analysis.report import page as page_module
-from rigidimeter.analysis.report.page import write_report
-from rigidimeter.analysis.study import StudyResult, comparison_document
-from rigidimeter.cli.comparison_text import comparison_blocks
-from rigidimeter.cli.estimate import estimate_blocks
-from rigidimeter.cli.terminal_tables import Block, Table, text_lines
+from rigidimeter.analysis.report.page import render_page, write_report
+from rigidimeter.analysis.study import (
+    StudyResult,
+    compare_analysis,
+    comparison_document,
+    conclude,
+    difference_rows,
+    precisions,
+    statements,
+)
+from rigidimeter.cli.comparison_text import (
+    difference_blocks,
+    full_blocks,
+    statement_blocks,
+)
+from rigidimeter.cli.estimate_text import estimate_blocks
+from rigidimeter.cli.terminal_tables import Block, Heading, Table
 from rigidimeter.core.files import read_json, write_json
 
 NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:e[+-]\d+)?")
@@ -46,7 +59,7 @@ def assert_shows(text: str, values: Sequence[float | None], digits: int) -> None
 @pytest.fixture(scope="module")
 def study() -> StudyResult:
     made = made_study(Design(days=(4, 3), epochs=(4, 4), scores=(3, 3)))
-    first = made.analysis.fits[0]
+    first = next(fit for fit in made.analysis.fits if fit.outcome.included)
     pooled = tuple(
         replace(first, source="pooled", epoch="pooled", condition=name, value=share * first.value)
         for name, share in (("OFF", 1.01), ("DBS", 0.87), ("", 0.93))
@@ -76,14 +89,21 @@ def page(folder: Path) -> ParsedPage:
     return ParsedPage((folder / "report.html").read_text(encoding="utf-8"))
 
 
-def cells_below(blocks: Iterable[Block], heading: str) -> list[Sequence[str]]:
-    """Return the rows of the table that a heading of the terminal announces."""
-    announced = False
+def plain(text: str) -> str:
+    """Return a cell without its line breaks and unbroken spaces."""
+    return " ".join(text.split())
+
+
+def tables_of(blocks: Iterable[Block]) -> list[tuple[str, Table]]:
+    """Return the tables of the terminal with their headings, in their order."""
+    found = []
+    heading = ""
     for block in blocks:
-        if announced and isinstance(block, Table):
-            return [row for row in block.rows if not isinstance(row, str)]
-        announced |= isinstance(block, str) and block.startswith(heading)
-    raise AssertionError(heading)
+        if isinstance(block, Heading):
+            heading = str(block)
+        elif isinstance(block, Table):
+            found.append((heading, block))
+    return found
 
 
 def rows_of(folder: Path, table: str) -> list[Row]:
@@ -99,13 +119,117 @@ def assert_same(row: Row, values: dict[str, Any], prefix: str = "") -> None:
         assert float(row[prefix + name]) == values[name], name
 
 
-def test_comparisons_over_epochs(study, json, folder: Path, page: ParsedPage) -> None:
-    blocks = list(comparison_blocks(study))
+@pytest.mark.parametrize("by_epoch", [False, True], ids=["compare", "estimate"])
+def test_the_terminal_has_the_tables_of_the_page_cell_for_cell(study, page, by_epoch: bool) -> None:
+    """In the order of the page; `estimate` also those with a row for each epoch."""
+    shown = tables_of(full_blocks(study, by_epoch=by_epoch))
+    long = [
+        t for t in shown_tables(study) if t.folding and "Epoch" in [c.heading for c in t.columns]
+    ]
+    assert len(long) == 5
+    titles = [title for title, _ in shown]
+    for one in long:
+        assert (one.title in titles) == by_epoch
+    captions = [caption for caption in page.rows if " tables/" in caption]
+    on_page = [caption.rpartition(" tables/")[0] for caption in captions]
+    drawn = [title for title in titles if title not in on_page]
+    assert [t for t in titles if t not in drawn] == [
+        title for title in on_page if by_epoch or title not in {one.title for one in long}
+    ]
+    assert len(drawn) < 3  # of the sections of figures, which this page is made without
+    for title, table in shown:
+        if title in drawn:
+            continue
+        cells = page.table(title)
+        grouped = any("\n" in heading for heading in table.headings)
+        body = cells[1 + grouped :]
+        assert [[plain(cell) for cell in row] for row in table.rows] == body
+        last = [heading.rpartition("\n") for heading in table.headings]
+        heads = [plain(name) for group, _, name in last if group or not grouped]
+        assert heads == cells[int(grouped)]
+        if grouped:
+            groups = dict.fromkeys(plain(group) for group, _, _ in last if group)
+            assert [*groups] == [cell for cell in cells[0] if cell in groups]
+
+
+def test_the_table_of_differences_is_one_on_page_and_terminal(study, json, page) -> None:
+    """Each cell is that of `difference_rows`, and rounds the number of the document."""
+    rows = difference_rows(conclude(study))
+    (terminal,) = difference_blocks(study)
+    strip = page.table("DBS against OFF")
+    assert [plain(heading) for heading in strip[0]][:4] == ["Measure", "OFF", "DBS", "DBS − OFF"]
+    assert [*terminal.headings[1:4]] == ["OFF", "DBS", "DBS − OFF"]
+    found = json["comparison"]["conclusion"]
+    for row, one, cells, line in zip(rows, found, strip[1:], terminal.rows, strict=True):
+        shown = [row.reference, row.other, row.difference, row.interval, row.p, row.verdict]
+        measure = f"{row.measure}, {row.unit}" if row.unit else row.measure
+        assert [cells[0], *cells[1:5], *cells[6:8]] == [measure, *shown]
+        reference, other, difference, simulated, interval, p, verdict = line[1:]
+        assert line[0] == measure
+        assert [reference, other, difference, interval, p, verdict] == shown
+        assert simulated == row.simulated == ""
+        factor = 1e3 if "10⁻³" in row.unit else 1.0
+        assert_shows(row.reference, [factor * one["value_reference"]], 3)
+        assert_shows(row.other, [factor * one["value_other"]], 3)
+        part = "difference" if one["difference_percent"] is None else "difference_percent"
+        assert (" %" in row.difference) == (part == "difference_percent")
+        factor = factor if part == "difference" else 1.0
+        sizes = [factor * one[f"{part}{end}"] for end in ("", "_low", "_high")]
+        assert_rounds(f"{row.difference} {row.interval}", sizes)
+        assert_shows(row.p, [one["p_holm"]], 2)
+        assert one["verdict"].startswith(row.verdict) or row.verdict == "not shown"
+
+
+def assert_rounds(text: str, values: Sequence[float]) -> None:
+    """Assert that a text has these numbers, signed, each to one place of all."""
+    found = re.findall(r"[+−]?\d+(?:\.\d+)?", text)
+    places = {len(one.partition(".")[2]) for one in found}
+    assert len(found) == len(values)
+    assert len(places) == 1
+    for one, value in zip(found, values, strict=True):
+        assert abs(float(one.replace("−", "-")) - value) <= 0.501 * 10.0 ** -places.copy().pop()
+        assert one[0] in "+−" or not float(one)
+
+
+def test_simulated_differences_stand_beside_those_found(study) -> None:
+    """Of a virtual study, on terminal, page and in the document."""
+    simulated = {"OFF": {"stiffness_nm_rad": 1.75}, "DBS": {"stiffness_nm_rad": 1.4}}
+    virtual = replace(
+        study,
+        conditions=tuple(replace(c, simulated=simulated[c.name]) for c in study.conditions),
+    )
+    rows = difference_rows(conclude(virtual))
+    assert [row.simulated for row in rows] == ["−20 %", *[""] * 5]
+    (terminal,) = difference_blocks(virtual)
+    assert terminal.headings[4] == "simulated"
+    assert [line[4] for line in terminal.rows] == [row.simulated for row in rows]
+    strip = ParsedPage(render_page(virtual, (), {})).table("DBS against OFF")
+    assert strip[0][4] == "Simulated"
+    assert [cells[4] for cells in strip[1:]] == ["−20 %", *["–"] * 5]
+    document = comparison_document(virtual)["conclusion"]
+    assert document[0]["simulated_difference_percent"] == pytest.approx(-20.0)
+    assert "simulated_difference" not in document[1]
+
+
+def test_statements_are_the_same_on_page_terminal_and_in_python(study, page) -> None:
+    said = statements(study)
+    (terminal,) = statement_blocks(study)
+    assert [*terminal.rows] == [
+        ("measured", said.measured),
+        ("tested", said.tested),
+        *zip(("concluded", ""), said.concluded, strict=True),
+    ]
+    on_page = page.words()
+    for sentence in (said.measured, said.tested, *said.concluded):
+        assert on_page.count(sentence) == 1
+    assert on_page.index(said.measured) < on_page.index(said.tested)
+    assert on_page.index(said.tested) < on_page.index(said.concluded[0])
+
+
+def test_comparisons_over_epochs(json, folder: Path, page: ParsedPage) -> None:
     shown = page.table("OFF against DBS: each epoch counted")[2:]
-    conditions = cells_below(blocks, "Each condition")
-    tests = cells_below(blocks, "OFF − DBS, Wilcoxon")
-    for place, (c, row, cells) in enumerate(
-        zip(json["comparison"]["comparisons"], rows_of(folder, "comparisons"), shown, strict=True)
+    for c, row, cells in zip(
+        json["comparison"]["comparisons"], rows_of(folder, "comparisons"), shown, strict=True
     ):
         assert row["measure"] == c["measure"]
         test = {name: c[name] for name in ("shift", "shift_low", "shift_high", "z", "p", "p_holm",
@@ -122,50 +246,32 @@ def test_comparisons_over_epochs(study, json, folder: Path, page: ParsedPage) ->
         for (cell, sd), name in ((cells[2:4], "OFF"), (cells[5:7], "DBS")):
             assert_shows(cell, [c["groups"][name][key] for key in ("median", "q1", "q3")], 3)
             assert_shows(sd, [c["groups"][name]["sd_percent"]], 2)
-        for name, terminal in zip(("OFF", "DBS"), conditions[2 * place :], strict=False):
-            group = c["groups"][name]
-            assert terminal[0] == name
-            assert_shows(" ".join(terminal[3:5]), [group[k] for k in ("median", "q1", "q3")], 4)
-            assert_shows(terminal[5], [group["sd_percent"]], 2)
-        title, shift, ends, z, p, p_holm, r = tests[place]
-        assert title == c["title"]
-        assert_shows(f"{shift} {ends}", [c["shift"], c["shift_low"], c["shift_high"]], 4)
-        assert_shows(f"{p} {p_holm}", [c["p"], c["p_holm"]], 2)
-        assert_shows(f"{z} {r}", [c["z"], c["r"]], 2)
 
 
-def test_comparisons_by_days(study, json, folder: Path, page: ParsedPage) -> None:
+def test_comparisons_by_days(json, folder: Path, page: ParsedPage) -> None:
     shown = page.table("OFF against DBS: days counted")[1:]
-    for c, row, cells, terminal in zip(
-        json["comparison"]["comparisons"],
-        rows_of(folder, "comparisons"),
-        shown,
-        cells_below(comparison_blocks(study), "OFF − DBS: days, not epochs"),
-        strict=True,
+    for c, row, cells in zip(
+        json["comparison"]["comparisons"], rows_of(folder, "comparisons"), shown, strict=True
     ):
         days = c["days"]
         names = ("estimate", "low", "high", "p", "p_holm", "df", "p_days", "day_share")
         assert_same(row, {name: days[name] for name in names}, "days_")
         assert_shows(cells[1], [days["estimate"], days["low"], days["high"]], 4)
+        assert_shows(cells[4], [days["df"]], 4)
         assert_shows(cells[5], [days["p"], days["p_holm"]], 2)
         assert_shows(cells[6], [days["p_days"]], 2)
-        _, estimate, ends, p, p_holm, df, medians, share = terminal
-        assert_shows(f"{estimate} {ends}", [days["estimate"], days["low"], days["high"]], 4)
-        assert_shows(f"{p} {p_holm}", [days["p"], days["p_holm"]], 2)
-        assert_shows(f"{df} {medians}", [days["df"], days["p_days"]], 2)
         if days["day_share"] is None:
-            assert share == "–"
+            assert cells[7] == "–"
         else:
-            assert float(share) == pytest.approx(100 * days["day_share"], abs=0.5)
+            assert_shows(cells[7], [float(f"{100 * days['day_share']:.0f}")], 2)
 
 
-def test_differences_between_effects(study, json, folder: Path, page: ParsedPage) -> None:
+def test_differences_between_effects(json, folder: Path, page: ParsedPage) -> None:
     shown = page.table("Differences between effect sizes")[1:]
-    for d, row, cells, terminal in zip(
+    for d, row, cells in zip(
         json["comparison"]["effect_differences"],
         rows_of(folder, "effect_differences"),
         shown,
-        cells_below(comparison_blocks(study), "Which separates the conditions better"),
         strict=True,
     ):
         assert (row["first"], row["second"]) == (d["first"], d["second"])
@@ -173,14 +279,9 @@ def test_differences_between_effects(study, json, folder: Path, page: ParsedPage
         assert_shows(cells[2], [d["estimate"], d["low"], d["high"]], 4)
         assert_shows(cells[3], [d["p"]], 2)
         assert_shows(cells[4], [d["p_holm"]], 2)
-        _, estimate, ends, p, p_holm, _ = terminal
-        values = [d["estimate"], d["low"], d["high"]] if ends else [d["estimate"]]
-        for one, value in zip(numbers(f"{estimate} {ends}"), values, strict=True):
-            assert one == pytest.approx(value, abs=0.000501)
-        assert_shows(f"{p} {p_holm}", [d["p"], d["p_holm"]] if ends else [], 2)
 
 
-def test_ratings(study, json, folder: Path, page: ParsedPage) -> None:
+def test_ratings(json, folder: Path, page: ParsedPage) -> None:
     found = json["comparison"]["ratings"]
     contrast, by_days = found["contrast"], found["contrast_days"]
     shown = page.table("Contrast of the ratings")[1:]
@@ -194,9 +295,6 @@ def test_ratings(study, json, folder: Path, page: ParsedPage) -> None:
         contrast["p_kenward_roger"],
         by_days["p_kenward_roger"],
     ]
-    lines = text_lines(comparison_blocks(study), 200)
-    begin = next(k for k, line in enumerate(lines) if line.startswith("Examiners' ratings"))
-    assert_shows(lines[begin + 2].rpartition("Kenward-Roger p")[2], [float(rows[2]["p"])], 2)
     for row in rows_of(folder, "rating_offsets"):
         assert float(row["offset"]) == found["offsets_by"][row["grouping"]][row["name"]]
     means = page.words("ratings").partition("intervals: ")[2]
@@ -206,12 +304,11 @@ def test_ratings(study, json, folder: Path, page: ParsedPage) -> None:
     assert_shows(means.partition(" Contrast")[0], expected, 3)
 
 
-def test_sensitivity(study, json, folder: Path, page: ParsedPage) -> None:
-    for s, row, cells, terminal in zip(
+def test_sensitivity(json, folder: Path, page: ParsedPage) -> None:
+    for s, row, cells in zip(
         json["comparison"]["sensitivity"],
         rows_of(folder, "sensitivity"),
         page.table("The shift by each method")[1:],
-        cells_below(comparison_blocks(study), "By other methods"),
         strict=True,
     ):
         assert (row["measure"], row["method"], row["inertia"]) == (
@@ -223,18 +320,13 @@ def test_sensitivity(study, json, folder: Path, page: ParsedPage) -> None:
         assert_shows(cells[5], [s["shift"], s["shift_low"], s["shift_high"]], 4)
         assert_shows(cells[7], [s["p"]], 2)
         assert_shows(cells[8], [s["p_day"]], 2)
-        assert terminal[2:4] == (s["method"], s["inertia"])
-        assert_shows(" ".join(terminal[4:]), [s["shift"], s["p"], s["p_day"]], 2)
 
 
-def test_estimates_and_scores_of_every_epoch(study, json, folder: Path, page: ParsedPage) -> None:
+def test_estimates_of_every_epoch(json, folder: Path, page: ParsedPage) -> None:
     epochs, fixed = json["estimates"]["epochs"], json["estimates"]["fixed_inertia"]["epochs"]
     rows = rows_of(folder, "estimates")
     free = page.table("Inertia, damping and stiffness, epoch by epoch")
     held = page.table("Damping and stiffness with the inertia fixed")
-    blocks = estimate_blocks(study)
-    shown_free = cells_below(blocks, "J, B, K of each epoch")
-    shown_held = cells_below(blocks, "B, K with the inertia held")
     for place, (one, two, row) in enumerate(zip(epochs, fixed, rows, strict=True)):
         assert (row["source"], row["epoch"]) == (one["source"], one["epoch"])
         assert_same(row, one)
@@ -246,48 +338,107 @@ def test_estimates_and_scores_of_every_epoch(study, json, folder: Path, page: Pa
                 )
                 ends = [found[name], found[f"{name}_low"], found[f"{name}_high"]]
                 assert_shows(table[1 + place][heading], ends, 4)
-        for terminal, found, names in (
-            (shown_free[place], one, PARAMETERS),
-            (shown_held[place], two, PARAMETERS[1:]),
-        ):
-            assert terminal[:2] == (found["epoch"], found["condition"])
-            for name, cell in zip(names, terminal[2:], strict=False):
-                factor = 1e3 if name == "inertia_kg_m2" else 1.0
-                value, error = (factor * found[key] for key in (name, f"{name}_se"))
-                assert_shows(cell, [value, error], 1)
-                decimals = [len(shown.partition(".")[2]) for shown in cell.split("±")]
-                assert decimals[0] == decimals[1]
-    for score, row in zip(json["estimates"]["scores"], rows_of(folder, "scores"), strict=True):
-        assert_same(row, score)
 
 
-def test_scores_of_every_epoch(study, json, folder: Path, page: ParsedPage) -> None:
-    terminal = cells_below(estimate_blocks(study), "Scores of each")
+def first_screen(study: StudyResult, column: str) -> list[Sequence[str]]:
+    """Return the rows of the table of the first screen of `estimate` with this first heading."""
+    for _, table in tables_of(estimate_blocks(study)):
+        if table.headings and table.headings[0] == column:
+            return [row for row in table.rows if not isinstance(row, str)]
+    raise AssertionError(column)
+
+
+def test_the_first_screen_of_estimates_has_the_numbers_of_the_document(study, json) -> None:
+    """Value ± standard error to two digits of the error: the first four epochs, and the last."""
+    epochs = json["estimates"]["epochs"]
+    assert len(epochs) > 8
+    fits = tuple(replace(fit, source="x.csv") for fit in study.analysis.fits)
+    one_file = replace(study, analysis=replace(study.analysis, fits=fits, fixed_inertia=fits))
+    shown = first_screen(one_file, "epoch")[:6]
+    assert first_screen(study, "epoch")[0][0] == "together"  # of several recordings
+    assert shown[4][0] == "…"
+    for row, one in zip([*shown[:4], shown[5]], [*epochs[:4], epochs[-1]], strict=True):
+        assert row[0] == one["epoch"]
+        assert row[1] == one["condition"]
+        for name, cell in zip(PARAMETERS, row[2:5], strict=True):
+            factor = 1e3 if name == "inertia_kg_m2" else 1.0
+            value, error = (factor * one[key] for key in (name, f"{name}_se"))
+            found, spread = numbers(cell)
+            size = 10.0 ** (math.floor(math.log10(error)) - 1)
+            assert abs(found - value) <= 0.51 * size
+            assert abs(spread - error) <= 0.51 * size
+            decimals = [len(part.partition(".")[2]) for part in cell.split(" ± ")]
+            assert decimals[0] == decimals[1]
+        assert_shows(row[5], [one["vaf_percent"]], 3)
+        assert row[6] == ("" if one["outcome"] == "included" else one["outcome"])
+
+
+def test_the_first_screen_has_all_epochs_together(study, json) -> None:
+    """Value, 95 % interval and SD between epochs of each condition."""
+    pooled = json["estimates"]["pooled"]["conditions"]
+    rows = first_screen(study, "epoch")
+    for name in ("OFF", "DBS"):
+        begin = next(k for k, row in enumerate(rows) if row[:2] == ("together", name))
+        value, ends, sd = rows[begin : begin + 3]
+        assert (ends[0], sd[0]) == ("95 %", "SD")
+        own = [
+            one
+            for one in json["estimates"]["epochs"]
+            if one["condition"] == name and one["outcome"] == "included"
+        ]
+        for k, parameter in enumerate(PARAMETERS, start=2):
+            factor = 1e3 if parameter == "inertia_kg_m2" else 1.0
+            sizes = [factor * pooled[name][f"{parameter}{end}"] for end in ("", "_low", "_high")]
+            for one, size in zip(numbers(f"{value[k]} {ends[k]}"), sizes, strict=True):
+                places = len(value[k].partition(".")[2])
+                assert abs(one - size) <= 0.501 * 10.0**-places
+            each = [one[parameter] for one in own]
+            assert_shows(sd[k], [100 * stdev(each) / fmean(each)], 2)
+
+
+def test_the_first_screen_has_the_precision_of_one_condition(make_analysis) -> None:
+    """Without a fit to all epochs together: means over epochs, of one epoch without an interval."""
+    result = compare_analysis(make_analysis({"DBS": 3}), resamples=0)
+    found = {one.measure.name: one for one in precisions(result)}
+    value, ends, sd = first_screen(result, "epoch")[-3:]
+    for k, name in enumerate(PARAMETERS, start=2):
+        one = found[name]
+        factor = 1e3 if name == "inertia_kg_m2" else 1.0
+        shown = numbers(f"{value[k]} {ends[k]}")
+        places = len(value[k].partition(".")[2])
+        for number, size in zip(shown, (one.value, one.low, one.high), strict=True):
+            assert abs(number - factor * size) <= 0.501 * 10.0**-places
+        assert_shows(sd[k], [one.sd_percent], 2)
+    (scores,) = first_screen(result, "sinusoids")
+    assert scores[1] == "3"
+    for cell, name in zip(scores[2:], ("impulse_nm_s", "work_j"), strict=True):
+        assert_shows(cell, [found[name].value, found[name].sd_percent], 2)
+    (scores,) = first_screen(compare_analysis(make_analysis({"DBS": 1}), resamples=0), "sinusoids")
+    assert "SD" not in " ".join(scores)
+
+
+def test_scores_of_every_epoch(json, folder: Path, page: ParsedPage) -> None:
     shown = page.table("Scores of the epochs")
     columns = [shown[0].index(next(h for h in shown[0] if h.startswith(name)))
                for name in ("Angular impulse", "Work", "Cycles", "Frequency")]  # fmt: skip
-    for score, row, cells, line in zip(
-        json["estimates"]["scores"], rows_of(folder, "scores"), shown[1:], terminal, strict=True
+    for score, row, cells in zip(
+        json["estimates"]["scores"], rows_of(folder, "scores"), shown[1:], strict=True
     ):
         assert (row["source"], row["epoch"]) == (score["source"], score["epoch"])
-        assert line[:2] == (score["epoch"], score["condition"])
+        assert_same(row, score)
         values = [score[name] for name in ("impulse_nm_s", "work_j", "n_cycles", "frequency_hz")]
         for column, value in zip(columns, values, strict=True):
             assert_shows(cells[column], [value], 4)
-        assert_shows(" ".join(line[2:]), values[:3], 5)
 
 
-def test_pooled_estimates(study, json, folder: Path, page: ParsedPage) -> None:
+def test_pooled_estimates(json, folder: Path, page: ParsedPage) -> None:
     whole = json["estimates"]["pooled"]
     found = {**whole["conditions"], "all": whole}
-    terminal = cells_below(estimate_blocks(study), "All epochs together")
     shown = page.table("All epochs of a condition together")
     rows = rows_of(folder, "pooled")
     assert [row["condition"] for row in rows] == ["OFF", "DBS", "(all)"]
-    for place, ((name, fit), row) in enumerate(zip(found.items(), rows, strict=True)):
+    for place, (fit, row) in enumerate(zip(found.values(), rows, strict=True)):
         assert_same(row, fit)
-        assert terminal[3 * place][0] == name
         for k, parameter in enumerate(PARAMETERS):
             ends = [fit[parameter], fit[f"{parameter}_low"], fit[f"{parameter}_high"]]
             assert_shows(shown[1 + place][1 + k], ends, 4)
-            assert_shows(" ".join(terminal[3 * place + k][2:4]), ends, 5)

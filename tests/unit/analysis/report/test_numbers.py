@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from rigidimeter.analysis.report.numbers import number, p_and_r, p_value, short_names
+from rigidimeter.core.words import number, p_and_r, p_value, short_names
 
 
 @pytest.mark.parametrize(

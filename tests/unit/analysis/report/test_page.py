@@ -12,10 +12,11 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from rigidimeter.analysis.report.numbers import interval, number
 from rigidimeter.analysis.report.page import contents, render_page, tables, write_report
 from rigidimeter.analysis.study import StudyResult, estimate
-from rigidimeter.core.records import Epoch, Finding, Notice, Outcome
+from rigidimeter.core.findings import Finding, Level
+from rigidimeter.core.records import Epoch, Notice, Outcome
+from rigidimeter.core.words import interval, number
 
 NASTY = "<script>alert('x')</script>&amp;\"$_$"
 VOID = {"meta", "img", "br", "link", "input", "hr"}
@@ -240,38 +241,42 @@ def test_the_joint_over_frequency_is_on_the_page(
     assert (tmp_path / "figures" / "impedance.svg").exists()
 
 
-def found(level: str, name: str = "voluntary_torque", text: str = "it pushed") -> Finding:
-    return Finding(name, level, 20.0, 15.0, text, "relax")
+def found(level: Level, name: str = "voluntary_torque", value: float = 20.0) -> Finding:
+    facts = {"sd_nm": 0.2, "low_hz": 0.3, "high_hz": 4.0, "channel": "torque_nm", "start_s": 3.0}
+    return Finding(name, level, value, 15.0, facts=facts)
 
 
 @pytest.mark.usefixtures("no_figures")
 def test_findings_are_told_once_a_kind(make_study, make_analysis, tmp_path: Path) -> None:
     analysis = make_analysis({"OFF": 30, "DBS": 2}, scores=False)
     fits = [
-        dataclasses.replace(fit, findings=(found("doubt", text=f"pushed in {fit.epoch}"),))
+        dataclasses.replace(fit, findings=(found("caution", value=20.0 + int(fit.epoch)),))
         for fit in analysis.fits[:-1]
     ]
-    last = dataclasses.replace(analysis.fits[-1], findings=(found("exclude", "frozen", "stood"),))
+    last = dataclasses.replace(analysis.fits[-1], findings=(found("exclude", "frozen"),))
     together = tuple(
-        dataclasses.replace(fit, epoch="pooled", findings=(found("note", "varying", "it varied"),))
+        dataclasses.replace(fit, epoch="pooled", findings=(found("note", "varying"),))
         for fit in fits[:2]
     )
     analysis = dataclasses.replace(analysis, fits=(*fits, last), pooled=together)
     made = make_study([], analysis=analysis)
     text = " ".join(page_of(made, tmp_path).text.split())
-    assert text.index("frozen exclude 1 32 1 stood") < text.index("voluntary_torque doubt 31 32")
-    assert "22, 23 and 7 more pushed in 0 relax" in text
-    assert "pushed in 1 " not in text
-    assert "varying note 0 32 all epochs together it varied" in text
+    lines = [
+        "exclude frozen torque_nm repeats one value for 20 s; epoch 1",
+        "caution voluntary_torque Torque beyond J, B, K is 49 % of the torque's variance; ",
+        "note varying varying: 20, limit 15; all epochs together",
+    ]
+    places = [text.index(line) for line in lines]
+    assert places == sorted(places)
     with (tmp_path / "tables" / "findings.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 34
-    assert rows[1]["text"] == "pushed in 1"
+    assert rows[1]["headline"] == "Torque beyond J, B, K is 21 % of the torque's variance"
 
 
 def test_no_findings_say_so(make_study, make_analysis) -> None:
     clean = make_study([], analysis=make_analysis({"OFF": 3}))
-    assert "No check casts doubt on an epoch." in words_of(clean)
+    assert re.search(r"(\d+) of \1 epochs? without a caution\.", words_of(clean))
 
 
 @pytest.mark.usefixtures("no_figures")

@@ -11,7 +11,7 @@ from rigidimeter.core.records import Outcome
 
 
 def test_estimates_bring_their_intervals(study: StudyResult) -> None:
-    included = [fit for fit in study.analysis.fixed_inertia if fit.outcome.included]
+    included = [fit for fit in study.analysis.fits if fit.outcome.included]
     off = [fit for fit in included if fit.condition == "OFF"]
     stiffness = study.comparison("stiffness_nm_rad")
     assert [o.low for o in stiffness.of("OFF")] == [fit.stiffness_nm_rad_low for fit in off]
@@ -60,7 +60,7 @@ def test_the_representative_is_the_included_fit_with_the_median_stiffness(
     ]
     fits[3] = dataclasses.replace(fits[3], outcome=Outcome("excluded", "limit"))
     fits[0] = dataclasses.replace(fits[0], outcome=Outcome("excluded", "limit"))
-    made = make_study([], analysis=dataclasses.replace(analysis, fixed_inertia=tuple(fits)))
+    made = make_study([], analysis=dataclasses.replace(analysis, fits=tuple(fits)))
     chosen = [(fit.condition, fit.stiffness_nm_rad) for fit in representative_fits(made)]
     # Three are left of OFF; of the four of DBS the lower middle one is taken.
     assert chosen == [("OFF", 1.7), ("DBS", 1.2)]

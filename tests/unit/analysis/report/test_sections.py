@@ -11,11 +11,12 @@ from xml.etree import ElementTree as ET
 import pytest
 from matplotlib.figure import Figure as Drawing
 
-from rigidimeter.analysis.report import SECTIONS, Column, Figure, Section, Table, paragraph, report
+from rigidimeter.analysis.report import SECTIONS, Figure, Section, paragraph, report
 from rigidimeter.analysis.report.contents import Block
 from rigidimeter.analysis.report.page import contents
 from rigidimeter.analysis.study import StudyResult
 from rigidimeter.core.records import Delay, Outcome, Ticks
+from rigidimeter.core.words import Column, Table
 
 
 def tables_of(result: StudyResult, name: str) -> list[Table]:
@@ -95,7 +96,7 @@ def test_estimates_hold_what_the_analysis_holds(study: StudyResult) -> None:
         assert (row["band_low_hz"], row["band_high_hz"]) == fit.band_hz
         assert row["findings"] == ", ".join(finding.name for finding in fit.findings)
         assert row["n_findings"] == len(fit.findings)
-        assert row["doubts"] == ", ".join(fit.doubts)
+        assert row["cautions"] == ", ".join(fit.cautions)
 
 
 def test_the_band_is_a_column_where_it_differs(make_study, make_analysis) -> None:

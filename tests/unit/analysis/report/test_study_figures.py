@@ -158,9 +158,9 @@ def test_figures_of_a_study(study: StudyResult) -> None:
     shown = figures(study)
     assert [figure.name for figure in shown] == [
         "effects",
-        "days_inertia_kg_m2",
-        "days_damping_nm_s_rad",
         "days_stiffness_nm_rad",
+        "days_damping_nm_s_rad",
+        "days_inertia_kg_m2",
         "days_impulse_nm_s",
         "days_work_j",
         "ratings",

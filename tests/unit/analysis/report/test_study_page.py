@@ -10,9 +10,9 @@ from tests.unit.analysis.report.parsed_page import ParsedPage
 
 from rigidimeter.analysis.report import SECTIONS
 from rigidimeter.analysis.report import page as page_module
-from rigidimeter.analysis.report.numbers import number, p_value
 from rigidimeter.analysis.report.page import contents, render_page, write_report
 from rigidimeter.analysis.study import Condition, StudyResult
+from rigidimeter.core.words import number, p_value
 
 SMALL = Design(days=(4, 3), epochs=(4, 4), scores=(3, 3))
 NASTY = "<script>alert('x')</script>&amp;\"$_$"
@@ -104,8 +104,7 @@ def test_a_measure_that_days_cannot_test_says_why(study: StudyResult) -> None:
     (row,) = (r for r in page.table("OFF against DBS: days") if r[0].startswith("Work"))
     assert row[-1] == "there is one day in each condition"
     assert (
-        "It cannot be decided whether the conditions differ in work: there is one day in each "
-        "condition."
+        "Whether OFF and DBS differ in work cannot be decided: there is one day in each condition."
     ) in page.words()
 
 

@@ -198,3 +198,74 @@ def test_the_test_of_days_keeps_its_word_where_that_of_epochs_does_not() -> None
             hits += [day_difference(x, y, *labels).p < 0.05, p < 0.05]
         assert 0.035 < hits[0] / draws < 0.065
         assert hits[1] / draws > 0.1
+
+
+Epoch = tuple[str, str, float]
+"""Subject, day and value."""
+
+
+def epochs_of(condition: int, subjects: dict[str, tuple[str, str]]) -> list[Epoch]:
+    """Return the epochs of a condition: each subject names the days with it, one letter each.
+
+    The number of epochs differs from day to day, and so does the level.
+    """
+    rng = np.random.default_rng(5 + condition)
+    return [
+        (subject, day, 2.0 - 0.4 * condition + 0.3 * ord(day) % 0.7 + 0.05 * value)
+        for subject, days in subjects.items()
+        for day in days[condition]
+        for value in rng.standard_normal(1 + (ord(day) + condition) % 3)
+    ]
+
+
+WEIGHED = {
+    "one subject, paired": {"M1": ("abc", "abc")},
+    "one subject, partly paired": {"M1": ("abcde", "abcf")},
+    "one subject, no day with both": {"M1": ("abc", "de")},
+    "one subject, one day with both": {"M1": ("abc", "cde")},
+    "two subjects": {"M1": ("abc", "abcd"), "M2": ("ef", "gh")},
+    "five subjects": {f"M{k}": ("abcd"[: 2 + k % 3], "abe"[: 1 + k % 3]) for k in range(5)},
+    "a subject with one condition": {
+        **{f"M{k}": ("abc"[: 1 + k], "bde"[: 3 - k]) for k in range(3)},
+        "M9": ("ab", ""),
+    },
+    "no subject with both": {
+        **{f"M{k}": ("abc"[: 1 + k], "") for k in range(3)},
+        **{f"M{k}": ("", "ab"[: k - 2]) for k in (3, 4)},
+    },
+}
+
+
+@pytest.mark.parametrize("subjects", WEIGHED.values(), ids=WEIGHED)
+def test_means_are_those_of_the_days_with_their_weights(subjects) -> None:
+    """mean = Σ w_d m_d, m_d the mean of the epochs of a day, Σ w_d = 1."""
+    columns = [list(zip(*epochs_of(k, subjects), strict=True)) for k in (0, 1)]
+    (x_subjects, x_days, x), (y_subjects, y_days, y) = columns
+    found = day_difference(x, y, x_days, y_days, x_subjects=x_subjects, y_subjects=y_subjects)
+    for k, mean in enumerate((found.mean_x, found.mean_y)):
+        by_day: dict[tuple[str, str], list[float]] = {}
+        for subject, day, value in epochs_of(k, subjects):
+            by_day.setdefault((subject, day), []).append(value)
+        weights = found.weights[k]
+        assert set(weights) == {key for key in by_day if key[0] != "M9"}
+        assert sum(weights.values()) == pytest.approx(1.0, rel=1e-12)
+        assert min(weights.values()) > 0
+        weighted = sum(weight * np.mean(by_day[key]) for key, weight in weights.items())
+        assert weighted == pytest.approx(mean, rel=1e-12)
+    assert found.estimate == pytest.approx(found.mean_x - found.mean_y, rel=1e-12)
+
+
+def test_days_of_a_subject_count_alike_and_so_do_subjects() -> None:
+    """Three subjects with both conditions, so a day of a subject with m days has 1/(3 m)."""
+    subjects = WEIGHED["a subject with one condition"]
+    columns = [list(zip(*epochs_of(k, subjects), strict=True)) for k in (0, 1)]
+    (x_subjects, x_days, x), (y_subjects, y_days, y) = columns
+    found = day_difference(x, y, x_days, y_days, x_subjects=x_subjects, y_subjects=y_subjects)
+    assert found.test.endswith("1 subject with one condition left out")
+    for k, own in enumerate(found.weights):
+        assert own == {
+            (subject, day): pytest.approx(1 / (3 * len(days[k])))
+            for subject, days in subjects.items()
+            if subject != "M9"
+            for day in days[k]
+        }

@@ -174,10 +174,11 @@ def test_epochs_whose_stiffness_differs_are_named_in_the_pooled_fit():
     analysis = estimate([batch.epoch(i) for i in range(4)], "iv", settings=settings)
     (finding,) = (f for f in analysis.pooled[0].findings if f.name == "varying_between_epochs")
     assert finding.value == pytest.approx(60 / 0.975, rel=0.05)
-    assert "N·m/rad in the 1st epoch to 2.2" in finding.text
+    assert (finding.facts["symbol"], finding.facts["low_at"]) == ("K", "epoch 0")
+    assert finding.facts["high"] == pytest.approx(2.25, abs=0.05)
     # A joint is not the same twice: a number, and no warning unless the settings ask for one.
     assert finding.level == "note"
     assert analysis_warnings(analysis) == ()
-    pooled = replace(analysis.pooled[0], findings=(replace(finding, level="doubt"),))
+    pooled = replace(analysis.pooled[0], findings=(replace(finding, level="caution"),))
     (notice,) = analysis_warnings(replace(analysis, pooled=(pooled,)))
-    assert "the pooled estimate is a mean" in notice.text
+    assert "K differs between epochs" in notice.text

@@ -11,20 +11,29 @@ from scipy.stats import ttest_ind
 from tests.unit.analysis.report.cohorts import Design, altered, made_study
 
 from rigidimeter.analysis.report.page import contents, render_page
+from rigidimeter.analysis.statistics import summarise
 from rigidimeter.analysis.study import (
+    Comparison,
     Difference,
     LeftOut,
+    Measure,
+    Observation,
     StudyResult,
     compare,
     compare_analysis,
     conclude,
+    condition_precisions,
     precisions,
     precisions_untested,
     result_table,
     traffic_light,
 )
-from rigidimeter.analysis.study.comparison import no_days
-from rigidimeter.core.records import Epoch, Finding, Outcome
+from rigidimeter.analysis.study.comparison import day_test, no_days
+from rigidimeter.analysis.study.days_to_decide import days_to_decide
+from rigidimeter.analysis.study.differences import by_units
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import Epoch, Outcome
+from rigidimeter.planning import pairs_needed
 
 SMALL = Design(days=(5, 4), epochs=(5, 5), scores=(4, 4))
 
@@ -43,18 +52,38 @@ def of(result: StudyResult, measure: str) -> Difference:
 
 class TestDifference:
     def test_per_cent_are_of_the_reference(self):
-        found = Difference("mean", 2.0, 1.5, 0.5, 0.1, 0.9, 0.01)
-        assert found.percent == pytest.approx((25.0, 5.0, 45.0))
-        assert found.side == "lower"
-        assert replace(found, estimate=-0.5).side == "higher"
+        found = Difference("mean", 2.0, 1.5, -0.5, -0.9, -0.1, 0.01, 0.05)
+        assert found.percent == pytest.approx((-25.0, -45.0, -5.0))
+        assert found.measured == pytest.approx((-0.5, -0.55, -0.45))
+        assert found.measured_percent == pytest.approx((-25.0, -27.5, -22.5))
 
     @pytest.mark.parametrize("odd", [{"reference": -2.0}, {"reference": 0.0}, {"ratio": False}])
     def test_there_is_none_where_it_has_no_meaning(self, odd):
-        found = Difference("mean", 2.0, 1.5, 0.5, 0.1, 0.9, 0.01)
-        assert np.isnan(replace(found, **odd).percent).all()
+        found = replace(Difference("mean", 2.0, 1.5, -0.5, -0.9, -0.1, 0.01, 0.05), **odd)
+        assert np.isnan(found.percent).all()
+        assert np.isnan(found.measured_percent).all()
+
+    def test_the_row_has_every_number_under_the_keys_of_the_document(self):
+        row = Difference("mean", 2.0, 1.5, -0.5, -0.9, -0.1, 0.01, 0.05).row()
+        assert row == {
+            "centre": "mean",
+            "value_reference": 2.0,
+            "value_other": 1.5,
+            "difference": -0.5,
+            "difference_low": -0.9,
+            "difference_high": -0.1,
+            "difference_percent": -25.0,
+            "difference_percent_low": -45.0,
+            "difference_percent_high": -5.0,
+            "measured_low": pytest.approx(-0.55),
+            "measured_high": pytest.approx(-0.45),
+            "measured_percent_low": pytest.approx(-27.5),
+            "measured_percent_high": pytest.approx(-22.5),
+            "p": 0.01,
+        }
 
     def test_means_difference_and_interval_are_those_of_the_test_by_days(self, study):
-        """No day has both: Welch's test of the means of the days."""
+        """No day has both: Welch's test of the means of the days. It is other − reference."""
         c = study.comparison("stiffness_nm_rad")
         days = [
             [
@@ -66,13 +95,14 @@ class TestDifference:
         expected = ttest_ind(*days, equal_var=False)
         found = of(study, "stiffness_nm_rad")
         assert (found.reference, found.other) == pytest.approx([np.mean(own) for own in days])
-        assert found.estimate == pytest.approx(found.reference - found.other, rel=1e-12)
+        assert found.estimate == pytest.approx(found.other - found.reference, rel=1e-12)
         assert (found.estimate, found.low, found.high, found.p) == (
-            c.days.estimate,
-            c.days.low,
-            c.days.high,
+            -c.days.estimate,
+            -c.days.high,
+            -c.days.low,
             c.days.p,
         )
+        assert found.low < found.estimate < found.high < 0
         assert found.p == pytest.approx(expected.pvalue, rel=0.1)
 
     def test_the_interval_excludes_zero_where_p_is_below_the_level(self, study):
@@ -86,9 +116,9 @@ class TestDifference:
         study = made_study(replace(SMALL, both_on_a_day=True))
         for one in conclude(study).each:
             d = one.difference
-            assert d.estimate == pytest.approx(d.reference - d.other, rel=1e-9)
+            assert d.estimate == pytest.approx(d.other - d.reference, rel=1e-9)
 
-    def test_one_recording_of_each_has_values_and_no_interval(self, study):
+    def test_one_recording_of_each_has_values_and_no_interval_of_a_test(self, study):
         first = {fit.condition: fit.source for fit in reversed(study.analysis.fits)}
         fits = tuple(f for f in study.analysis.fits if f.source == first[f.condition])
         alone = replace(study.analysis, fits=fits, fixed_inertia=fits, scores=())
@@ -96,19 +126,116 @@ class TestDifference:
         found = of(result, "stiffness_nm_rad")
         c = result.comparison("stiffness_nm_rad")
         assert found.reference == pytest.approx(np.mean(c.values["OFF"]))
-        assert found.estimate == pytest.approx(found.reference - found.other)
+        assert found.estimate == pytest.approx(found.other - found.reference)
         assert np.isnan([found.low, found.high, found.p]).all()
+        half = math.sqrt(
+            sum(
+                sum(((o.high - o.low) / 2) ** 2 for o in c.of(name)) / len(c.of(name)) ** 2
+                for name in c.pair
+            )
+        )
+        assert found.measured_half == pytest.approx(half, rel=1e-12)
 
     def test_values_of_a_table_have_medians_and_the_shift(self):
         values = [*range(1, 11), *range(21, 31)]
         table = pd.DataFrame({"condition": ["a"] * 10 + ["b"] * 10, "k": values})
         found = of(compare(table, value="k", resamples=0), "k")
         assert (found.centre, found.reference, found.other) == ("median", 5.5, 25.5)
-        assert (found.estimate, found.side) == (-20.0, "higher")
+        assert found.estimate == 20.0
+        assert 0 < found.low < 20.0 < found.high
+        assert math.isnan(found.measured_half)
+
+
+def compared(*days: tuple[str, str, list[float], list[float]]) -> Difference:
+    """Return the difference in K of (condition, day, values, halves of their intervals)."""
+    observations = tuple(
+        Observation(value, condition, "M1", day, f"{day}-{condition}.csv", f"{k}",
+                    low=value - half, high=value + half)
+        for condition, day, values, halves in days
+        for k, (value, half) in enumerate(zip(values, halves, strict=True))
+    )  # fmt: skip
+    own = {name: [o.value for o in observations if o.condition == name] for name in ("OFF", "DBS")}
+    c = Comparison(
+        Measure("stiffness_nm_rad", "Stiffness K", "N·m/rad", "fits"),
+        "OFF",
+        "DBS",
+        observations,
+        {name: summarise(values) for name, values in own.items()},
+        {"OFF": 0, "DBS": 0},
+    )
+    return by_units(c, day_test(c))
+
+
+class TestMeasured:
+    """half = √(Σ w²h²) over the epochs of both conditions, with the weights of the test."""
+
+    def test_days_of_unequal_numbers_of_epochs_and_a_day_with_one_condition(self):
+        """Days 1 to 3 have both, day 4 OFF alone, so OFF weighs them as least squares does.
+
+        At a correlation of ½ of 3 pairs and 1 of OFF alone (1 + 4)α' − 2β' = 1 and −2α' + 4β' = −1
+        give α' = 1/8 for the day of OFF alone, so (1 − 1/8)/3 = 7/24 for each of the pairs; those
+        of DBS have 1/3. An epoch has the weight of its day over the number of its epochs.
+        """
+        found = compared(
+            ("OFF", "1", [2.0, 2.2], [0.1, 0.2]),
+            ("OFF", "2", [1.9], [0.3]),
+            ("OFF", "3", [2.1, 2.2, 2.3], [0.1, 0.1, 0.1]),
+            ("OFF", "4", [1.6, 1.8], [0.2, 0.2]),
+            ("DBS", "1", [1.5], [0.1]),
+            ("DBS", "2", [1.4, 1.6], [0.2, 0.1]),
+            ("DBS", "3", [1.3], [0.3]),
+        )
+        pair, alone, dbs = 7 / 24, 1 / 8, 1 / 3
+        assert found.reference == pytest.approx(pair * (2.1 + 1.9 + 2.2) + alone * 1.7, rel=1e-12)
+        assert found.other == pytest.approx((1.5 + 1.5 + 1.3) / 3, rel=1e-12)
+        squares = [
+            (pair / 2) ** 2 * (0.1**2 + 0.2**2),
+            pair**2 * 0.3**2,
+            (pair / 3) ** 2 * 3 * 0.1**2,
+            (alone / 2) ** 2 * 2 * 0.2**2,
+            dbs**2 * 0.1**2,
+            (dbs / 2) ** 2 * (0.2**2 + 0.1**2),
+            dbs**2 * 0.3**2,
+        ]
+        assert found.measured_half == pytest.approx(math.sqrt(sum(squares)), rel=1e-12)
+        assert found.measured_half == pytest.approx(0.147702, abs=1e-6)
+
+    def test_it_is_not_that_of_the_test(self, study):
+        """Between days there is more than the measurement of either."""
+        found = of(study, "stiffness_nm_rad")
+        assert 0 < 2 * found.measured_half < 0.3 * (found.high - found.low)
+        assert found.measured[0] == found.tested[0]
+
+    def test_without_a_test_days_count_alike(self):
+        found = compared(("OFF", "1", [2.0, 2.2, 2.4], [0.1, 0.2, 0.3]), ("DBS", "1", [1.5], [0.1]))
+        assert math.isnan(found.p)
+        assert (found.reference, found.other) == pytest.approx((2.2, 1.5))
+        half = math.sqrt((0.01 + 0.04 + 0.09) / 9 + 0.01)
+        assert found.measured_half == pytest.approx(half, rel=1e-12)
+
+    def test_it_is_never_narrower_than_what_the_instrument_is_accurate_to(self):
+        """0.1 % of the mean of both values: 0.001 · (2.0 + 1.5)/2."""
+        found = compared(("OFF", "1", [2.0, 2.0], [1e-6] * 2), ("DBS", "1", [1.5], [1e-6]))
+        assert found.measured_half == pytest.approx(0.00175, rel=1e-12)
+        assert found.measured_percent == pytest.approx((-25.0, -25.0875, -24.9125), rel=1e-9)
+        wider = compared(("OFF", "1", [2.0, 2.0], [1e-3] * 2), ("DBS", "1", [1.5], [2e-3]))
+        assert wider.measured_half == pytest.approx(math.sqrt(1e-6 / 2 + 4e-6), rel=1e-12)
+
+    def test_an_epoch_without_an_interval_leaves_it_unknown(self):
+        found = compared(("OFF", "1", [2.0, 2.0], [0.1, math.nan]), ("DBS", "1", [1.5], [0.1]))
+        assert found.estimate == pytest.approx(-0.5)
+        assert math.isnan(found.measured_half)
+
+    def test_scores_and_ratings_have_none(self, study):
+        for measure in ("impulse_nm_s", "work_j", "rating"):
+            assert math.isnan(of(study, measure).measured_half)
+
+
+TREMOR = {"frequency_hz": 5.0, "amplitude_nm": 0.2, "stands_out": 9.0}
 
 
 def doubted(study: StudyResult, epochs: int, condition: str = "DBS") -> StudyResult:
-    finding = Finding("tremor", "doubt", 2.0, 1.0, "a tremor at 5 Hz", "repeat it at rest")
+    finding = Finding("tremor", "caution", 2.0, 1.0, facts=TREMOR)
     left = iter([True] * epochs)
     fits = tuple(
         replace(fit, findings=(finding,))
@@ -130,7 +257,8 @@ class TestTrafficLight:
         light = traffic_light(doubted(study, 19))
         assert (light.level, light.sound, light.doubted) == ("caution", 59, 19)
         assert (light.doubt, light.doubt_epochs) == ("tremor", 19)
-        assert (light.text, light.remedy) == ("a tremor at 5 Hz", "repeat it at rest")
+        assert light.text == "Torque oscillates at 5 Hz with 0.2 N·m"
+        assert light.remedy.startswith("Record the perturbation")
 
     def test_a_recording_that_could_not_be_used_is_no_good_quality(self, study):
         refused = LeftOut("b.csv", "M1", "1", "DBS", "its angle is in degrees")
@@ -162,7 +290,7 @@ class TestTrafficLight:
         assert traffic_light(compare(table, value="k", resamples=0)) is None
 
     def test_scatter_between_epochs_is_no_caution_where_conditions_are_compared(self, study):
-        finding = Finding("varying_between_epochs", "doubt", 2.0, 1.0, "K varies", "look")
+        finding = Finding("varying_between_epochs", "caution", 2.0, 1.0)
         pooled = replace(study.analysis.fits[-1], condition="OFF", findings=(finding,))
         made = replace(study, analysis=replace(study.analysis, pooled=(pooled,)))
         light = traffic_light(made)
@@ -205,6 +333,20 @@ class TestPrecision:
     def test_two_conditions_have_none(self, study):
         assert precisions(study) == ()
 
+    def test_a_condition_without_an_epoch_has_not_those_of_the_other(self, study):
+        """The only fit to epochs together is then that of the other condition."""
+        lost = Outcome("excluded", "the arm touched the position limit")
+        fits = tuple(
+            replace(fit, outcome=lost) if fit.condition == "DBS" else fit
+            for fit in study.analysis.fits
+        )
+        first = next(fit for fit in fits if fit.outcome.included)
+        pooled = (replace(first, epoch="pooled", condition="OFF"),)
+        made = replace(study, analysis=replace(study.analysis, fits=fits, pooled=pooled))
+        found = condition_precisions(made)
+        assert found["OFF"][0].value == first.stiffness_nm_rad
+        assert [one.measure.name for one in found["DBS"]] == ["impulse_nm_s", "work_j"]
+
     def test_a_single_day_has_those_of_each_condition(self, study):
         """No test by days exists; what the epochs of the day give is shown, for each condition."""
         assert precisions_untested(study) == {}
@@ -227,3 +369,34 @@ class TestPrecision:
         ]
         page = render_page(one_day, contents(one_day), {})
         assert 'href="tables/precision.csv">the intervals' in page
+
+
+def test_the_days_that_would_decide_are_those_of_the_paired_t_test():
+    """One day of two epochs each: SD 12 % between days as assumed, of which half cancels.
+
+    v = Σ (0.12²·½ + 0.16²/2) x² over both conditions, for scatter is assumed below three epochs.
+    """
+    c = observed_on_one_day([2.0, 2.0], [1.6, 1.6])
+    v = (0.12**2 / 2 + 0.16**2 / 2) * (2.0**2 + 1.6**2)
+    assert days_to_decide(c) == pairs_needed(0.4, math.sqrt(v))
+    # Of three epochs the scatter is their own: none here, so that the days' alone counts.
+    c = observed_on_one_day([2.0] * 3, [1.6] * 3)
+    assert days_to_decide(c) == pairs_needed(0.4, math.sqrt(0.12**2 / 2 * (2.0**2 + 1.6**2)))
+    scores = replace(c, measure=replace(c.measure, origin="scores"))
+    assert days_to_decide(scores) is None
+
+
+def observed_on_one_day(off: list[float], dbs: list[float]) -> Comparison:
+    observations = tuple(
+        Observation(value, name, "M1", "1", f"{name}.csv", f"{k}")
+        for name, values in (("OFF", off), ("DBS", dbs))
+        for k, value in enumerate(values)
+    )
+    return Comparison(
+        Measure("stiffness_nm_rad", "Stiffness K", "N·m/rad", "fits"),
+        "OFF",
+        "DBS",
+        observations,
+        {"OFF": summarise(off), "DBS": summarise(dbs)},
+        {"OFF": 0, "DBS": 0},
+    )

@@ -21,6 +21,7 @@ from rigidimeter.analysis.study import (
     compare,
     compare_analysis,
     estimate,
+    lead,
     read_study,
     result_table,
 )
@@ -156,7 +157,14 @@ def test_the_front_door_gives_the_same(study: Path, tmp_path: Path) -> None:
     table = found.table()
     assert list(table["measure"]) == [c.measure.name for c in found.comparisons]
     assert list(table["days_p_holm"]) == [c.days_p_holm for c in found.comparisons]
+    assert len(table.columns) == 13
+    assert table.equals(found.table(full=True)[list(table.columns)])
+    assert len(found.table(full=True).columns) > 50
     assert "Small study" in found._repr_html_()
+    work = found.comparison("work_j").summaries
+    assert repr(found).startswith("Small study; OFF and DBS; medians: ")
+    assert f"Work {work['OFF'].median:.4g} and {work['DBS'].median:.4g} J" in repr(found)
+    assert "\n" not in repr(found)
 
 
 def test_a_table_and_its_file_give_the_same(study: Path) -> None:
@@ -201,14 +209,21 @@ def test_three_subjects_are_compared_and_words_say_so(study: Path, rigidimeter) 
     (study / "ratings.csv").unlink()
     rows = [f"sessions/{k}-OFF,S{k},1,OFF\nsessions/{k + 1}-DBS,S{k},2,DBS" for k in (1, 2, 3)]
     (study / "sessions.csv").write_text("\n".join(["path,subject,day,condition", *rows]))
-    ran = rigidimeter("compare", study, "--resamples", "200")
-    out = " ".join(ran.out.split())
-    assert "Tested by subjects" in out
-    assert "means of subjects; p and intervals by the test of subjects" in out
-    assert "OFF − DBS: subjects, not epochs" in out
-    assert "paired t-test of 3 subjects" in out
-    assert "by resampling the days of each subject" in out
-    assert "by days" not in out
+    ran = rigidimeter("compare", study, "--resamples", "200", "--full")
+    first, _, full = ran.out.partition("\nConditions\n")
+    first, full = (" ".join(text.split()) for text in (first, full))
+    assert "3 subjects · 6 days · 12 epochs, 12 used · tested by subjects" in first
+    assert "tested Paired t-test of 3 subjects; p adjusted by Holm’s method for 2 " in first
+    assert "more subjects would show smaller ones" in first
+    assert "Paired t-test of 3 subjects. In brackets: p adjusted for all measures" in full
+    assert "by days" not in first + full
+    found = compare(study, resamples=RESAMPLES)
+    assert found.resampled == "the days of each subject"
+    for c in found.comparisons:
+        assert c.days.unit == "subject"
+        means = [[np.mean([o.value for o in c.of(name) if o.subject == f"S{k}"]) for k in (1, 2, 3)]
+                 for name in c.pair]  # fmt: skip
+        assert (c.days.mean_x, c.days.mean_y) == pytest.approx(np.mean(means, axis=1))
 
 
 def test_a_session_of_two_conditions_has_one_vote_on_the_protocol(study: Path, rigidimeter) -> None:
@@ -225,9 +240,11 @@ def test_a_session_of_two_conditions_has_one_vote_on_the_protocol(study: Path, r
     found = analysed(study)
     assert [out.path for out in found.left_out] == ["sessions/both"] * 2
     assert "but 2 of 3 sessions, such as sessions/1-OFF" in found.left_out[0].reason
+    assert lead(found).endswith(" 1 of 3 sessions is left out.")
     ran = rigidimeter("compare", study, "--resamples", "200")
-    first = " ".join(ran.out.split("\n\n")[0].split())
-    assert "1 of 3 sessions is left out." in first
+    shown = " ".join(ran.out.split())
+    assert shown.count(f"left out sessions/both: {found.left_out[0].reason}") == 1
+    assert shown.count(found.left_out[0].reason) == 1
 
 
 def test_a_third_condition_is_compared_with_the_first_and_p_is_adjusted_for_all(
@@ -244,11 +261,13 @@ def test_a_third_condition_is_compared_with_the_first_and_p_is_adjusted_for_all(
     head, *before = table.read_text().splitlines()
     table.write_text("\n".join([head, *rows, *before]) + "\n")
     out = tmp_path / "found.json"
-    ran = rigidimeter("compare", study, "--resamples", "200", "--json", out)
+    ran = rigidimeter("compare", study, "--resamples", "200", "--json", out, "--full")
     assert ran.status == 0, ran.err
     text = " ".join(ran.out.split())
-    assert "p adjusted by Holm’s method for 4 tests" in text
-    assert "OFF − LOW: days, not epochs" in text
+    assert text.count("p adjusted by Holm’s method for 4 tests, intervals not") == 2
+    assert "DBS − OFF 95 % interval p, Holm" in text
+    assert "LOW − OFF 95 % interval p, Holm" in text
+    assert "OFF against LOW: days counted" in text
     document = json.loads(out.read_text())
     concluded = {(c["measure"], c["other"]): c for c in document["conclusion"]}
     assert {other for _, other in concluded} == {"DBS", "LOW"}
@@ -261,7 +280,7 @@ def test_a_third_condition_is_compared_with_the_first_and_p_is_adjusted_for_all(
     found = analysed(study)
     rows = [row["condition"] for row in result_table(found, "summaries")]
     assert rows == ["OFF", "LOW", "DBS"] * 2  # as in study.toml, not as the table or the folders
-    shown = ran.out.partition("Each condition")[2].partition("Wilcoxon")[0]
+    shown = ran.out.partition("\nMedians and quartiles by condition\n")[2]
     assert [word for word in shown.split() if word in DAYS or word == "LOW"][:3] == rows[:3]
     again = rigidimeter("report", study, "--out", tmp_path / "page")
     assert again.status == 0, again.err

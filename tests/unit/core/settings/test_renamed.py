@@ -81,6 +81,18 @@ def test_every_older_name_is_read_and_none_is_written() -> None:
             assert not re.search(rf"\b{name}\b", text)
 
 
+def test_the_older_level_is_read_with_one_notice() -> None:
+    levels = {"tremor": "doubt", "coherence": "doubt", "frozen": "note"}
+    notice = 'mine: "doubt" in diagnostics.levels is now "caution"; the older name was read'
+    with pytest.warns(UserWarning, match=re.escape(notice)) as warned:
+        settings = parse_settings({"diagnostics": {"levels": levels}}, source="mine")
+    assert len(warned) == 1
+    read = settings.diagnostics.levels
+    assert [read.of(name) for name in levels] == ["caution", "caution", "note"]
+    with pytest.raises(UserError, match="tremor"):
+        parse_settings({"diagnostics": {"levels": {"tremor": "grave"}}})
+
+
 def test_a_change_by_its_older_name_takes_the_place_of_the_new_one() -> None:
     base = parse_settings({"diagnostics": {"min_coherence": 0.4}})
     with pytest.warns(UserWarning, match=r"^form: diagnostics.coherence_least is now"):

@@ -223,7 +223,7 @@ def test_a_run_does_not_begin_on_a_sensor_under_load(tmp_path, subject, bias_nm,
     [
         (0.1, ""),  # 0.05 deg in the half second
         (0.8, "moved by 0.39"),
-        (2.5, "told to stand still"),
+        (2.5, "commanded to rest"),
     ],
 )
 def test_a_zero_is_not_made_from_a_joint_that_moves(tmp_path, speed_deg_s, words):

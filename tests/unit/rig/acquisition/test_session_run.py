@@ -53,6 +53,14 @@ def test_a_session_runs_what_was_planned_tells_it_and_takes_the_power_away():
     assert time_s == len(ran.sink.samples) / RATE_HZ
 
 
+def test_who_watches_is_given_the_loop_before_its_first_tick():
+    seen = []
+    ran = session(watch=lambda loop: seen.append((loop, loop.tick, len(loop.rig.calls))))
+    ((loop, tick, calls),) = seen
+    assert (tick, calls) == (0, 0)
+    assert loop.tick == len(ran.sink.samples) > 0
+
+
 def test_a_sinusoid_is_imposed_where_one_is_planned():
     values = {"protocol": {**VALUES["protocol"], "blocks": [{"task": "sinusoid", "epochs": 1}]}}
     ran = session(values=values)
@@ -69,6 +77,11 @@ def test_the_ticks_that_enabling_took_are_left_out():
     assert ran.sink.of("epoch_started")[0]["time_s"] == 0.5
 
 
+def repeated_as(ran):
+    """Return of each epoch the number of its repetition, as it is told at the epoch's end."""
+    return [ended.get("again_as") for ended in ran.sink.of("epoch_ended")]
+
+
 def test_an_epoch_in_which_a_limit_held_is_a_fail_and_repeated_last_if_wanted():
     protocol = {**VALUES["protocol"], "repeat_limited": True}
     values = {"guard": {**VALUES["guard"], "position_limit_deg": 1.5}, "protocol": protocol}
@@ -78,6 +91,7 @@ def test_an_epoch_in_which_a_limit_held_is_a_fail_and_repeated_last_if_wanted():
     assert {outcome for _, outcome in ran.epochs} == {"fail"}
     assert "position limit of ±1.5 deg" in ran.sink.of("epoch_ended")[0]["reason"]
     assert (ran.result.outcome, ran.result.epochs_run, ran.result.epochs_good) == ("success", 4, 0)
+    assert repeated_as(ran) == [3, 4, None, None]
 
 
 def test_an_epoch_that_went_well_is_not_repeated():
@@ -145,6 +159,7 @@ def test_a_pause_now_ends_the_epoch_which_comes_again_first_and_once():
     assert ran.epochs == [(1, "abort"), (3, "abort"), (2, "success")]
     assert ran.sink.of("epoch_ended")[0]["reason"] == "ended by the operator"
     assert (ran.result.epochs_run, ran.result.epochs_good) == (3, 1)
+    assert repeated_as(ran) == [3, None, None]
 
 
 @pytest.mark.parametrize(

@@ -244,6 +244,36 @@ def test_a_velocity_of_another_size_is_told_by_how_much(moved_rad2, reported_rad
     assert (found.unit, found.duration_s) == (unit, SQUARED_S)
 
 
+def test_of_two_laws_the_one_that_is_broken_is_told():
+    """A value at its limit, to the bit, breaks no law. Gain: (m + r - d) / 2 on the smaller."""
+    consistency = latched(Cause.VELOCITY_WRONG).consistency
+
+    def velocity(**values):
+        means = consistency.means._replace(**values)
+        return told(Cause.VELOCITY_WRONG, consistency={"means": means})
+
+    smaller, unseen_rad2 = 2.0**-6, AGREEMENT.unseen_rad * AGREEMENT.unseen_rad
+    gain = velocity(moved_rad2=smaller, reported_rad2=3 * smaller, disagreement_rad2=smaller)
+    assert gain.unit == "deg"  # the gain is WRONG_GAIN
+    assert gain.value == pytest.approx(math.degrees(2.0**-3))
+    few = {"moved_rad2": 0.1 * unseen_rad2, "reported_rad2": 1.5 * unseen_rad2}
+    apart = velocity(**few, disagreement_rad2=unseen_rad2)
+    assert (apart.value, apart.limit) == (pytest.approx(3.0), WRONG_GAIN)
+
+
+@pytest.mark.parametrize(
+    ("cause", "age_s", "told_s"),
+    [
+        (Cause.MOTION_STALE, LIMITS.stale_s, 0.7),  # not too old: it repeats itself
+        (Cause.MOTION_STALE, 1.01 * LIMITS.stale_s, 1.01 * LIMITS.stale_s),
+        (Cause.DRIVE_LOST, 0.5 * LIMITS.stale_s, 0.5 * LIMITS.stale_s),
+    ],
+)
+def test_a_reading_that_repeats_itself_is_told_by_how_long_it_did(cause, age_s, told_s):
+    found = told(cause, guard={"age_s": age_s}, consistency={"same_s": 0.7})
+    same(found, Found(1e3 * told_s, *STALE, told_s, "guard.stale_s"))
+
+
 @pytest.mark.parametrize(
     ("cause", "expected"),
     [

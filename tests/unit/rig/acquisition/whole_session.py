@@ -62,11 +62,15 @@ class Ran(NamedTuple):
 
 
 def session(desk=None, *, change=lambda tick, reading: reading, late=None, values=None, **options):
-    """Run a session; `change` says what is in each reading, `values` other settings."""
+    """Run a session; `change` says what is in each reading, `values` other settings.
+
+    `clock`, `rig` and `sink` are others than those made here.
+    """
     settings = parse_settings({**VALUES, **(values or {})})
     interval_s = 1.0 / settings.rig.tick_rate_hz
     rig = options.pop("rig", None) or ExactRig(change, interval_s, HAND_KG_M2)
     protocol = plan(settings.protocol, settings.prbs, settings.sinusoid, 1)
+    clock = options.pop("clock", None) or LateClock(late, interval_s)
     sink, states = options.pop("sink", None) or ListSink(), []
     result, error = None, None
     try:
@@ -74,7 +78,7 @@ def session(desk=None, *, change=lambda tick, reading: reading, late=None, value
             protocol,
             settings,
             rig,
-            LateClock(late, interval_s),
+            clock,
             sink,
             supervision=desk,
             **{"state_changed": states.append, **options},

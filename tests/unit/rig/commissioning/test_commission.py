@@ -75,7 +75,7 @@ def test_somebody_signs_for_hardware(commissioned: Any) -> None:
     [
         ("mechanical stops", "mechanical stops"),
         ("power go by itself", "hardware enable drops the power"),
-        ("joint move first", "the joint moved as said"),
+        ("joint move first", "the joint moved as described"),
     ],
 )
 def test_an_operator_who_says_no_fails_the_check(commissioned: Any, words: str, name: str) -> None:

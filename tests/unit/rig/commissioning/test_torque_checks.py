@@ -33,11 +33,11 @@ def answer(inertia_kg_m2: float = 0.01, *, se: float = 0.0, delay_s: float = 0.0
 def test_the_inertia_may_differ_by_the_larger_limit(
     known_se: float, se: float, allowed: float, sign: float
 ) -> None:
-    known = KnownInertia(0.01, known_se, "as told")
+    known = KnownInertia(0.01, known_se, "as given")
     for part, passed in ((0.99, True), (1.01, False)):
         check = gain_check(answer(0.01 + sign * part * allowed, se=se), known, SETTINGS)
         assert check.passed == passed, part
-        assert check.limit == f"0.01 ± {allowed:.2g} kg·m², as told"
+        assert check.limit == f"0.01 ± {allowed:.2g} kg·m², as given"
 
 
 @pytest.mark.parametrize("rate_hz", [1000.0, 50.0])

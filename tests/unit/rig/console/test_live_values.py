@@ -50,7 +50,7 @@ def test_a_value_is_shown_with_its_interval_once_it_means_something():
     assert all(value.settled for value in (J, B, K))
     assert K.half_width == pytest.approx(1.96 * 0.02, rel=1e-4)
     assert K.text == "K 1.700 ± 0.039 N·m/rad"
-    assert J.text == "J 0.004500 ± 0.000020 kg·m²"
+    assert J.text == "J 4.500e-3 ± 0.020e-3 kg·m²"
     assert B.text == "B 0.1370 ± 0.0020 N·m·s/rad"
 
 
@@ -110,7 +110,7 @@ def test_each_parameter_settles_for_itself():
 
 def test_a_wrong_sign_is_shown_as_it_is():
     K = live_values(steady(10.0, stiffness=-1.7), "prbs", SETTINGS)[2]
-    assert K.text == "K -1.700 ± 0.039 N·m/rad"
+    assert K.text == "K −1.700 ± 0.039 N·m/rad"
 
 
 def test_of_a_sinusoid_and_before_any_epoch_nothing_is_shown():

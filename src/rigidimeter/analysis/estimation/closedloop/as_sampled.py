@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import fft
 
-from rigidimeter.analysis.estimation.closedloop.between_finding import doubt_of
+from rigidimeter.analysis.estimation.closedloop.between_finding import NAME, between_finding
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
     INEXACT,
     TorqueFilter,
@@ -27,43 +27,39 @@ from rigidimeter.analysis.estimation.closedloop.between_samples import (
     step_kept_s,
     torque_filter_of,
 )
+from rigidimeter.analysis.estimation.found import found
 from rigidimeter.analysis.estimation.least_squares_bias import BEYOND_BAND
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array, Signals
-from rigidimeter.core.records import Finding
+from rigidimeter.core.findings import Finding
 from rigidimeter.core.settings import RigSettings
 from rigidimeter.model import DriveModel
 
-REMEDY = (
-    "use --method iv with the perturbation recorded, which corrects it; or sample faster, or give "
-    "the drive a lower bandwidth"
-)
 
-
-class InertiaDoubt(NamedTuple):
+class InertiaUncertainty(NamedTuple):
     """How far J, B and K may be elsewhere, either way, for each unit of J; what is said of it."""
 
     away: Array
     findings: tuple[Finding, ...] = ()
 
 
-NONE = InertiaDoubt(np.zeros(3))
+NONE = InertiaUncertainty(np.zeros(3))
 
 
-def inertia_doubt(prepared: PreparedEpoch, signals: Signals) -> InertiaDoubt:
-    """Return the doubt where the drive was followed as far as it is known."""
-    found, epoch = prepared.source.drive, prepared.epoch
+def inertia_uncertainty(prepared: PreparedEpoch, signals: Signals) -> InertiaUncertainty:
+    """Return the uncertainty where the drive was followed as far as it is known."""
+    drive, epoch = prepared.source.drive, prepared.epoch
     command = epoch.channels.get("velocity_command_rad_s")
     torque_filter = torque_filter_of(prepared.settings.estimation)
-    known = found is not None and command is not None
+    known = drive is not None and command is not None
     away = np.zeros(3)
-    if found is None or command is None:
+    if drive is None or command is None:
         rig = prepared.settings.rig
         away = np.abs(moved_by_settings(rig, torque_filter, signals))
         share = abs(1.0 / acceleration_by_settings(rig, torque_filter) - 1.0)
     else:
         interval_s, stamps_s = 1.0 / command.mean_rate_hz, epoch.channels["torque_nm"].time_s
-        drives, times_s = (found.model, *found.rivals), phases_s(command, stamps_s)
+        drives, times_s = (drive.model, *drive.rivals), phases_s(command, stamps_s)
         ours, *others = accelerations_seen(drives, torque_filter, interval_s, times_s).tolist()
         others.append(ours + INEXACT * (1.0 - ours))
         kept_s = step_kept_s(command, stamps_s)
@@ -73,8 +69,10 @@ def inertia_doubt(prepared: PreparedEpoch, signals: Signals) -> InertiaDoubt:
             ).tolist()
         share = max(abs(ours / other - 1.0) for other in others)
     away[0] = share
-    doubts = doubt_of(epoch, "J", 100.0 * share, known, prepared.settings.diagnostics)
-    return InertiaDoubt(away, doubts)
+    values = np.abs(signals.solution.values)
+    percent = 100.0 * away * values[0] / np.maximum(values, 1e-300)
+    settings = prepared.settings.diagnostics
+    return InertiaUncertainty(away, between_finding(epoch, percent, 0, known, settings))
 
 
 def moved_by_settings(
@@ -120,25 +118,26 @@ def delay_of_drive_s(prepared: PreparedEpoch) -> float:
     return abs(acceleration_late_s(drive, 1.0 / rig.tick_rate_hz))
 
 
-def as_they_are(prepared: PreparedEpoch, signals: Signals) -> InertiaDoubt:
+def as_they_are(prepared: PreparedEpoch, signals: Signals) -> InertiaUncertainty:
     """Return the finding if the drive shows that J comes out wrong from the samples as they are."""
     del signals
-    found, epoch = prepared.source.drive, prepared.epoch
+    drive, epoch = prepared.source.drive, prepared.epoch
     command = epoch.channels.get("velocity_command_rad_s")
-    if found is None or command is None:
+    if drive is None or command is None:
         return NONE
     settings = prepared.settings.diagnostics
     times_s = phases_s(command, epoch.channels["torque_nm"].time_s)
-    (seen,) = accelerations_seen([found.model], None, 1.0 / command.mean_rate_hz, times_s)
+    (seen,) = accelerations_seen([drive.model], None, 1.0 / command.mean_rate_hz, times_s)
     percent, most = 100.0 * abs(1.0 - seen), settings.max_between_samples_percent
     if not percent > most:
         return NONE
-    text = (
-        f"the torque was sampled where the acceleration is {100 * seen:.3g} % of its mean between "
-        f"the samples (at most {most:g} % away), and J is taken to be as much too "
-        f"{'small' if seen < 1 else 'large'}"
+    finding = found(
+        NAME,
+        settings,
+        percent,
+        most,
+        condition=epoch.condition,
+        facts={"seen": 100.0 * float(seen), "side": "small" if seen < 1 else "large"},
+        variant="as_sampled",
     )
-    level = settings.levels.between_samples
-    return InertiaDoubt(
-        NONE.away, (Finding("between_samples", level, percent, most, text, REMEDY),)
-    )
+    return InertiaUncertainty(NONE.away, (finding,))

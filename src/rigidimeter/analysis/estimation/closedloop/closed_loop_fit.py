@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import special
 
-from rigidimeter.analysis.estimation.closedloop.between_doubt import between_samples
+from rigidimeter.analysis.estimation.closedloop.between_uncertainty import between_samples
 from rigidimeter.analysis.estimation.closedloop.linear_problems import (
     Linearise,
     Problem,
@@ -142,18 +142,18 @@ def _fit_condition(
             fits[place] = _without_numbers(epoch, method.name, str(error))
         else:
             found = _epoch_fit(epoch, method.name, fit, observation, inertia_kg_m2)
-            doubt = between_samples(
+            unsettled = between_samples(
                 epoch, observation, fit.values, fit.between, settings.diagnostics
             )
-            fits[place] = replace(found, findings=doubt)
+            fits[place] = replace(found, findings=unsettled)
         progress(1.0 - POOLED_SHARE)
     if shared is None:
         return fits, []
     together = _pooled_fit(method.name, condition, shared, good, inertia_kg_m2)
-    doubt = between_samples(
+    unsettled = between_samples(
         good[0].epoch, good[0].observation, shared.values, shared.between, settings.diagnostics
     )
-    return fits, [replace(together, findings=doubt)]
+    return fits, [replace(together, findings=unsettled)]
 
 
 def _fit_all(

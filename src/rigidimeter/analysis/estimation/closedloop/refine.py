@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.closedloop.between_doubt import moved_elsewhere
+from rigidimeter.analysis.estimation.closedloop.between_uncertainty import moved_elsewhere
 from rigidimeter.analysis.estimation.closedloop.line_noise import (
     Shape,
     Smoother,

@@ -1,6 +1,7 @@
 """Checks on an epoch and its fit, each a pure function from numbers to what it saw."""
 
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
+    HARMFUL,
     Case,
     Check,
     at_most,
@@ -11,6 +12,7 @@ from rigidimeter.analysis.estimation.diagnostics.together import checked_togethe
 
 __all__ = [
     "CHECKS",
+    "HARMFUL",
     "Case",
     "Check",
     "at_most",

@@ -1,9 +1,9 @@
 """Whether the band decides what J, B and K are: neighbouring bands that contradict the interval.
 
 The epochs of a condition are fitted again in bands with other edges
-(`closedloop.band_sensitivity`). An estimate is doubted where another band moves a parameter by more
-than chance, over all bands and parameters together, by more than a share of the parameter, and by
-more than half of half the interval of that estimate: then the interval does not hold what other
+(`closedloop.band_sensitivity`). An estimate has the finding where another band moves a parameter by
+more than chance, over all bands and parameters together, by more than a share of the parameter, and
+by more than half of half the interval of that estimate: then the interval does not hold what other
 frequencies say.
 """
 
@@ -13,11 +13,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.between_epochs import in_full, p_text
 from rigidimeter.analysis.estimation.closedloop.band_sensitivity import BandChange
-from rigidimeter.analysis.estimation.diagnostics.check_record import half_widths
+from rigidimeter.analysis.estimation.found import found, half_widths
 from rigidimeter.analysis.estimation.signals import Array
-from rigidimeter.core.records import PARAMETERS, BandEstimate, Finding, Fit, Three
+from rigidimeter.core.findings import Effect, Finding, Three
+from rigidimeter.core.records import PARAMETERS, BandEstimate, Fit
 from rigidimeter.core.settings import DiagnosticsSettings
 
 NAME = "band_sensitivity"
@@ -54,15 +54,15 @@ def band_estimates(
     others = [
         BandEstimate(
             condition,
-            found.low_hz,
-            found.high_hz,
-            found.part,
-            _three(at + found.change),
-            _three(found.change),
-            _three(found.change_se),
-            _three(found.p),
+            band.low_hz,
+            band.high_hz,
+            band.part,
+            _three(at + band.change),
+            _three(band.change),
+            _three(band.change_se),
+            _three(band.p),
         )
-        for found in changes
+        for band in changes
     ]
     return [own, *others]
 
@@ -79,39 +79,39 @@ def band_finding(
     changes : sequence of BandChange
     settings : DiagnosticsSettings
     """
-    bands = [found for found in changes if found.part == "all"]
+    bands = [band for band in changes if band.part == "all"]
     if not bands:
         return []
-    change = np.array([found.change for found in bands])
-    p = np.minimum(change.size * np.array([found.p for found in bands]), 1.0)  # Bonferroni
+    change = np.array([band.change for band in bands])
+    p = np.minimum(change.size * np.array([band.p for band in bands]), 1.0)  # Bonferroni
     percent = 100 * np.abs(change / fit.value)
-    of_half = np.abs(change) / half_widths(fit)
+    half = half_widths(fit)
+    of_half = np.abs(change) / half
     most = settings.max_band_sensitivity_percent
     contradicting = (p < CHANCE) & (percent > most) & (of_half > OF_HALF)
     if not np.any(contradicting):
         return []
     worst = np.argmax(np.where(contradicting, of_half, 0.0))
-    band, parameter = np.unravel_index(worst, change.shape)
-    found, about = bands[int(band)], PARAMETERS[int(parameter)]
-    own = changes[-1]
-    way = "more" if change[band, parameter] * fit.value[parameter] > 0 else "less"
-    text = (
-        f"from {found.low_hz:.3g} to {found.high_hz:.3g} Hz {about.symbol} is "
-        f"{in_full(float(percent[band, parameter]), limit=most)} ± "
-        f"{100 * found.change_se[parameter] / abs(fit.value[parameter]):.2g} % {way} than from "
-        f"{own.low_hz:.3g} to {own.high_hz:.3g} Hz (at most {most:g} %; by chance "
-        f"{p_text(float(p[band, parameter]))}), {of_half[band, parameter]:.2g} times half its "
-        "interval: the band decides what the estimate is, as it does where a term is missing"
-    )
+    at, j = np.unravel_index(worst, change.shape)
+    band, own = bands[int(at)], changes[-1]
     return [
-        Finding(
+        found(
             NAME,
-            settings.levels.band_sensitivity,
-            float(percent[band, parameter]),
+            settings,
+            float(percent[at, j]),
             most,
-            text,
-            "see how J, B and K depend on the band (`sensitivity` in the JSON file, the report’s "
-            "figure) and state the band; `rigidimeter model --compare` tries terms",
+            p=float(p[at, j]),
+            effect=Effect.of(-change[at], fit.value, half),
+            facts={
+                "symbol": PARAMETERS[int(j)].symbol,
+                "way": "more" if change[at, j] * fit.value[j] > 0 else "less",
+                "low_hz": band.low_hz,
+                "high_hz": band.high_hz,
+                "error": float(100 * band.change_se[j] / abs(fit.value[j])),
+                "own_low_hz": own.low_hz,
+                "own_high_hz": own.high_hz,
+                "of_half": float(of_half[at, j]),
+            },
         )
     ]
 

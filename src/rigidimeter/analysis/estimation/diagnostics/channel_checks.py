@@ -7,7 +7,6 @@ the position limit, or a command that the guard changed, is not the perturbation
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -17,96 +16,79 @@ from rigidimeter.analysis.estimation.bad_stretches import (
     longest_repetition,
     share_at_extremes,
 )
-from rigidimeter.analysis.estimation.between_epochs import in_full
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
+    HARMFUL,
     Case,
     Check,
+    Harmless,
     Look,
     at_most,
 )
 from rigidimeter.analysis.estimation.stretches import left_out_s
+from rigidimeter.core.findings import Fact
 from rigidimeter.core.records import LOST_SAMPLES, Channel, Epoch, LeftOut, Ticks
 from rigidimeter.core.settings import DiagnosticsSettings
+from rigidimeter.core.units import deg_from_rad
 
 MOST_SHOWN = 3
 
 
 def saturation(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     """Return the largest share of samples in which a channel repeats its extreme value."""
-    most = settings.max_saturated_percent
-    left_out = _left_out(epoch, "saturation")
-    if left_out:
-        value = 100.0 * _seconds(left_out) / _length_s(epoch)
-        share = in_full(value, limit=most)
-        fact = f"{_channels(left_out)} in {share} % of the time (at most {most:g} %)"
-        return Look(value, most, True, fact)
+    most, found = settings.max_saturated_percent, _left_out(epoch, "saturation")
+    if found:
+        value = 100.0 * _seconds(found) / _length_s(epoch)
+        return Look(value, most, True, {"channel": _channels(found), **_rest(epoch, found)})
     shares = {c.name: 100.0 * share_at_extremes(epoch, c, settings) for c in _fitted(epoch)}
     worst = max(shares, key=lambda name: shares[name])
-    value = shares[worst]
-    return at_most(
-        value,
-        most,
-        f"{worst} repeats its extreme values in {in_full(value, limit=most)} % of samples (at most "
-        f"{most:g} %)",
-    )
+    return at_most(shares[worst], most, channel=worst)
 
 
 def frozen(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     """Return the longest time for which a channel repeats one value."""
-    most = settings.max_frozen_s
-    left_out = _left_out(epoch, "frozen")
-    if left_out:
-        longest = max(left_out, key=lambda stretch: stretch.stop_s - stretch.start_s)
-        value, start_s, what = longest.stop_s - longest.start_s, longest.start_s, longest.reason
-    else:
-        found = {c.name: longest_repetition(epoch, c, settings) for c in _fitted(epoch)}
-        worst = max(found, key=lambda name: found[name][0])
-        (value, start_s), what = found[worst], f"{worst} repeats one value"
-    when = f", from {start_s:.4g} s" if value > 0 else ""
-    fact = f"{what} for {in_full(value, limit=most)} s (at most {most:g} s){when}"
-    return at_most(value, most, fact)
+    most, found = settings.max_frozen_s, _left_out(epoch, "frozen")
+    if found:
+        value = max(stretch.stop_s - stretch.start_s for stretch in found)
+        return Look(value, most, True, {"channel": _channels(found), **_rest(epoch, found)})
+    longest = {c.name: longest_repetition(epoch, c, settings) for c in _fitted(epoch)}
+    worst = max(longest, key=lambda name: longest[name][0])
+    value, start_s = longest[worst]
+    return at_most(value, most, channel=worst, start_s=start_s)
 
 
 def left_out(epoch: Epoch) -> Look:
     """Return for how long the user left parts of the epoch out, in s."""
     found = _left_out(epoch, "")
-    if not found:
-        return Look(0.0, 0.0, False, "nothing is left out by hand")
-    value = _seconds(found)
     reasons = "; ".join(dict.fromkeys(stretch.reason for stretch in found if stretch.reason))
-    fact = f"{value:.3g} s are left out by hand, {_spans(found)}"
-    return Look(value, 0.0, True, fact, f"{reasons or 'no reason was given'}; {_rest(epoch)}")
+    facts = {"reason": reasons or "no reason was given", **_rest(epoch, found)}
+    return Look(_seconds(found), 0.0, bool(found), facts)
 
 
 def lost_samples(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     """Return in which share of the epoch's time its samples are lost, in %."""
     found, most = _left_out(epoch, LOST_SAMPLES), settings.max_left_out_percent
     if not found:
-        return Look(0.0, most, False, "no samples are lost")
-    lost_s = _seconds(found)
-    torque_s = epoch.channels["torque_nm"].time_s
+        return Look(0.0, most, False)
+    torque_s, lost_s = epoch.channels["torque_nm"].time_s, _seconds(found)
     start_s = min(float(torque_s[0]), *(stretch.start_s for stretch in found))
     stop_s = max(float(torque_s[-1]), *(stretch.stop_s for stretch in found))
     value = 100.0 * lost_s / (stop_s - start_s)
-    reasons = "; ".join(stretch.reason for stretch in found[:MOST_SHOWN])
-    share = f"{in_full(value, limit=most)} % of the epoch (at most {most:g} %)"
-    return Look(value, most, True, f"samples of {lost_s:.3g} s are lost, {share}: {reasons}")
+    facts = {"lost_s": lost_s, "reason": found[0].reason, **_rest(epoch, found)}
+    return Look(value, most, True, facts)
 
 
-def _said_lost(case: Case, look: Look) -> str:
-    """Return that what is lost is left out, where enough is left."""
-    return said_left_out(LOST_SAMPLES)(case, look) if look.value <= look.threshold else ""
+def is_left_out(check: str) -> Callable[[Case, Look], Harmless]:
+    """Return what says whether the stretches that a check found are left out."""
 
-
-def said_left_out(check: str) -> Callable[[Case, Look], str]:
-    """Return what says that the stretches which a check found are left out; else nothing."""
-
-    def said(case: Case, look: Look) -> str:
+    def left_out(case: Case, look: Look) -> Harmless:
         del look
-        found = _left_out(case.epoch, check)
-        return f"left out, {_spans(found)}; {_rest(case.epoch)}" if found else ""
+        return ("left_out", {}) if _left_out(case.epoch, check) else HARMFUL
 
-    return said
+    return left_out
+
+
+def _enough_is_left(case: Case, look: Look) -> Harmless:
+    return is_left_out(LOST_SAMPLES)(case, look) if look.value <= look.limit else HARMFUL
 
 
 def _left_out(epoch: Epoch, check: str) -> list[LeftOut]:
@@ -114,7 +96,8 @@ def _left_out(epoch: Epoch, check: str) -> list[LeftOut]:
 
 
 def _channels(stretches: Sequence[LeftOut]) -> str:
-    return " and ".join(dict.fromkeys(stretch.reason for stretch in stretches))
+    """Return the channels that repeat a value; the reason of a stretch begins with its channel."""
+    return " and ".join(dict.fromkeys(stretch.reason.split()[0] for stretch in stretches))
 
 
 def _seconds(stretches: Sequence[LeftOut]) -> float:
@@ -132,57 +115,42 @@ def _length_s(epoch: Epoch) -> float:
     return float(torque.time_s[-1] - torque.time_s[0])
 
 
-def _rest(epoch: Epoch) -> str:
-    """Say what of an epoch is used."""
-    whole_s = _length_s(epoch)
-    return f"{whole_s - left_out_s(epoch):.3g} of {whole_s:.3g} s are used"
+def _rest(epoch: Epoch, stretches: Sequence[LeftOut]) -> dict[str, Fact]:
+    """Return which parts are left out, and how much of the epoch is used."""
+    length_s = _length_s(epoch)
+    used_s = length_s - left_out_s(epoch)
+    return {"spans": _spans(stretches), "used_s": used_s, "length_s": length_s}
 
 
 def missed_ticks(ticks: Ticks, settings: DiagnosticsSettings) -> Look:
     """Return in what share of the ticks that were due the loop did not run, in %."""
-    most = settings.max_missed_ticks_percent
-    fact = (
-        f"{ticks.missed} of {ticks.ran + ticks.missed} ticks never ran "
-        f"({in_full(ticks.missed_percent)} %, at most {most:g} %), and {ticks.late} were late"
+    return at_most(
+        ticks.missed_percent,
+        settings.max_missed_ticks_percent,
+        missed=ticks.missed,
+        ticks=ticks.ran + ticks.missed,
+        late=ticks.late,
     )
-    return at_most(ticks.missed_percent, most, fact)
 
 
-def _followed(case: Case, look: Look) -> str:
+def _followed(case: Case, look: Look) -> Harmless:
     """Return that the estimate follows a command that was held, where it knows the drive."""
     del look
     by_samples = case.method is None or case.method.as_recorded
     if by_samples or case.prepared is None or case.prepared.source.drive is None:
-        return ""
-    return (
-        "the drive held its command at them, and the estimate allows for that: nothing moves J, B "
-        "and K beyond their intervals"
-    )
+        return HARMFUL
+    return "followed", {}
 
 
 def guard_limited(ticks: Ticks, settings: DiagnosticsSettings) -> Look:
     """Return in what share of the ticks the guard changed the command, in %."""
-    value = 100.0 * ticks.limited / ticks.ran
-    most = settings.max_limited_percent
-    return at_most(
-        value,
-        most,
-        f"the guard changed {in_full(value, limit=most)} % of the commands (at most {most:g} %)",
-    )
+    return at_most(100.0 * ticks.limited / ticks.ran, settings.max_limited_percent)
 
 
 def position_limit(angle: Channel, limit_rad: float, settings: DiagnosticsSettings) -> Look:
     """Return how near the joint came to the position limit, in % of it."""
     value = 100.0 * float(np.max(np.abs(angle.values))) / limit_rad
-    most = settings.max_position_percent
-    return at_most(
-        value,
-        most,
-        (
-            f"the joint came to {in_full(value, '.0f', limit=most)} % of the position limit of "
-            f"{math.degrees(limit_rad):.3g} deg (at most {most:g} %)"
-        ),
-    )
+    return at_most(value, settings.max_position_percent, limit_deg=deg_from_rad(limit_rad))
 
 
 def _fitted(epoch: Epoch) -> list[Channel]:
@@ -200,45 +168,28 @@ CHANNEL_CHECKS = (
         "saturation",
         (),
         lambda c: saturation(c.epoch, c.settings),
-        "the sensor or its amplifier was at the end of its range",
-        "choose a larger range or a smaller perturbation, and repeat",
         of_fit=False,
-        harmless=said_left_out("saturation"),
+        harmless=is_left_out("saturation"),
     ),
     Check(
         "frozen",
         (),
         lambda c: frozen(c.epoch, c.settings),
-        "the sensor hung, or the joint was held",
-        "check the sensor's cable and its rate",
         of_fit=False,
-        harmless=said_left_out("frozen"),
+        harmless=is_left_out("frozen"),
     ),
-    Check(
-        "left_out",
-        (),
-        lambda c: left_out(c.epoch),
-        "",
-        "see whether the estimate changes with them",
-        of_fit=False,
-    ),
+    Check("left_out", (), lambda c: left_out(c.epoch), of_fit=False),
     Check(
         LOST_SAMPLES,
         (),
         lambda c: lost_samples(c.epoch, c.settings),
-        "what is left is another experiment than was planned",
-        "read a copy of the recording that is whole; test the disk that it was on",
         of_fit=False,
-        harmless=_said_lost,
+        harmless=_enough_is_left,
     ),
     Check(
         "missed_ticks",
         ("velocity_command_rad_s",),
         lambda c: None if c.epoch.ticks is None else missed_ticks(c.epoch.ticks, c.settings),
-        "the drive held its command at them, and how the joint then moved between the samples is "
-        "not known",
-        "run it on a processor of its own with `--cpu N`, close other programs, or lower "
-        "rig.tick_rate_hz",
         of_fit=False,
         harmless=_followed,
     ),
@@ -246,16 +197,7 @@ CHANNEL_CHECKS = (
         "guard_limited",
         (),
         lambda c: None if c.epoch.ticks is None else guard_limited(c.epoch.ticks, c.settings),
-        "the arm did not follow the perturbation as designed",
-        "use a smaller perturbation or wider limits in [guard]",
         of_fit=False,
     ),
-    Check(
-        "position_limit",
-        ("angle_rad",),
-        _position_limit,
-        "it was held back there, which the fit takes for stiffness",
-        "use a smaller perturbation, or begin nearer to the middle of the range",
-        of_fit=False,
-    ),
+    Check("position_limit", ("angle_rad",), _position_limit, of_fit=False),
 )

@@ -2,53 +2,60 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+import math
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.between_epochs import in_full
+from rigidimeter.analysis.estimation.found import UNKNOWN_WIDTH, found, half_widths
 from rigidimeter.analysis.estimation.method_record import Method
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array, Signals
-from rigidimeter.core.records import Epoch, Finding, Fit
-from rigidimeter.core.settings import DiagnosticLevels, DiagnosticsSettings, Level
+from rigidimeter.core.findings import UNKNOWN_EFFECT, Effect, Fact, Finding
+from rigidimeter.core.records import Epoch, Fit
+from rigidimeter.core.settings import DiagnosticsSettings
 from rigidimeter.model import Loop
 
 T = TypeVar("T")
 
-DEFAULT_LEVELS = DiagnosticLevels()
+Harmless = tuple[str, Mapping[str, Fact]]
+"""The variant of the words that says why, and the facts that it shows."""
 
-UNKNOWN_WIDTH = 0.1
-"""The share of a parameter that stands for half its interval where a method gives none."""
-
-
-def half_widths(fit: Fit) -> Array:
-    """Return half the 95 % intervals of J, B and K; without intervals `UNKNOWN_WIDTH` of them."""
-    half = 0.5 * (fit.high - fit.low)
-    return np.where(np.isfinite(half), half, np.abs(fit.value) * UNKNOWN_WIDTH)
+HARMFUL: Harmless = ("", {})
 
 
-def push_harmless(case: Case, look: Look) -> str:
-    """Return why torque of the subject's own does not bias the estimate; empty where it does."""
+def push_harmless(case: Case, look: Look) -> Harmless:
+    """Return why torque of the subject's own does not bias the estimate; `HARMFUL` if it does."""
     del look
-    if case.uses_perturbation and case.method is not None:
-        return (
-            f"{case.method.name} uses the motion that the perturbation causes alone, so torque "
-            "that something but the robot adds does not bias J, B and K; it is in their intervals"
-        )
+    if case.uses_perturbation:
+        return "instrument", {}
     share = case.loop_bias_percent
     if share is not None and share <= case.settings.max_loop_bias_percent:
-        return f"it biases J, B and K by {in_full(share)} % of half their intervals at most"
-    return ""
+        return "small_bias", {"share": share}
+    return HARMFUL
 
 
-def never(case: Case, look: Look) -> str:
+def push_effect(case: Case) -> Effect:
+    """Return what torque of the subject's own does to the estimate, as far as that is known."""
+    if case.uses_perturbation:
+        return Effect((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    bias = case.loop_bias
+    return UNKNOWN_EFFECT if bias is None else Effect.of(bias, case.parameters, case.half_widths)
+
+
+def never(case: Case, look: Look) -> Harmless:
     """Return that a failed check is not harmless."""
     del case, look
-    return ""
+    return HARMFUL
+
+
+def unknown(case: Case) -> Effect:
+    """Return that nothing is known of what a failure does to J, B and K."""
+    del case
+    return UNKNOWN_EFFECT
 
 
 @dataclass(frozen=True)
@@ -141,17 +148,18 @@ class Case:
 class Look(NamedTuple):
     """What a check saw.
 
-    `value` and `threshold` are in the unit that `fact` states; `failed` says whether the value is
-    on the wrong side; one that is not a number is. `meaning` and `remedy` replace those of the
-    check where they are not empty.
+    `value` and `limit` are in the unit of the kind of finding; `failed` says whether the value is
+    on the wrong side; one that is not a number is. `facts` are what else the words show, and
+    `variant` which words they are.
     """
 
     value: float
-    threshold: float
+    limit: float
     failed: bool
-    fact: str
-    meaning: str = ""
-    remedy: str = ""
+    facts: Mapping[str, Fact] = {}
+    variant: str = ""
+    effect: Effect = UNKNOWN_EFFECT
+    p: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -161,75 +169,61 @@ class Check:
     Parameters
     ----------
     name : str
-        As `[diagnostics.levels]` names it; a check that is not named there casts doubt.
+        Of its kind of finding (`rigidimeter.core.findings.KINDS`).
     needs : tuple of str
         The channels without which there is nothing to look at.
     function : callable
         From a `Case` to a `Look`; None if there turns out to be nothing to look at.
-    meaning : str
-        What it means if the check fails.
-    remedy : str
-        What to do about it.
     of_fit : bool
         Whether the function looks at J, B and K; where not, it is called once for each epoch and
         not again for each method.
     harmless : callable
-        From a `Case` in which the check failed to the reason why this cannot move J, B or K of the
-        method used by more than their intervals; an empty text where it can. What is harmless is a
-        note with the reason in place of the meaning, unless `[diagnostics.levels]` sets another
-        level than the default.
+        From a `Case` in which the check failed to the variant of the words that says why this
+        cannot move J, B or K of the method used by more than their intervals, and the facts that
+        it shows; `HARMFUL` where it can. What is harmless is a note, unless
+        `[diagnostics.levels]` sets another level than the default.
+    effect : callable
+        From a `Case` in which the check failed to what that does to J, B and K, where the look
+        does not say it.
     """
 
     name: str
     needs: tuple[str, ...]
     function: Callable[[Case], Look | None]
-    meaning: str
-    remedy: str
     of_fit: bool = True
-    harmless: Callable[[Case, Look], str] = never
-
-    def level(self, settings: DiagnosticsSettings) -> Level:
-        """Return what a failure does."""
-        level: Level = getattr(settings.levels, self.name, "doubt")
-        return level
+    harmless: Callable[[Case, Look], Harmless] = never
+    effect: Callable[[Case], Effect] = unknown
 
     def looks(self, case: Case) -> Look | None:
         """Return what the check sees, or None where it lacks what it needs."""
         return self.function(case) if all(case.has(name) for name in self.needs) else None
 
-    def finding(self, look: Look, settings: DiagnosticsSettings, harmless: str = "") -> Finding:
-        """Return what was seen as a finding; a check that passed is a note without a remedy.
-
-        Parameters
-        ----------
-        look : Look
-        settings : DiagnosticsSettings
-        harmless : str
-            Why a failure does not move J, B or K; empty where it does.
-        """
-        if not look.failed:
-            return Finding(self.name, "note", look.value, look.threshold, look.fact, "")
-        level = self.level(settings)
-        if harmless and level == getattr(DEFAULT_LEVELS, self.name, "doubt"):
-            level = "note"
-        return Finding(
+    def finding(self, look: Look, case: Case) -> Finding:
+        """Return a failure as a finding."""
+        variant, why = self.harmless(case, look)
+        method = {} if case.method is None else {"method": case.method.name}
+        return found(
             self.name,
-            level,
+            case.settings,
             look.value,
-            look.threshold,
-            f"{look.fact}: {harmless or look.meaning or self.meaning}",
-            look.remedy or self.remedy,
+            look.limit,
+            p=look.p,
+            condition=case.epoch.condition,
+            effect=self.effect(case) if look.effect == UNKNOWN_EFFECT else look.effect,
+            facts={**look.facts, **why, **(method if variant == "instrument" else {})},
+            variant=look.variant,
+            harmless=variant,
         )
 
 
-def at_most(value: float, most: float, fact: str, meaning: str = "") -> Look:
-    """Return a look that fails above a threshold, or if the value is not a number."""
-    return Look(value, most, not value <= most, fact, meaning)
+def at_most(value: float, most: float, **facts: Fact) -> Look:
+    """Return a look that fails above a limit, or if the value is not a number."""
+    return Look(value, most, not value <= most, facts)
 
 
-def at_least(value: float, least: float, fact: str, meaning: str = "") -> Look:
-    """Return a look that fails below a threshold, or if the value is not a number."""
-    return Look(value, least, not value >= least, fact, meaning)
+def at_least(value: float, least: float, **facts: Fact) -> Look:
+    """Return a look that fails below a limit, or if the value is not a number."""
+    return Look(value, least, not value >= least, facts)
 
 
 def reconstructed_torque_nm(signals: Signals, parameters: Array) -> Array:

@@ -23,7 +23,6 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from rigidimeter.analysis.estimation.between_epochs import in_full
 from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look, at_least
 from rigidimeter.analysis.estimation.diagnostics.excitation_checks import perturbation_nm
 from rigidimeter.analysis.estimation.signals import (
@@ -57,12 +56,7 @@ def static_torque(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings)
     variance = float(np.var(torque))
     value = 100.0 * float(np.mean(steps**2)) / (2.0 * variance) if variance > 0 else math.nan
     least = settings.min_static_torque_percent
-    return at_least(
-        value,
-        least,
-        f"{in_full(value, limit=least)} % of the torque's variance is not a function of the angle "
-        f"(at least {least:g} %)",
-    )
+    return at_least(value, least)
 
 
 def _at(channel: Channel, time_s: Array) -> Array:
@@ -90,13 +84,7 @@ def computed_torque(epoch: Epoch, settings: DiagnosticsSettings) -> Look | None:
     value, least = 100.0 * shares[origin], settings.min_computed_torque_percent
     if not math.isfinite(value):
         return None
-    return at_least(
-        value,
-        least,
-        f"{in_full(value, limit=least)} % of the torque's SD is not a sum of samples of {origin} "
-        f"(at least {least:g} %)",
-        f"the torque was computed from {origin}, or simulated without noise",
-    )
+    return at_least(value, least, origin=origin)
 
 
 def _not_a_sum(epoch: Epoch, channels: Sequence[Channel]) -> float:
@@ -132,26 +120,8 @@ def _static_torque(case: Case) -> Look:
 
 
 COMPUTED_TORQUE_CHECKS = (
-    Check(
-        "computed_torque",
-        (),
-        lambda c: computed_torque(c.epoch, c.settings),
-        "the torque was not measured",
-        "record what the torque sensor measured; for a simulation set "
-        '[diagnostics.levels] computed_torque = "note"',
-        of_fit=False,
-    ),
+    Check("computed_torque", (), lambda c: computed_torque(c.epoch, c.settings), of_fit=False),
 )
 """Before those of the channels: a binary torque that was computed repeats its extremes too."""
 
-STATIC_TORQUE_CHECKS = (
-    Check(
-        "static_torque",
-        ("angle_rad",),
-        _static_torque,
-        "the torque was computed from the angle, as to compensate gravity, or the joint moved so "
-        "slowly that neither inertia nor damping is in it",
-        "record what the torque sensor measured; use a faster perturbation",
-        of_fit=False,
-    ),
-)
+STATIC_TORQUE_CHECKS = (Check("static_torque", ("angle_rad",), _static_torque, of_fit=False),)

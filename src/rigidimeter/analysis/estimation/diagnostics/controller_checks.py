@@ -15,10 +15,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.between_epochs import in_full
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
+    HARMFUL,
     Case,
     Check,
+    Harmless,
     Look,
     at_most,
     push_harmless,
@@ -34,11 +35,6 @@ from rigidimeter.core.settings import ControllerSettings, Settings
 from rigidimeter.core.units import per_rad_from_per_deg
 from rigidimeter.model import JointDynamics, Loop, spectral_radius
 
-REMEDY = (
-    "give the values that were used, per radian: --controller J_C B_C, or in the settings "
-    "[controller] inertia_kg_m2 and damping_nm_s_rad"
-)
-
 PER_DEGREE_WITHIN = 1.5
 """Values that are wrong by 57.3, within this factor, were given per degree."""
 
@@ -50,17 +46,16 @@ def controller_misfit(prepared: PreparedEpoch, loop: Loop) -> Look | None:
         return None
     value, factor = misfit
     most = prepared.settings.diagnostics.max_controller_misfit_percent
-    look = at_most(
-        value,
-        most,
-        (
-            f"from perturbation and torque the controller of the settings makes a velocity command "
-            f"that differs from the recorded one by {in_full(value, limit=most)} % (at most "
-            f"{most:g} %) and is {factor:.2g} times as large"
-        ),
-    )
+    look = at_most(value, most, factor=factor)
     shown = _controller_shown(prepared, loop) if look.failed else None
-    return look if shown is None else look._replace(remedy=_remedy(loop.controller, shown))
+    if shown is None:
+        return look
+    facts = {
+        "shown_inertia": shown.inertia_kg_m2,
+        "shown_damping": shown.damping_nm_s_rad,
+        **look.facts,
+    }
+    return look._replace(facts=facts, variant=_how_shown(loop.controller, shown))
 
 
 def controller_used(prepared: PreparedEpoch) -> Loop:
@@ -92,44 +87,28 @@ def unstable_loop(parameters: Array, loop: Loop) -> Look | None:
     settings = Settings().model_copy(update={"controller": loop.controller, "rig": loop.rig})
     radius = spectral_radius(settings, JointDynamics(*parameters.tolist()))
     value = float(np.log(max(radius, 1e-12))) * loop.rig.tick_rate_hz
-    return at_most(
-        value,
-        0.0,
-        f"with the controller of the settings and this joint the loop's slowest motion changes by "
-        f"a factor of e^({value:.2g}) a second (at most 1)",
-    )
+    return at_most(value, 0.0)
 
 
-def _remedy(given: ControllerSettings, shown: ControllerSettings) -> str:
-    """Return what to give in place of the controller of the settings."""
-    J, B = shown.inertia_kg_m2, shown.damping_nm_s_rad
+def _how_shown(given: ControllerSettings, shown: ControllerSettings) -> str:
+    """Return the variant that says how the settings differ from the controller that was used."""
     per_deg = per_rad_from_per_deg(1.0)
-    factors = np.array([J / given.inertia_kg_m2, B / max(given.damping_nm_s_rad, 1e-12)])
-    why = ""
-    for wrong, text in (
-        (per_deg, "; those of the settings are per degree, as it seems"),
-        (1.0 / per_deg, "; those of the settings were multiplied by 57.3, as it seems"),
-    ):
+    factors = np.array(
+        [
+            shown.inertia_kg_m2 / given.inertia_kg_m2,
+            shown.damping_nm_s_rad / max(given.damping_nm_s_rad, 1e-12),
+        ]
+    )
+    for wrong, variant in ((per_deg, "per_degree"), (1.0 / per_deg, "per_degree_twice")):
         if np.all(np.abs(np.log(factors / wrong)) < np.log(PER_DEGREE_WITHIN)):
-            why = text
-    return f"{REMEDY}; the recording shows {J:.3g} kg·m² and {B:.3g} N·m·s/rad{why}"
+            return variant
+    return "shown"
 
 
-def _harmless(case: Case, look: Look) -> str:
-    """Return why a wrong controller does not bias the estimate; empty where it does."""
-    if case.uses_perturbation and case.method is not None:
-        return f"{case.method.name} is less precise with it, not biased"
+def _harmless(case: Case, look: Look) -> Harmless:
+    """Return why a wrong controller does not bias the estimate; `HARMFUL` where it does."""
     # Of a loop that is not known the bias cannot be told.
-    return push_harmless(case, look) if look.remedy else ""
-
-
-def _loop_harmless(case: Case, look: Look) -> str:
-    if case.uses_perturbation and case.method is not None:
-        return (
-            f"{case.method.name} takes the motion that the perturbation would cause without "
-            "feedback, so it is less precise, not biased"
-        )
-    return push_harmless(case, look)
+    return push_harmless(case, look) if case.uses_perturbation or look.variant else HARMFUL
 
 
 CONTROLLER_CHECKS = (
@@ -137,8 +116,6 @@ CONTROLLER_CHECKS = (
         "controller_misfit",
         ("velocity_command_rad_s", "perturbation_nm"),
         lambda c: controller_misfit(c.prepared, c.loop) if c.prepared and c.loop else None,
-        "what is computed of the loop is that of another one",
-        REMEDY,
         of_fit=False,
         harmless=_harmless,
     ),
@@ -146,8 +123,6 @@ CONTROLLER_CHECKS = (
         "unstable_loop",
         ("perturbation_nm",),
         lambda c: unstable_loop(c.parameters, c.loop) if c.loop is not None else None,
-        "the joint or the controller was another one",
-        REMEDY,
-        harmless=_loop_harmless,
+        harmless=push_harmless,
     ),
 )

@@ -16,8 +16,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.diagnostics.check_record import half_widths
-from rigidimeter.core.records import Delay, Finding, Fit
+from rigidimeter.analysis.estimation.found import found, half_widths
+from rigidimeter.core.findings import Effect, Finding
+from rigidimeter.core.records import Delay, Fit
 from rigidimeter.core.settings import DiagnosticsSettings
 
 SIGNIFICANT = 3.0
@@ -39,27 +40,28 @@ def torque_delay(
         Which delay may be the drive's.
     settings : DiagnosticsSettings
     """
-    found = next((delay for delay in delays if delay.source == fit.source), None)
-    if found is None or found.corrected or not fit.n_samples:
+    delay = next((delay for delay in delays if delay.source == fit.source), None)
+    if delay is None or delay.corrected or not fit.n_samples:
         return ()
-    late_s = abs(found.delay_s)
-    if not late_s > of_drive_s + SIGNIFICANT * found.delay_s_se:
+    late_s = abs(delay.delay_s)
+    if not late_s > of_drive_s + SIGNIFICANT * delay.delay_s_se:
         return ()
-    moved = late_s * np.abs(fit.value[1:])
-    share = float(np.max(moved / half_widths(fit)[:2]))
+    _, B, K = fit.value
+    # Of a late torque J is B τ too low and B is K τ.
+    bias = np.array([-abs(B), -abs(K), 0.0]) * delay.delay_s
+    half = half_widths(fit)
+    share = float(np.max(np.abs(bias) / half))
     if share <= 1.0:
         return ()
-    late_ms, most_ms = 1e3 * found.delay_s, 1e3 * late_s / share
-    text = (
-        f"the torque is {late_ms:.3g} ms late against the motion (at most {most_ms:.2g} ms either "
-        f"way), which was not corrected: if it is a delay, J is about {moved[0]:.2g} kg·m² off and "
-        f"B {moved[1]:.2g} N·m·s/rad; if not, a reflex is in them, or torque that "
-        "something but the robot adds"
-    )
-    remedy = (
-        "record the perturbation, which tells the two apart; or take the delay out of the "
-        "recording if it is known"
-    )
+    late_ms, most_ms = 1e3 * delay.delay_s, 1e3 * late_s / share
     return (
-        Finding("torque_delay", settings.levels.torque_delay, abs(late_ms), most_ms, text, remedy),
+        found(
+            "torque_delay",
+            settings,
+            abs(late_ms),
+            most_ms,
+            condition=fit.condition,
+            effect=Effect.of(bias, fit.value, half),
+            facts={"late_ms": late_ms},
+        ),
     )

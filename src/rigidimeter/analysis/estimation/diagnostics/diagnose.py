@@ -26,11 +26,13 @@ from rigidimeter.analysis.estimation.diagnostics.motion_checks import MOTION_CHE
 from rigidimeter.analysis.estimation.diagnostics.movement_checks import MOVEMENT_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.tremor_check import TREMOR_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.varying_checks import VARYING_CHECKS
+from rigidimeter.analysis.estimation.found import in_half_intervals
 from rigidimeter.analysis.estimation.least_squares_bias import compensated
 from rigidimeter.analysis.estimation.methods import method_named
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array
-from rigidimeter.core.records import Finding, Fit, Outcome
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import Fit, Outcome
 from rigidimeter.core.units import rad_from_deg
 
 CHECKS: list[Check] = [
@@ -51,11 +53,9 @@ CHECKS: list[Check] = [
 
 
 def diagnose(
-    case: Case,
-    seen: Mapping[str, Look | None] | None = None,
-    checks: Sequence[Check] = CHECKS,
+    case: Case, seen: Mapping[str, Look | None] | None = None, checks: Sequence[Check] = CHECKS
 ) -> tuple[Finding, ...]:
-    """Run the checks for which there is something to look at; passed ones are among the findings.
+    """Return what the checks found for which there is something to look at.
 
     What several epochs show together is found by `together.checked_together` and, for
     `varying_between_epochs`, where they are fitted together.
@@ -68,13 +68,8 @@ def diagnose(
     checks : sequence of Check
     """
     seen = seen or {}
-    found = []
-    for check in checks:
-        look = seen[check.name] if check.name in seen else check.looks(case)
-        if look is not None:
-            reason = check.harmless(case, look) if look.failed else ""
-            found.append(check.finding(look, case.settings, reason))
-    return tuple(found)
+    looks = ((one, seen[one.name] if one.name in seen else one.looks(case)) for one in checks)
+    return tuple(one.finding(look, case) for one, look in looks if look is not None and look.failed)
 
 
 def checked(prepared: PreparedEpoch, fit: Fit, *, exclusions_alone: bool = False) -> Fit:
@@ -92,14 +87,14 @@ def checked(prepared: PreparedEpoch, fit: Fit, *, exclusions_alone: bool = False
     method = method_named(fit.method)
     by_loop = None if method.uses_perturbation else prepared.once(unbiased)
     case = replace(_case(prepared, fit.value), fit=fit, method=method, unbiased=by_loop)
-    checks = [c for c in CHECKS if not exclusions_alone or c.level(case.settings) == "exclude"]
+    levels = case.settings.levels
+    checks = [c for c in CHECKS if not exclusions_alone or levels.of(c.name) == "exclude"]
     findings = diagnose(case, prepared.once(_seen_without_fit), checks)
-    failed = [finding for finding in findings if finding.remedy]
-    grave = [finding for finding in failed if finding.level == "exclude"]
+    serious = [finding for finding in findings if finding.level == "exclude"]
     outcome = fit.outcome
-    if grave and outcome.included:
-        outcome = Outcome("excluded", f"{grave[0].text}; {grave[0].remedy}")
-    return replace(fit, outcome=outcome, findings=(*fit.findings, *failed))
+    if serious and outcome.included:
+        outcome = Outcome("excluded", f"{serious[0].headline}. {serious[0].remedy}".rstrip("."))
+    return in_half_intervals(replace(fit, outcome=outcome, findings=(*fit.findings, *findings)))
 
 
 def _case(prepared: PreparedEpoch, parameters: Array) -> Case:

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy import fft, signal
 
-from rigidimeter.analysis.estimation.between_epochs import in_full
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
     Check,
     Look,
     at_least,
     at_most,
+    push_effect,
     push_harmless,
 )
 from rigidimeter.analysis.estimation.power_lines import lines_inside, power_lines
@@ -45,27 +45,17 @@ def conditioning(signals: Signals, settings: DiagnosticsSettings) -> Look:
     """Return whether the regressors can be told apart, and if not which two and because of what."""
     solution, most = signals.solution, settings.max_condition_number
     if not np.all(solution.lengths > 0):
-        return Look(
-            math.inf,
-            most,
-            True,
-            f"the condition number of the motion is infinite (at most {most:g})",
-            "the joint did not move",
-        )
-    value = solution.condition_number
+        return Look(math.inf, most, True, variant="at_rest")
     # The weakest direction adds and subtracts what cannot be told apart.
     first, second = sorted(np.argsort(np.abs(solution.right[-1]))[-2:])
     low_hz, high_hz = _middle_hz(signals)
     return at_most(
-        value,
+        solution.condition_number,
         most,
-        f"the condition number of the motion is {in_full(value, '.3g', limit=most)} "
-        f"(at most {most:g})",
-        meaning=(
-            f"this epoch cannot distinguish {PARAMETERS[first].symbol} from "
-            f"{PARAMETERS[second].symbol}, because {MIDDLE_PERCENT:g} % of the velocity's power "
-            f"lies between {low_hz:.2g} and {high_hz:.2g} Hz"
-        ),
+        first=PARAMETERS[first].symbol,
+        second=PARAMETERS[second].symbol,
+        low_hz=low_hz,
+        high_hz=high_hz,
     )
 
 
@@ -78,19 +68,8 @@ def coherence(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> 
     shared = _coherence(cause, np.stack([signals.torque_nm, signals.velocity_rad_s]), signals)
     values = dict(zip(("torque", "velocity"), np.median(shared, axis=1).tolist(), strict=True))
     weaker = min(values, key=lambda name: values[name])
-    value, least = values[weaker], settings.min_coherence
-    return at_least(
-        value,
-        least,
-        (
-            f"the coherence of perturbation and {weaker} has a median of "
-            f"{in_full(value, '.2f', limit=least)} in the band (at least {least:g})"
-        ),
-        meaning=(
-            f"only {100 * value:.0f} % of the {weaker}'s power follows the perturbation; the rest "
-            "is torque that something but the robot adds, noise, or a joint that is not linear"
-        ),
-    )
+    value = values[weaker]
+    return at_least(value, settings.min_coherence, signal=weaker, percent=100.0 * value)
 
 
 def _coherence(cause: Array, effects: Array, signals: Signals) -> Array:
@@ -119,29 +98,16 @@ def band_share(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) ->
         "velocity": _share(velocity, signals.rate_hz, signals.band_hz),
     }
     weaker = min(shares, key=lambda name: shares[name])
-    value, least = 100.0 * shares[weaker], settings.min_band_share_percent
     low, high = signals.band_hz
-    return at_least(
-        value,
-        least,
-        (
-            f"{in_full(value, '.0f', limit=least)} % of the {weaker}'s power lies in the band, "
-            f"{low:g} to {high:.3g} Hz (at least {least:g} %)"
-        ),
-    )
+    value, least = 100.0 * shares[weaker], settings.min_band_share_percent
+    return at_least(value, least, signal=weaker, low_hz=low, high_hz=high)
 
 
 def imposed_sinusoid(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     """Return whether the motion is a single sinusoid, which no fit of three parameters can use."""
     shares, most = line_shares(epoch), settings.max_single_frequency_percent
-    value = 100.0 * shares.angle
-    return Look(
-        value,
-        most,
-        shares.single(most / 100.0),
-        f"the strongest line holds {in_full(value, '.0f', limit=most)} % of the angle's "
-        f"variance (at most {most:g} %) and {100 * shares.velocity:.0f} % of the velocity's",
-    )
+    facts = {"velocity": 100.0 * shares.velocity}
+    return Look(100.0 * shares.angle, most, shares.single(most / 100.0), facts)
 
 
 def perturbation_nm(channel: Channel, time_s: Array) -> Array:
@@ -175,43 +141,15 @@ def _middle_hz(signals: Signals) -> tuple[float, float]:
 
 
 EXCITATION_CHECKS = (
-    Check(
-        "conditioning",
-        (),
-        lambda c: conditioning(c.signals, c.settings),
-        "the motion cannot distinguish J, B and K",
-        "use a perturbation with more frequencies, or hold J at the median of other epochs",
-        of_fit=False,
-    ),
-    Check(
-        "imposed_sinusoid",
-        (),
-        lambda c: imposed_sinusoid(c.epoch, c.settings),
-        "the motion is a sinusoid, in which J and K are one number, K − J ω²",
-        "score it as an imposed sinusoid (--task sinusoid), or use a PRBS",
-        of_fit=False,
-    ),
-    Check(
-        "band_share",
-        (),
-        lambda c: band_share(c.epoch, c.signals, c.settings),
-        "most of what was measured is drift below or noise above what is fitted",
-        (
-            "look for drift of the sensor and for slow pushes; check the rate and the unit of the "
-            "time; set estimation.band_low_hz and band_high_hz to what was perturbed"
-        ),
-        of_fit=False,
-    ),
+    Check("conditioning", (), lambda c: conditioning(c.signals, c.settings), of_fit=False),
+    Check("imposed_sinusoid", (), lambda c: imposed_sinusoid(c.epoch, c.settings), of_fit=False),
+    Check("band_share", (), lambda c: band_share(c.epoch, c.signals, c.settings), of_fit=False),
     Check(
         "coherence",
         ("perturbation_nm",),
         lambda c: coherence(c.epoch, c.signals, c.settings),
-        (
-            "the rest is torque that something but the robot adds, noise, or a joint that is not "
-            "linear"
-        ),
-        "perturb more strongly, pool epochs by iv, or repeat while the robot alone moves it",
         of_fit=False,
         harmless=push_harmless,
+        effect=push_effect,
     ),
 )

@@ -14,19 +14,22 @@ from scipy import fft
 from scipy.special import digamma
 
 from rigidimeter.analysis.estimation.bandlimited import zero_phase_band
-from rigidimeter.analysis.estimation.between_epochs import in_full
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
+    HARMFUL,
     Case,
     Check,
+    Harmless,
     Look,
     at_least,
+    at_most,
+    push_effect,
     push_harmless,
 )
 from rigidimeter.analysis.estimation.diagnostics.excitation_checks import perturbation_nm
 from rigidimeter.analysis.estimation.power_lines import lines_inside, power_lines
 from rigidimeter.analysis.estimation.signals import Array, Signals
 from rigidimeter.analysis.estimation.terms.explained import explained
-from rigidimeter.core.records import Epoch
+from rigidimeter.core.records import PARAMETERS, Epoch
 from rigidimeter.core.settings import DiagnosticsSettings
 from rigidimeter.core.units import rad_from_deg
 
@@ -48,12 +51,7 @@ def residual_whiteness(residual_nm: Array, signals: Signals, settings: Diagnosti
     if np.all(means > 0):
         made_up = math.log(LINES_TOGETHER) - float(digamma(LINES_TOGETHER))
         value = min(float(np.exp(np.mean(np.log(means)) + made_up) / np.mean(means)), 1.0)
-    return at_least(
-        value,
-        least,
-        f"the residual's spectral flatness in the band is "
-        f"{in_full(value, '.2f', limit=least)} (at least {least:g})",
-    )
+    return at_least(value, least)
 
 
 def residual_perturbation(
@@ -83,16 +81,8 @@ def residual_perturbation(
     sd = float(np.std(signals.torque_nm))
     value = 100.0 * r * float(np.std(residual)) / sd if sd > 0 else math.nan
     most = settings.max_residual_perturbation_percent
-    return Look(
-        value,
-        most,
-        not (value <= most or r <= chance),
-        (
-            f"what is left over follows the perturbation by {in_full(value, limit=most)} % of the "
-            f"torque's SD (at most {most:g} %; correlation {r:.2f} at a lag of {delay_s:.2g} s, "
-            f"by chance up to {chance:.2f})"
-        ),
-    )
+    facts = {"correlation": r, "lag_s": delay_s, "chance": chance}
+    return Look(value, most, not (value <= most or r <= chance), facts)
 
 
 def _chance_correlation(a: Array, b: Array, rate_hz: float, lag: int) -> float:
@@ -124,20 +114,12 @@ def held_out_vaf(signals: Signals, settings: DiagnosticsSettings) -> Look:
     left = torque[half:] - signals.motion[half:] @ explained(upper[:, :-1], upper[:, -1]).values
     variance, least = float(np.var(torque[half:])), settings.min_held_out_vaf_percent
     value = 100.0 * (1.0 - float(np.var(left)) / variance) if variance > 0 else math.nan
-    return at_least(
-        value,
-        least,
-        (
-            f"the first half's J, B and K explain {in_full(value, '.1f', limit=least)} % of the "
-            f"second half's torque (at least {least:g} %)"
-        ),
-    )
+    return at_least(value, least)
 
 
 def r_squared(value: float, settings: DiagnosticsSettings) -> Look:
     """Return the share of the torque that J, B and K explain."""
-    least = settings.min_r_squared
-    return at_least(value, least, f"R² is {in_full(value, limit=least)} (at least {least:g})")
+    return at_least(value, settings.min_r_squared)
 
 
 def negative_parameters(parameters: Array, high: Array | None = None) -> Look:
@@ -146,17 +128,10 @@ def negative_parameters(parameters: Array, high: Array | None = None) -> Look:
     `high` are the upper ends of their intervals: a sign that noise may have made says nothing.
     """
     wrong = [name for name, value in zip("JBK", parameters, strict=True) if not value > 0]
-    if not wrong:
-        return Look(0.0, 0.0, False, "J, B and K are above zero")
-    verb = "is" if len(wrong) == 1 else "are"
-    fact = f"{' and '.join(wrong)} {verb} not above zero (0 of 3 may be)"
-    if len(wrong) < len(parameters):
-        return Look(float(len(wrong)), 0.0, True, fact)
-    if high is not None and np.any(np.asarray(high) > 0):
-        meaning = "not all of their intervals lie below zero, so the torque says little of a joint"
-        return Look(float(len(wrong)), 0.0, True, fact, meaning, "check which column is the torque")
-    meaning = "the torque has the sign of the joint's reaction"
-    return Look(float(len(wrong)), 0.0, True, fact, meaning, "say --reaction")
+    variant = ""
+    if len(wrong) == len(parameters):
+        variant = "noise" if high is not None and np.any(np.asarray(high) > 0) else "reaction"
+    return Look(float(len(wrong)), 0.0, bool(wrong), {"names": " and ".join(wrong)}, variant)
 
 
 def implausible_parameters(parameters: Array, settings: DiagnosticsSettings) -> Look:
@@ -164,26 +139,23 @@ def implausible_parameters(parameters: Array, settings: DiagnosticsSettings) -> 
 
     Only sizes are looked at; signs are another check's business.
     """
-    J, B, K = parameters
-    least = settings.min_inertia_kg_m2
-    factors = {
-        f"J = {J:.3g} kg·m² is large": abs(J) / settings.max_inertia_kg_m2,
-        f"J = {J:.3g} kg·m² is small": least / abs(J) if J != 0 else math.inf,
-        f"B = {B:.3g} N·m·s/rad is large": abs(B) / settings.max_damping_nm_s_rad,
-        f"K = {K:.3g} N·m/rad is large": abs(K) / settings.max_stiffness_nm_rad,
-    }
-    worst = max(factors, key=lambda text: factors[text])
-    value = factors[worst]
-    failed = not value <= 1.0
-    return Look(
-        value,
+    J = abs(parameters[0])
+    most = (
+        settings.max_inertia_kg_m2,
+        settings.max_damping_nm_s_rad,
+        settings.max_stiffness_nm_rad,
+    )
+    factors = {(i, "large"): abs(parameters[i]) / most[i] for i in range(3)}
+    factors[0, "small"] = settings.min_inertia_kg_m2 / J if J else math.inf
+    worst, side = max(factors, key=lambda one: factors[one])
+    about, size = PARAMETERS[worst], float(parameters[worst])
+    return at_most(
+        float(factors[worst, side]),
         1.0,
-        failed,
-        (
-            f"{worst}, {value:.3g} times the end of its range (at most 1)"
-            if failed
-            else "J, B and K are within the ranges of joints"
-        ),
+        symbol=about.symbol,
+        size=size,
+        size_unit=about.unit,
+        side=side,
     )
 
 
@@ -199,33 +171,22 @@ def gravity(
         return None
     hanging_rad = rad_from_deg(settings.gravity_angle_deg)
     slope = settings.gravity_nm * float(np.mean(np.cos(hanging_rad + angle_rad)))
-    without = stiffness_nm_rad - slope
-    return Look(
-        without,
-        stiffness_nm_rad,
-        True,
-        f"K of {stiffness_nm_rad:.4g} N·m/rad includes {slope:.4g} of the weight (m g l "
-        f"cos θ); without it K is {without:.4g}",
-    )
+    facts = {"stiffness": stiffness_nm_rad, "slope": slope}
+    return Look(stiffness_nm_rad - slope, math.nan, True, facts)
 
 
-def _of_least_squares(case: Case, look: Look) -> str:
+def _of_least_squares(case: Case, look: Look) -> Harmless:
     """Return why little of the torque does not bias an instrument; least squares it may."""
-    return push_harmless(case, look) if case.uses_perturbation else ""
+    return push_harmless(case, look) if case.uses_perturbation else HARMFUL
 
 
-def _by_chance(case: Case, look: Look) -> str:
-    """Return why a single epoch is no proof; empty where torque of the subject biases the estimate.
+def _by_chance(case: Case, look: Look) -> Harmless:
+    """Return why a single epoch is no proof, unless torque of the subject biases the estimate.
 
     What the perturbation causes beyond J, B and K biases every method, so nothing is claimed of
     them.
     """
-    if not push_harmless(case, look):
-        return ""
-    return (
-        "the model lacks something that the perturbation causes, unless this is the one epoch in "
-        "20 that passes the limit by chance; lack_of_fit tests all epochs together"
-    )
+    return HARMFUL if push_harmless(case, look) == HARMFUL else ("chance", {})
 
 
 RESIDUAL_CHECKS = (
@@ -233,33 +194,22 @@ RESIDUAL_CHECKS = (
         "residual_whiteness",
         (),
         lambda c: residual_whiteness(-c.voluntary_nm, c.signals, c.settings),
-        (
-            "the residual is coloured, by torque that something but the robot adds or by what the "
-            "model lacks, and standard errors for white noise are too small"
-        ),
-        "use the intervals for coloured residuals; see the residual's spectrum",
         harmless=push_harmless,
+        effect=push_effect,
     ),
     Check(
         "residual_perturbation",
         ("perturbation_nm",),
         lambda c: residual_perturbation(c.epoch, -c.voluntary_nm, c.signals, c.settings),
-        "the model lacks something that the perturbation causes",
-        (
-            "look for a delay between torque and motion, for a reflex, for stiffness that changes "
-            "with the angle; torque that something but the robot adds biases least squares in this "
-            "way too"
-        ),
         harmless=_by_chance,
     ),
     Check(
         "held_out_vaf",
         (),
         lambda c: held_out_vaf(c.signals, c.settings),
-        "the fit does not foresee torque that it has not seen",
-        "look for torque from elsewhere than the robot, and for a change during the epoch",
         of_fit=False,
         harmless=push_harmless,
+        effect=push_effect,
     ),
 )
 
@@ -268,36 +218,17 @@ PARAMETER_CHECKS = (
         "gravity",
         ("angle_rad",),
         lambda c: gravity(c.epoch.channels["angle_rad"].values, c.parameters[2], c.settings),
-        "the weight is no stiffness of the joint itself",
-        "state which of the two is given",
     ),
     Check(
         "r_squared",
         (),
         lambda c: r_squared(c.fit.r_squared, c.settings) if c.fit is not None else None,
-        "most of the torque is not J, B and K, and least squares puts a part of it into them",
-        "look for torque from elsewhere than the robot; record the perturbation and use iv",
         harmless=_of_least_squares,
     ),
     Check(
         "negative_parameters",
         (),
         lambda c: negative_parameters(c.parameters, None if c.fit is None else c.fit.high),
-        (
-            "something but the robot may have pushed, or the channels are delayed relative to each "
-            "other"
-        ),
-        "check the stamps of torque and motion, and see the torque beyond J, B and K",
     ),
-    Check(
-        "implausible_parameters",
-        (),
-        lambda c: implausible_parameters(c.parameters, c.settings),
-        "a joint of a person or an animal is not like that; a machine's axis may be",
-        (
-            "check the units of torque (N·m) and angle (rad, not degrees) and the time (s); for an "
-            "axis that is so, set the ends of the ranges: min_inertia_kg_m2, max_inertia_kg_m2, "
-            "max_damping_nm_s_rad and max_stiffness_nm_rad in [diagnostics]"
-        ),
-    ),
+    Check("implausible_parameters", (), lambda c: implausible_parameters(c.parameters, c.settings)),
 )

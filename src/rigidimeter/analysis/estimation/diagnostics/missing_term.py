@@ -8,17 +8,17 @@ found in `omitted_bias`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy import fft
 
-from rigidimeter.analysis.estimation.between_epochs import in_full
-from rigidimeter.analysis.estimation.closedloop.between_finding import REMEDY
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
+    HARMFUL,
     Case,
     Check,
+    Harmless,
     Look,
 )
 from rigidimeter.analysis.estimation.diagnostics.omitted_bias import moved, moved_by_linear
@@ -28,15 +28,16 @@ from rigidimeter.analysis.estimation.stretches import longest_part
 from rigidimeter.analysis.estimation.terms.beyond_linear import BeyondLinear, beyond_linear
 from rigidimeter.analysis.estimation.terms.catalogue import REFLEXES, term_named
 from rigidimeter.analysis.estimation.terms.linear_misfit import LinearTerm, linear_term
-from rigidimeter.analysis.estimation.terms.omitted_terms import CHANCE, OmittedTerm, omitted_terms
+from rigidimeter.analysis.estimation.terms.omitted_terms import OmittedTerm, omitted_terms
 from rigidimeter.analysis.estimation.terms.wideband import wideband_signals
+from rigidimeter.core.findings import Effect, Fact
 from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE
 
 WORDS = {
     "coulomb": ("friction", "coulomb"),
-    "damping+": ("damping that differs between the directions", "directional-damping"),
+    "damping+": ("directional damping", "directional-damping"),
     "cubic": ("cubic stiffness", "cubic"),
-    "quadratic": ("stiffness that differs between the sides", "quadratic"),
+    "quadratic": ("one-sided stiffness", "quadratic"),
     **{
         f"{kind}{side}": ("reflex", f"{kind}{side}")
         for kind in ("reflex", "reflex-second-order")
@@ -45,6 +46,8 @@ WORDS = {
 }
 """What a term is called, and what `rigidimeter model --terms` calls it."""
 
+MOST_PERCENT = 100.0
+"""Of half the intervals: what is within them is in what they say."""
 
 LITTLE = 0.02
 """A friction below this share of the torque's SD may be one of the drive: in simulated recordings a
@@ -90,33 +93,26 @@ def missing_term(case: Case) -> Look | None:
     if found.linear is not None:
         return _linear(case, found.beyond, found.linear)
     if not found.terms:
-        return Look(0.0, 100.0, False, "no further term is in the torque")
+        return Look(0.0, MOST_PERCENT, False)
     *alone, added = moved(case, found.beyond, [*((term,) for term in found.terms), found.terms])
-    value = _share_percent(case, added)
-    named = "; ".join(_text(*one, case) for one in zip(found.terms, alone, strict=True))
-    together = f"; all of them change {_changes(case, added)}" if len(found.terms) > 1 else ""
     asked = ",".join(["inertia", "damping", "stiffness", *(WORDS[t.name][1] for t in found.terms)])
     # The whole damping and its two halves are one too many.
     asked = asked.replace("damping,", "", 1) if "directional-damping" in asked else asked
-    return Look(
-        value,
-        100.0,
-        True,
-        f"{named}{together}, {in_full(value, '.3g', limit=100.0)} % of half their intervals "
-        "(at most 100 %)",
-        meaning=_of_drive(case, found.terms),
-        remedy=f"include it: rigidimeter model --terms {asked}",
-    )
-
-
-def _of_drive(case: Case, terms: Sequence[OmittedTerm]) -> str:
-    """Say that a friction is so small that it may be the drive's; else return an empty text."""
-    if not _little_friction(case, terms):
-        return ""
-    return (
-        f"J, B and K take it for their own; or, since it is below {100 * LITTLE:g} % of the "
-        "torque's SD, it is friction of the drive, and including it does not make them better"
-    )
+    facts: dict[str, Fact] = {
+        "terms": _and(WORDS[term.name][0] for term in found.terms),
+        "sizes": _and(map(_size, found.terms)),
+        "asked": asked,
+    }
+    variants = ""
+    if len(found.terms) > 1:
+        variants = "several"
+        for term, (by_fit, *_) in zip(found.terms, alone, strict=True):
+            percent = 100 * by_fit / np.abs(case.parameters)
+            for symbol, one in zip("JBK", percent.tolist(), strict=True):
+                facts[f"{symbol}_percent_of_{term.name}"] = one
+    if _little_friction(case, found.terms):
+        variants = "of_drive"
+    return _look(case, added, max(term.p for term in found.terms), facts, variants)
 
 
 def _little_friction(case: Case, terms: Sequence[OmittedTerm]) -> bool:
@@ -132,43 +128,30 @@ def friction_of_drive(case: Case) -> Look | None:
     known = case.uses_perturbation or "velocity_command_rad_s" in case.epoch.channels
     said = case.fit is not None and any(f.name == "between_samples" for f in case.fit.findings)
     look = None if known or said else case.once(missing_term)
-    if look is None or case.prepared is None or not look.value > look.threshold:
+    if look is None or case.prepared is None or not look.value > look.limit:
         return None
     if not _little_friction(case, case.prepared.once(_Found).terms):
         return None
     most = case.settings.max_between_samples_percent
-    return Look(
-        np.nan,
-        most,
-        True,
-        f"the torque holds a friction below {100 * LITTLE:g} % of its SD, as friction of the drive "
-        "leaves there, and without the command it is not known how the drive moved between the "
-        "samples",
-    )
+    return Look(np.nan, most, True, {"little": 100 * LITTLE}, "friction")
 
 
 def _linear(case: Case, beyond: BeyondLinear, term: LinearTerm) -> Look:
-    added = moved_by_linear(case, beyond, term)
+    facts: dict[str, Fact] = {"size": term.value, "share": 100 * term.share}
+    if term.name != "coupling":
+        facts |= {"terms": "a reflex", "late_ms": 1e3 * term.delay_s}
+        facts["asked"] = "inertia,damping,stiffness,reflex+,reflex-"
+    variant = "coupling" if term.name == "coupling" else "reflex"
+    return _look(case, moved_by_linear(case, beyond, term), term.p, facts, variant)
+
+
+def _look(case: Case, added: Array, p: float, facts: Mapping[str, Fact], variant: str) -> Look:
+    """Return a look for what terms add to J, B and K while left out, shape (1 or 2, 3)."""
     value = _share_percent(case, added)
-    if term.name == "coupling":
-        what = f"coupling: between sensor and joint something gives, with {term.value:.3g} N·m/rad"
-        remedy = "make the coupling stiffer, or lower the upper edge of the band (--band-hz)"
-    else:
-        what = (
-            f"reflex: the torque holds a reflex of both directions of {term.value:.3g} N·m·s/rad "
-            f"{1e3 * term.delay_s:.0f} ms late"
-        )
-        remedy = "include it: rigidimeter model --terms inertia,damping,stiffness,reflex+,reflex-"
-    return Look(
-        value,
-        100.0,
-        True,
-        f"{what} (it explains {100 * term.share:.0f} % of what J, B and K leave to a linear "
-        f"filter; p = {term.p:.1g}, below {CHANCE:g}); included, it changes "
-        f"{_changes(case, added)}, {in_full(value, '.3g', limit=100.0)} % of half their intervals "
-        "(at most 100 %)",
-        remedy=remedy,
-    )
+    by_fit, *beside = (Effect.of(row, case.parameters, case.half_widths) for row in added)
+    # In a loop the fit with the terms may be biased: it is not enough to call them harmless.
+    effect = beside[0] if by_fit.negligible and beside else by_fit
+    return Look(value, MOST_PERCENT, True, facts, variant, effect, p)
 
 
 def _share_percent(case: Case, added: Array) -> float:
@@ -176,53 +159,24 @@ def _share_percent(case: Case, added: Array) -> float:
     return 100.0 * float(np.max(largest))
 
 
-def _text(term: OmittedTerm, moved: Array, case: Case) -> str:
-    words, _ = WORDS[term.name]
+def _and(words: Iterable[str]) -> str:
+    return " and ".join(words)
+
+
+def _size(term: OmittedTerm) -> str:
+    """Return a term with its coefficient."""
     plain = term_named(term.name)
     unit = "N·m·s/rad" if plain is None else plain.unit
     late = f" {1e3 * term.inner[0]:.0f} ms late" if term.name in REFLEXES else ""
-    return (
-        f"{term.name}: the torque holds a {words} of {term.value:.3g} ± "
-        f"{term.standard_error:.2g} {unit}{late} (p = {term.p:.1g}, below {CHANCE:g}); included, "
-        f"it changes {_changes(case, moved)}"
-    )
+    return f"{WORDS[term.name][0]} {term.value:.3g} ± {term.standard_error:.2g} {unit}{late}"
 
 
-def _changes(case: Case, moved: Array) -> str:
-    found = []
-    for row in moved:
-        shares = -100 * row / np.abs(case.parameters)
-        each = (
-            f"{name} by {in_full(share, '+.2g')} %"
-            for name, share in zip("JBK", shares, strict=True)
-        )
-        found.append(", ".join(each))
-    if len(found) == 1:
-        return found[0]
-    return f"{found[0]} (its part that is not linear alone: {found[1]})"
-
-
-def _harmless(case: Case, look: Look) -> str:
+def _within(case: Case, look: Look) -> Harmless:
     del case
-    if look.value > look.threshold:
-        return ""
-    return "it moves J, B and K by less than half their intervals"
+    return HARMFUL if look.value > look.limit else ("within", {})
 
 
 MISSING_TERM_CHECKS = (
-    Check(
-        "missing_term",
-        (),
-        lambda c: c.once(missing_term),
-        "J, B and K take it for their own",
-        "include it: rigidimeter model",
-        harmless=_harmless,
-    ),
-    Check(
-        "between_samples",
-        (),
-        friction_of_drive,
-        "J may be some percent too small",
-        f"record the command; or {REMEDY}",
-    ),
+    Check("missing_term", (), lambda c: c.once(missing_term), harmless=_within),
+    Check("between_samples", (), friction_of_drive),
 )

@@ -16,20 +16,13 @@ from the angle alone and from the velocity alone; the torque says which of them 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from rigidimeter.analysis.estimation.bandlimited import bandlimited_signals, zero_phase_band
-from rigidimeter.analysis.estimation.between_epochs import in_full
-from rigidimeter.analysis.estimation.diagnostics.check_record import (
-    Case,
-    Check,
-    Look,
-    at_most,
-)
+from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look, at_most
 from rigidimeter.analysis.estimation.least_squares import fit_inertia_damping_stiffness
 from rigidimeter.analysis.estimation.signals import (
     Array,
@@ -85,28 +78,15 @@ def velocity_fit(epoch: Epoch) -> tuple[float, float]:
 
 def velocity_scale(fitted: tuple[float, float], settings: DiagnosticsSettings) -> Look:
     """Return by how much the velocity's scale is off, in %."""
-    value, most = 100.0 * abs(fitted[0] - 1.0), settings.max_velocity_scale_percent
-    end = 1.0 + math.copysign(most / 100.0, fitted[0] - 1.0)
-    return at_most(
-        value,
-        most,
-        (
-            f"angle_rad changes {in_full(fitted[0], '.3g', limit=end)} times as much as "
-            f"velocity_rad_s says (within {most:g} % of 1)"
-        ),
-    )
+    value = 100.0 * abs(fitted[0] - 1.0)
+    return at_most(value, settings.max_velocity_scale_percent, scale=fitted[0])
 
 
 def velocity_delay(fitted: tuple[float, float], settings: DiagnosticsSettings) -> Look:
     """Return how late the velocity is against the angle, in ms; negative where it is early."""
     scale, delay_s = fitted
     value, most = 1e3 * delay_s / scale, settings.max_velocity_delay_ms
-    return Look(
-        value,
-        most,
-        not abs(value) <= most,
-        f"velocity_rad_s lags angle_rad by {in_full(value, limit=most)} ms (at most {most:g} ms)",
-    )
+    return Look(value, most, not abs(value) <= most)
 
 
 def velocity_shape(
@@ -140,38 +120,19 @@ def velocity_shape(
     solution = np.linalg.lstsq(regressors, derived, rcond=None)[0]
     value = 100.0 * float(np.linalg.norm(derived - regressors @ solution)) / size
     most = settings.max_velocity_shape_percent
-    fact = (
-        f"from {band[0]:g} to {band[1]:.3g} Hz velocity_rad_s and the derivative of angle_rad "
-        f"differ in shape by {in_full(value, limit=most)} % of its rms (at most {most:g} %)"
-    )
     if value <= most:
-        return Look(value, most, False, fact)
-    return Look(value, most, True, fact, *_better(epoch, band_hz))
-
-
-def _better(epoch: Epoch, band_hz: tuple[float, float]) -> tuple[str, str]:
-    """Return which of angle and velocity the torque fits, and what to do."""
+        return Look(value, most, False)
     by_angle = _r_squared(epoch, band_hz, "velocity_rad_s")
     by_velocity = _r_squared(epoch, band_hz, "angle_rad")
-    both = (
-        f"R² of the torque is {by_angle:.4g} with the motion from angle_rad alone and "
-        f"{by_velocity:.4g} with that from velocity_rad_s alone"
-    )
+    facts = {
+        "low_hz": band[0],
+        "high_hz": band[1],
+        "by_angle": by_angle,
+        "by_velocity": by_velocity,
+    }
     less, more = sorted((1.0 - by_angle, 1.0 - by_velocity))
-    if not more > CLEARLY * less:
-        return (
-            f"{both}, which does not say which of them is wrong; J, B and K may be",
-            "look at both channels; compare the estimates without the one and without the other",
-        )
-    if by_angle > by_velocity:
-        return (
-            f"{both}, so the velocity is wrong, and J and B are made from it",
-            "leave velocity_rad_s out: it is made from the angle then",
-        )
-    return (
-        f"{both}, so the angle is wrong, and K is made from it",
-        "leave angle_rad out: it is made from the velocity then",
-    )
+    worse = "velocity" if by_angle > by_velocity else "angle"
+    return Look(value, most, True, facts, worse if more > CLEARLY * less else "")
 
 
 def _r_squared(epoch: Epoch, band_hz: tuple[float, float], without: str) -> float:
@@ -204,24 +165,18 @@ MOTION_CHECKS = (
         "velocity_scale",
         ("angle_rad", "velocity_rad_s"),
         lambda c: _velocity(c, velocity_scale),
-        "one of them is in another unit, has another sign, or is another joint's",
-        "check the units and signs of both channels",
         of_fit=False,
     ),
     Check(
         "velocity_delay",
         ("angle_rad", "velocity_rad_s"),
         lambda c: _velocity(c, velocity_delay),
-        "a filter or a buffer moved one of them, and B and K take each other's part",
-        "correct the stamps, or leave velocity_rad_s out: it is made from the angle then",
         of_fit=False,
     ),
     Check(
         "velocity_shape",
         ("angle_rad", "velocity_rad_s"),
         lambda c: velocity_shape(c.epoch, c.signals.band_hz, c.settings),
-        "they are not the motion of one joint",
-        "look at both channels",
         of_fit=False,
     ),
 )

@@ -14,25 +14,24 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from rigidimeter.analysis.estimation.bandlimited import zero_phase_band
-from rigidimeter.analysis.estimation.between_epochs import in_full
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
     Case,
     Check,
     Look,
     at_most,
-    half_widths,
+    push_effect,
     push_harmless,
 )
+from rigidimeter.analysis.estimation.found import half_widths
 from rigidimeter.analysis.estimation.power_lines import lines_inside, power_lines
 from rigidimeter.analysis.estimation.signals import Array, Signals
+from rigidimeter.core.findings import Effect
 from rigidimeter.core.records import Channel, Fit
 from rigidimeter.core.settings import DiagnosticsSettings
 
 WINDOW_S = 1.0
 BASELINE_QUANTILE = 0.2
 """The quietest fifth of the envelope is rest: its upper end is the baseline."""
-
-_SHOWN = 5
 
 
 def voluntary_torque(voluntary_nm: Array, signals: Signals, settings: DiagnosticsSettings) -> Look:
@@ -43,15 +42,8 @@ def voluntary_torque(voluntary_nm: Array, signals: Signals, settings: Diagnostic
     total = float(np.var(signals.torque_nm))
     value = 100.0 * power / total if total > 0 else float("nan")
     most = settings.max_voluntary_share_percent
-    return at_most(
-        value,
-        most,
-        (
-            f"the torque beyond J, B and K has an SD of {np.std(voluntary_nm):.3g} N·m; its power "
-            f"from {low:g} to {high:g} Hz, {power:.2g} N²m², is {in_full(value, limit=most)} % of "
-            f"the torque's variance (at most {most:g} %)"
-        ),
-    )
+    sd_nm = float(np.std(voluntary_nm))
+    return at_most(value, most, sd_nm=sd_nm, low_hz=low, high_hz=high)
 
 
 def active_seconds(
@@ -86,18 +78,8 @@ def active_movement(voluntary_nm: Array, signals: Signals, settings: Diagnostics
     above_nm = max(settings.active_torque_nm, share * float(np.std(signals.torque_nm)))
     active = sd_nm > above_nm
     value = 100.0 * float(np.mean(active)) if active.size else float("nan")
-    most = settings.max_active_percent
-    when = ", ".join(f"{second:.1f} s" for second in start_s[active][:_SHOWN])
-    more = " and later" if np.count_nonzero(active) > _SHOWN else ""
-    return at_most(
-        value,
-        most,
-        (
-            f"the torque beyond J, B and K passes {above_nm:.2g} N·m in "
-            f"{in_full(value, '.0f', limit=most)} % of the seconds (at most {most:g} %)"
-            + (f", from {when}{more}" if when else "")
-        ),
-    )
+    first_s = float(start_s[active][0]) if np.any(active) else float("nan")
+    return at_most(value, settings.max_active_percent, above_nm=above_nm, first_s=first_s)
 
 
 def loop_bias(fit: Fit, unbiased: Array, settings: DiagnosticsSettings) -> Look:
@@ -106,19 +88,9 @@ def loop_bias(fit: Fit, unbiased: Array, settings: DiagnosticsSettings) -> Look:
     value = 100.0 * float(np.max(np.abs(bias) / half_widths(fit)))
     most = settings.max_loop_bias_percent
     if not np.isfinite(value):
-        return at_most(value, most, "no J, B and K go with this torque in this loop")
-    shares = 100.0 * bias / np.abs(fit.value)
-    of_each = ", ".join(
-        f"{name} by {in_full(share, '+.2g')} %" for name, share in zip("JBK", shares, strict=True)
-    )
-    return at_most(
-        value,
-        most,
-        (
-            f"torque beyond J, B and K, which the loop turns into motion, moves {of_each}, at most "
-            f"{in_full(value, limit=most)} % of half their intervals (at most {most:g} %)"
-        ),
-    )
+        return Look(value, most, True, variant="unknown")
+    effect = Effect.of(bias, fit.value, half_widths(fit))
+    return Look(value, most, not value <= most, effect=effect)
 
 
 def _loop_bias(case: Case) -> Look | None:
@@ -143,50 +115,31 @@ def emg_activity(emg: Channel, settings: DiagnosticsSettings) -> Look:
     baseline = float(np.quantile(envelope, BASELINE_QUANTILE))
     factor, most = settings.emg_baseline_factor, settings.max_emg_active_percent
     value = 100.0 * float(np.mean(envelope > factor * baseline))
-    return at_most(
-        value,
-        most,
-        (
-            f"the EMG stands above {factor:g} times its baseline of {1e6 * baseline:.3g} µV in "
-            f"{in_full(value, '.0f', limit=most)} % of the time (at most {most:g} %)"
-        ),
-    )
+    return at_most(value, most, factor=factor, baseline_uv=1e6 * baseline)
 
 
 MOVEMENT_CHECKS = (
-    Check(
-        "loop_bias",
-        (),
-        _loop_bias,
-        "least squares takes it for the joint, and the intervals do not include that",
-        "record the perturbation and use iv; or repeat while the robot alone moves it",
-    ),
+    Check("loop_bias", (), _loop_bias),
     Check(
         "voluntary_torque",
         (),
         lambda c: voluntary_torque(c.voluntary_nm, c.signals, c.settings),
-        (
-            "least squares takes part of it for the joint, J and B come out low in the loop; iv "
-            "does not, and is less precise"
-        ),
-        "record the perturbation, use iv and pool epochs, or leave the epoch out",
         harmless=push_harmless,
+        effect=push_effect,
     ),
     Check(
         "active_movement",
         (),
         lambda c: active_movement(c.voluntary_nm, c.signals, c.settings),
-        "something other than the robot moved it, and what was measured was not at rest",
-        "repeat while the robot alone moves it, or leave these seconds out",
         harmless=push_harmless,
+        effect=push_effect,
     ),
     Check(
         "emg_activity",
         ("emg_v",),
         lambda c: emg_activity(c.epoch.channels["emg_v"], c.settings),
-        "the muscle was active",
-        "ask the subject to relax and repeat, or leave the active part out",
         of_fit=False,
         harmless=push_harmless,
+        effect=push_effect,
     ),
 )

@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.between_epochs import in_full
 from rigidimeter.analysis.estimation.closedloop.band_sensitivity import (
     BandChange,
     Member,
@@ -37,13 +36,15 @@ from rigidimeter.analysis.estimation.closedloop.observation import (
 )
 from rigidimeter.analysis.estimation.closedloop.spectral_lines import Complex
 from rigidimeter.analysis.estimation.diagnostics.band_check import band_estimates, band_finding
-from rigidimeter.analysis.estimation.diagnostics.diagnose import CHECKS, unbiased
+from rigidimeter.analysis.estimation.diagnostics.diagnose import unbiased
 from rigidimeter.analysis.estimation.diagnostics.movement_checks import loop_bias
+from rigidimeter.analysis.estimation.found import found, in_half_intervals
 from rigidimeter.analysis.estimation.method_record import Method
 from rigidimeter.analysis.estimation.methods import method_named
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array
-from rigidimeter.core.records import BandEstimate, Finding, Fit
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import BandEstimate, Fit
 from rigidimeter.core.settings import DiagnosticsSettings
 
 CHANCE = 1e-4
@@ -83,10 +84,7 @@ class Observed(NamedTuple):
 
 
 def checked_together(
-    prepared: Sequence[PreparedEpoch],
-    fits: Sequence[Fit],
-    pooled: Sequence[Fit],
-    estimator: Method,
+    prepared: Sequence[PreparedEpoch], fits: Sequence[Fit], pooled: Sequence[Fit], estimator: Method
 ) -> Together:
     """Return the fits, and the pooled fits, with what the epochs of each condition show together.
 
@@ -119,7 +117,11 @@ def checked_together(
             return []
         settings = counting[0][0].settings.diagnostics
         bands = band_finding(fit, changes[fit.condition], settings)
-        return [*of_condition[fit.condition], *bands]
+        epochs = tuple(one.epoch for _, one in counting if one.condition == fit.condition)
+        return [
+            replace(one, condition=fit.condition, epochs=epochs)
+            for one in (*of_condition[fit.condition], *bands)
+        ]
 
     return Together(
         [_with(fit, shared(fit)) if fit.outcome.included else fit for fit in fits],
@@ -199,54 +201,49 @@ def _tested(
     answers: Sequence[Answer], first: tuple[PreparedEpoch, Fit], common: Array
 ) -> list[Misfit]:
     """Return what each test finds: those of sequences need two epochs or two periods."""
-    found = proportional(answers)
+    tested = proportional(answers)
     together = max(same_sequence(answers), key=len)
     if len(together) > 1:
-        return found + repeated(together)
+        return tested + repeated(together)
     prepared, fit = first
     try:
         periods = prepared.once(observe_periods)
     except ValueError:
-        return found  # there are not two periods
-    return found + periodic(_member(periods, fit.value, common, {}).answer, periods.excited)
+        return tested  # there are not two periods
+    return tested + periodic(_member(periods, fit.value, common, {}).answer, periods.excited)
 
 
 def lack_of_fit(
-    found: Sequence[Misfit], observed: Sequence[Observed], settings: DiagnosticsSettings
+    tested: Sequence[Misfit], observed: Sequence[Observed], settings: DiagnosticsSettings
 ) -> list[Finding]:
     """Return the finding for the part with the largest misfit that is not noise, if any.
 
     Parameters
     ----------
-    found : sequence of Misfit
+    tested : sequence of Misfit
     observed : sequence of Observed
         As `misfits` gives them.
     settings : DiagnosticsSettings
     """
     most = settings.max_lack_of_fit_percent
-    sure = [part for part in found if part.p * len(found) < CHANCE and 100 * part.share > most]
+    sure = [part for part in tested if part.p * len(tested) < CHANCE and 100 * part.share > most]
     if not sure:
         return []
     worst = max(sure, key=lambda part: part.share)
-    finding = Finding(
-        "lack_of_fit",
-        settings.levels.lack_of_fit,
-        100 * worst.share,
-        most,
-        f"from {worst.low_hz:.3g} to {worst.high_hz:.3g} Hz "
-        f"{in_full(100 * worst.share, limit=most)} % of the torque's response to the "
-        f"perturbation is not J, B and K (at most {most:g} %; by chance p = {worst.p:.1g})"
-        f"{_in_half_the_band(observed)}: friction, a reflex, a soft cuff or a "
-        "lag of a channel is taken for the joint",
-        "lower the upper edge of the band (--band-hz) and see whether J and B change; look at the "
-        "coupling; `rigidimeter model --compare` tries terms for it",
-    )
-    return [finding]
+    J, B, K = _in_half_the_band(observed).tolist()
+    facts = {
+        "low_hz": worst.low_hz,
+        "high_hz": worst.high_hz,
+        "half_J": J,
+        "half_B": B,
+        "half_K": K,
+    }
+    return [found("lack_of_fit", settings, 100 * worst.share, most, p=worst.p, facts=facts)]
 
 
-def _in_half_the_band(observed: Sequence[Observed]) -> str:
-    """Say how far J, B and K are different where only the lower half of the band is fitted."""
-    found = []
+def _in_half_the_band(observed: Sequence[Observed]) -> Array:
+    """Return by how many % J, B and K change if only the lower half of the band is fitted."""
+    both = []
     for share in (1.0, 0.5):
         gram, moment = np.zeros((3, 3)), np.zeros(3)
         for member in observed:
@@ -257,9 +254,8 @@ def _in_half_the_band(observed: Sequence[Observed]) -> str:
             gram += (weighted.conj().T @ lines.motion[part]).real
             moment += (weighted.conj().T @ lines.torque_nm[part]).real
         scale = np.sqrt(np.abs(np.diag(gram)))
-        found.append(np.linalg.lstsq(gram / np.outer(scale, scale), moment / scale)[0] / scale)
-    J, B, K = 100 * (found[1] / found[0] - 1)
-    return f"; the lower half of the band gives J {J:+.2g} %, B {B:+.2g} %, K {K:+.2g} %"
+        both.append(np.linalg.lstsq(gram / np.outer(scale, scale), moment / scale)[0] / scale)
+    return np.asarray(100 * (both[1] / both[0] - 1))
 
 
 def _pooled_bias(
@@ -274,9 +270,14 @@ def _pooled_bias(
     bias = np.mean([one.value - p.once(unbiased) for p, one in own], axis=0)
     settings = own[0][0].settings.diagnostics
     look = loop_bias(fit, fit.value - bias, settings)
-    (check,) = (check for check in CHECKS if check.name == "loop_bias")
-    return [check.finding(look, settings)] if look.failed else []
+    if not look.failed:
+        return []
+    return [
+        found(
+            "loop_bias", settings, look.value, look.limit, effect=look.effect, variant=look.variant
+        )
+    ]
 
 
 def _with(fit: Fit, findings: Sequence[Finding]) -> Fit:
-    return replace(fit, findings=(*fit.findings, *findings)) if findings else fit
+    return in_half_intervals(replace(fit, findings=(*fit.findings, *findings)))

@@ -14,11 +14,11 @@ import math
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.between_epochs import in_full
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
     Case,
     Check,
     Look,
+    push_effect,
     push_harmless,
     reconstructed_torque_nm,
 )
@@ -54,15 +54,12 @@ def tremor(voluntary_nm: Array, signals: Signals, settings: DiagnosticsSettings)
     near = slice(max(at - width // 2, 0), at + width // 2 + 1)
     centre_hz = float(np.average(frequency[near], weights=np.maximum(power[near], 1e-300)))
     most = settings.max_tremor_share_percent
-    return Look(
-        value,
-        most,
-        not (value <= most or stands_out < STANDS_OUT),
-        f"the torque beyond J, B and K has a line at {centre_hz:.2g} Hz of "
-        f"{math.sqrt(2.0 * running[at]):.2g} N·m (amplitude), {in_full(value, limit=most)} % of "
-        f"the torque's variance (at most {most:g} %) and {stands_out:.2g} times what lies "
-        "beside it",
-    )
+    facts = {
+        "frequency_hz": centre_hz,
+        "amplitude_nm": math.sqrt(2.0 * running[at]),
+        "stands_out": stands_out,
+    }
+    return Look(value, most, not (value <= most or stands_out < STANDS_OUT), facts)
 
 
 def _own_torque(case: Case) -> Array:
@@ -77,11 +74,7 @@ TREMOR_CHECKS = (
         "tremor",
         (),
         lambda c: tremor(_own_torque(c), c.signals, c.settings),
-        (
-            "a tremor or another oscillation; least squares takes part of it for the joint, and J "
-            "and B come out low in a closed loop"
-        ),
-        "record the perturbation and use iv, or leave the epoch out",
         harmless=push_harmless,
+        effect=push_effect,
     ),
 )

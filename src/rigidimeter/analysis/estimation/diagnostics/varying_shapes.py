@@ -97,7 +97,7 @@ def with_time(lines: VaryingLines, movement: Shapes | None) -> Shapes:
         polynomials(share, TIME_DEGREE),
         polynomials(share, FINER_TIME_DEGREE),
         polynomials(place, TIME_DEGREE),
-        lambda i: f"at {begin_s + place[i] * lines.duration_s:.1f} s",
+        lambda i: f"{begin_s + place[i] * lines.duration_s:.1f} s",
         np.empty((lines.time_s.size, 0)) if movement is None else movement.beside,
         np.ones(TIME_DEGREE),
     )
@@ -123,7 +123,7 @@ def with_angle(lines: VaryingLines) -> Shapes | None:
         powers[:, :ANGLE_DEGREE],
         powers,
         _powers(place / half, ANGLE_DEGREE),
-        lambda i: f"at {math.degrees(place[i]):+.1f} deg from the mean angle",
+        lambda i: f"{math.degrees(place[i]):+.1f}° from the mean",
         np.empty((angle.size, 0))
         if lines.by_perturbation
         else np.column_stack([np.ones_like(angle), powers[:, : ANGLE_DEGREE + 1]]),
@@ -143,7 +143,7 @@ def with_phase(lines: VaryingLines) -> Shapes | None:
         _harmonics(phase, PHASE_HARMONICS),
         _harmonics(phase, FINER_PHASE_HARMONICS),
         _harmonics(place, PHASE_HARMONICS),
-        lambda i: f"at {math.degrees(place[i]):.0f} deg of the cycle of {period_s:.3g} s",
+        lambda i: f"{math.degrees(place[i]):.0f}° of the {period_s:.3g} s cycle",
         np.column_stack([np.ones_like(phase), _harmonics(phase, MOVEMENT_HARMONICS)]),
         np.ones(2 * PHASE_HARMONICS),
     )

@@ -22,6 +22,7 @@ from rigidimeter.analysis.reading.formats.read_options import ReadOptions
 from rigidimeter.analysis.reading.formats.table import Table
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import Notice
+from rigidimeter.core.words import with_error
 
 Array = NDArray[np.float64]
 FOUND = "found"
@@ -74,7 +75,7 @@ def join_tables(
 def offset_notice(found: Offset, source: str) -> Notice:
     """Say what offset was added to the clock of the second source."""
     text = (
-        f"{source}: {found.value_s:.4f} ± {found.error_s:.2g} s is added to its clock; the motion "
+        f"{source}: {with_error(found.value_s, found.error_s)} s is added to its clock; the motion "
         f"then explains {100 * found.r_squared:.1f} % of the torque. The intervals of J, B and K "
         "contain the error"
     )

@@ -320,6 +320,6 @@ def look_text(seen: Look) -> str:
 
 def _fit_text(seen: Look) -> str:
     if seen.fit is None:
-        return "J, B and K cannot be told"
+        return "J, B and K are unknown"
     inertia, damping, stiffness = seen.fit.value
     return f"J {inertia:.2g} kg·m², B {damping:.2g} N·m·s/rad, K {stiffness:.2g} N·m/rad"

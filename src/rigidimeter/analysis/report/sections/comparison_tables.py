@@ -6,19 +6,12 @@ from collections.abc import Iterable, Iterator
 
 from markupsafe import Markup
 
-from rigidimeter.analysis.report.contents import (
-    Block,
-    Column,
-    Section,
-    Table,
-    from_study_folder,
-    paragraph,
-)
+from rigidimeter.analysis.report.contents import Block, Section, from_study_folder, paragraph
 from rigidimeter.analysis.report.method_words import interval_basis, pooled_basis
-from rigidimeter.analysis.report.numbers import condition_name, series
 from rigidimeter.analysis.report.prose_statistics import day_tests_in_words
 from rigidimeter.analysis.report.sections.estimate_tables import pooled_table
 from rigidimeter.analysis.study import StudyResult, comparison_rows, result_table
+from rigidimeter.core.words import Column, Table, condition_name, series
 
 _EPOCHS_NOTE = Markup(
     "All differences are {pair}. Two-sided Wilcoxon rank-sum test, asymptotic (normal "

@@ -7,53 +7,53 @@ from typing import Any
 
 from markupsafe import Markup
 
-from rigidimeter.analysis.report.contents import (
-    SESSION,
-    Block,
-    Column,
-    Section,
-    Table,
-    from_study_folder,
-    paragraph,
-)
-from rigidimeter.analysis.report.numbers import plural, short_names
+from rigidimeter.analysis.report.contents import Block, Section, from_study_folder, paragraph
 from rigidimeter.analysis.report.sections.estimate_tables import HOW, WHO
 from rigidimeter.analysis.study import StudyResult, result_table
-from rigidimeter.core.records import Finding, Fit, Outcome
-
-GRAVEST_FIRST = ("exclude", "doubt", "note")
-
-MOST_LABELS = 24
-"""At most this many epochs of a kind are named; every one is in the table of all findings."""
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import Fit, Outcome
+from rigidimeter.core.words import SESSION, Column, Table, plural
 
 BY = ("protocol", "check", "estimate", "operator")
 
 
+UNFOLDING = Markup(
+    '<details class="finding">\n<summary><span class="outcome is-{level}">{level}</span> '
+    "<strong>{name}</strong> {headline}; {where}</summary>\n"
+    "<p>{details}</p>\n<p>{remedy}</p>\n</details>"
+)
+
+
 def _findings(result: StudyResult) -> Iterator[Block]:
-    found = _of_fits(result)
-    if found:
+    groups, n_fitted = result.analysis.findings, len(result.analysis.fits)
+    if groups:
         yield paragraph(
             Markup(
                 "Every epoch was checked. <em>note</em>: the estimate is not affected. "
-                "<em>doubt</em>: look at the epoch. <em>exclude</em>: its numbers mean nothing. "
-                "Every finding with its value and threshold is in "
+                "<em>caution</em>: check the epoch. <em>exclude</em>: its numbers mean nothing. "
+                "Every finding with its value and limit is in "
                 "<code>tables/findings.csv</code>."
             )
         )
+    else:
+        yield paragraph("The checks found nothing." if n_fitted else "No epoch was fitted.")
+    for one, _, where in groups:
+        yield UNFOLDING.format(level=one.level, name=one.name, where=where, **one.words._asdict())
     yield Table(
         "finding_kinds",
         "Findings by kind",
-        (
-            Column("check", "Check", "check"),
-            Column("level", "Level", "outcome"),
-            Column("epochs", "Epochs", "count"),
-            Column("fitted", "Fitted", "count"),
-            Column("where", "In epochs", "reason"),
-            Column("first", "What was found in the first", "reason"),
-            Column("remedy", "Remedy", "reason"),
-        ),
-        list(_kinds(result, found)),
-        empty="The checks found nothing." if result.analysis.fits else "No epoch was fitted.",
+        (),
+        [
+            {
+                "check": one.name,
+                "level": one.level,
+                "epochs": sum(fit.epoch != "pooled" for fit in fits),
+                "fitted": n_fitted,
+                "where": where,
+                **one.words._asdict(),
+            }
+            for one, fits, where in groups
+        ],
     )
     yield Table(
         "findings",
@@ -67,11 +67,17 @@ def _findings(result: StudyResult) -> Iterator[Block]:
                 "check": finding.name,
                 "level": finding.level,
                 "value": finding.value,
-                "threshold": finding.threshold,
-                "text": finding.text,
-                "remedy": finding.remedy,
+                "unit": finding.unit,
+                "limit": finding.limit,
+                "p": finding.p,
+                **{
+                    f"effect_{name}_{of}": getattr(finding.effect, of)[i]
+                    for of in finding.effect._fields
+                    for i, name in enumerate("JBK")
+                },
+                **finding.words._asdict(),
             }
-            for fit, finding in found
+            for fit, finding in _of_fits(result)
         ],
     )
 
@@ -87,43 +93,6 @@ def _of_fits(result: StudyResult) -> list[tuple[Fit, Finding]]:
         for finding in fit.findings
         if finding not in carried
     ]
-
-
-def _kinds(result: StudyResult, found: list[tuple[Fit, Finding]]) -> Iterator[dict[str, Any]]:
-    """Yield each kind of finding: the most serious first, then the most frequent."""
-    kinds: dict[tuple[str, str], list[tuple[Fit, Finding]]] = {}
-    for fit, finding in found:
-        kinds.setdefault((finding.level, finding.name), []).append((fit, finding))
-    for level, name in sorted(kinds, key=lambda k: (GRAVEST_FIRST.index(k[0]), -len(kinds[k]))):
-        members = kinds[level, name]
-        first = members[0][1]
-        yield {
-            "check": name,
-            "level": level,
-            "epochs": sum(fit.epoch != "pooled" for fit, _ in members),
-            "fitted": len(result.analysis.fits),
-            "where": _where(result, [fit for fit, _ in members]),
-            "first": first.text,
-            "remedy": first.remedy,
-        }
-
-
-def _where(result: StudyResult, fits: list[Fit]) -> str:
-    """Return the epochs by source, at most `MOST_LABELS`."""
-    names = short_names(fit.source for fit in result.analysis.fits)
-    if len(fits) == len(result.analysis.fits) > 1:
-        return "all"
-    if any(fit.epoch == "pooled" for fit in fits):
-        return "all epochs together"
-    by_source: dict[str, list[str]] = {}
-    for fit in fits[:MOST_LABELS]:
-        by_source.setdefault(fit.source, []).append(fit.epoch)
-    if len(names) == 1:
-        text = ", ".join(fit.epoch for fit in fits[:MOST_LABELS])
-    else:
-        text = "; ".join(f"{names[key]}: {', '.join(own)}" for key, own in by_source.items())
-    more = len(fits) - MOST_LABELS
-    return f"{text} and {more} more" if more > 0 else text
 
 
 def _stages(result: StudyResult, *, on_page: bool) -> Table:

@@ -15,22 +15,22 @@ from rigidimeter.analysis.report.contents import (
     Block,
     Figure,
     Section,
-    Table,
     from_study_folder,
     paragraph,
 )
-from rigidimeter.analysis.report.numbers import axis_unit, condition_name, number, plural
 from rigidimeter.analysis.report.style import (
     GREY,
     condition_colours,
     condition_markers,
     drawable,
+    legend_above,
     listed,
     spread,
     styled,
     wrapped,
 )
 from rigidimeter.analysis.study import Comparison, DayMedian, Observation, StudyResult, result_table
+from rigidimeter.core.words import Table, axis_unit, condition_name, number, plural
 
 MOST_IN_A_ROW = 26
 """More days than this continue in another row of the same figure."""
@@ -64,7 +64,8 @@ class Day(NamedTuple):
 
 def _blocks(result: StudyResult) -> Iterator[Block]:
     yield Table("days", "Medians of the days", (), result_table(result, "days"))
-    by_measure = [(c, found) for c in result.comparisons if (found := _days(c))]
+    ordered = sorted(result.comparisons, key=lambda c: c.measure.place)
+    by_measure = [(c, found) for c in ordered if (found := _days(c))]
     if not by_measure:
         return
     yield paragraph(
@@ -114,8 +115,13 @@ def _marks(c: Comparison) -> dict[str, list[tuple[str, str]]]:
 
 
 def _in_unit(c: Comparison, found: Sequence[Day], order: Sequence[str]) -> Drawing:
+    return days(*_scaled(c, found), order)
+
+
+def _scaled(c: Comparison, found: Sequence[Day]) -> tuple[str, list[Day]]:
+    """Return the label of the axis, and the days in its unit."""
     factor, unit = axis_unit((value for one in found for value in one.values), c.measure.unit)
-    return days(f"{c.measure.title}\n({unit})", [one.times(factor) for one in found], order)
+    return f"{c.measure.title}\n({unit})", [one.times(factor) for one in found]
 
 
 class _Slot(NamedTuple):
@@ -139,24 +145,43 @@ def days(label: str, found: Sequence[Day], order: Sequence[str]) -> Drawing:
         All conditions of the report, which gives them their colours and markers.
     """
     rows = _rows(found)
-    several = len({one.median.subject for one in found}) > 1
-    longest = max(len(slot.day) for row in rows for slot in row)
-    colours, markers = condition_colours(order), condition_markers(order)
+    longest = _longest(found)
     with styled():
         figure = Drawing(figsize=(7.4, 0.35 + (2.1 + 0.5 * (longest > 3)) * len(rows)))
         panels = np.atleast_1d(figure.subplots(len(rows), 1, sharey=True))
-        for axes, row in zip(panels, rows, strict=True):
-            _row(axes, row, order, several)
-            axes.set_ylabel(label)
-            if longest > 3:
-                axes.tick_params(axis="x", rotation=45)
-        panels[-1].set_xlabel("Day, in the order of recording")
-        for name in dict.fromkeys(one.condition for one in found):
-            panels[0].plot(
-                [], [], markers[name], color=colours[name], markersize=6, label=listed(name)
-            )
+        _draw(list(panels), rows, label, found, order)
         figure.legend(loc="outside upper left", ncols=6, handletextpad=0.2)
     return figure
+
+
+def draw_days(axes: Axes, c: Comparison, order: Sequence[str]) -> None:
+    """Draw the days of a measure on axes, in one row however many there are."""
+    label, found = _scaled(c, _days(c))
+    _draw([axes], [[slot for row in _rows(found) for slot in row]], label, found, order)
+    legend_above(axes)
+
+
+def _longest(found: Sequence[Day]) -> int:
+    return max(len(one.median.day) for one in found)
+
+
+def _draw(
+    panels: Sequence[Axes],
+    rows: Sequence[Sequence[_Slot]],
+    label: str,
+    found: Sequence[Day],
+    order: Sequence[str],
+) -> None:
+    several = len({one.median.subject for one in found}) > 1
+    colours, markers = condition_colours(order), condition_markers(order)
+    for axes, row in zip(panels, rows, strict=True):
+        _row(axes, row, order, several)
+        axes.set_ylabel(label)
+        if _longest(found) > 3:
+            axes.tick_params(axis="x", rotation=45)
+    panels[-1].set_xlabel("Day, in the order of recording")
+    for name in dict.fromkeys(one.condition for one in found):
+        panels[0].plot([], [], markers[name], color=colours[name], ms=6, label=listed(name))
 
 
 def _rows(found: Sequence[Day]) -> list[list[_Slot]]:

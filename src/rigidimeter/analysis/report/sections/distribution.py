@@ -12,16 +12,16 @@ from matplotlib.figure import Figure as Drawing
 from numpy.typing import NDArray
 
 from rigidimeter.analysis.report.contents import Block, Figure, Section, paragraph
-from rigidimeter.analysis.report.numbers import (
+from rigidimeter.analysis.report.style import condition_colours, note, spread, styled, wrapped
+from rigidimeter.analysis.statistics import summarise
+from rigidimeter.analysis.study import Comparison, StudyResult
+from rigidimeter.core.words import (
     axis_unit,
     condition_name,
     interval,
     number,
     p_and_r,
 )
-from rigidimeter.analysis.report.style import condition_colours, note, spread, styled, wrapped
-from rigidimeter.analysis.statistics import summarise
-from rigidimeter.analysis.study import Comparison, StudyResult
 
 _STRIP = 0.26
 """Half the width of a strip, in units of the distance between conditions."""
@@ -44,26 +44,11 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
     )
     colours = condition_colours(result.condition_names)
     for c in shown:
-        factor, unit = axis_unit((o.value for o in c.observations), c.measure.unit)
         yield Figure(
             f"distribution_{c.measure.name}",
             f"{c.measure.title}.",
             f"{c.measure.title}, every included epoch a point. {_in_words(c)}",
-            partial(
-                distribution,
-                replace(c.measure, unit=unit).label,
-                {condition_name(key): [factor * v for v in c.values[key]] for key in c.summaries},
-                {condition_name(key): colours[key] for key in c.summaries},
-                "" if c.test is None else p_and_r(c.test.p, c.test.r),
-                ends={
-                    condition_name(key): [(factor * o.low, factor * o.high) for o in c.of(key)]
-                    for key in c.summaries
-                },
-                pooled={
-                    condition_name(key): (factor * o.value, factor * o.low, factor * o.high)
-                    for key, o in c.pooled.items()
-                },
-            ),
+            partial(_drawing, c, colours),
             "small",
             marks={
                 f"epochs-{place}": [(o.source, o.epoch) for o in c.of(key)]
@@ -85,6 +70,38 @@ def _in_words(c: Comparison) -> str:
     return f"{'; '.join(parts)} ({c.measure.unit})."
 
 
+def _drawing(c: Comparison, colours: Mapping[str, str]) -> Drawing:
+    with styled():
+        figure = Drawing(figsize=distribution_size(len(c.summaries), pooled=bool(c.pooled)))
+        draw_comparison(figure.add_subplot(), c, colours)
+    return figure
+
+
+def draw_comparison(axes: Axes, c: Comparison, colours: Mapping[str, str]) -> None:
+    """Draw every value of a measure on axes, with the colours of the conditions."""
+    factor, unit = axis_unit((o.value for o in c.observations), c.measure.unit)
+    draw_distribution(
+        axes,
+        replace(c.measure, unit=unit).label,
+        {condition_name(key): [factor * v for v in c.values[key]] for key in c.summaries},
+        {condition_name(key): colours[key] for key in c.summaries},
+        "" if c.test is None else p_and_r(c.test.p, c.test.r),
+        ends={
+            condition_name(key): [(factor * o.low, factor * o.high) for o in c.of(key)]
+            for key in c.summaries
+        },
+        pooled={
+            condition_name(key): (factor * o.value, factor * o.low, factor * o.high)
+            for key, o in c.pooled.items()
+        },
+    )
+
+
+def distribution_size(conditions: int, *, pooled: bool) -> tuple[float, float]:
+    """Return the size of a figure in inches."""
+    return max(2.9, 0.9 + (0.95 + 0.2 * pooled) * conditions), 3.0
+
+
 def distribution(
     label: str,
     values: Mapping[str, Sequence[float]],
@@ -94,10 +111,30 @@ def distribution(
     ends: Mapping[str, Sequence[tuple[float, float]]] | None = None,
     pooled: Mapping[str, tuple[float, float, float]] | None = None,
 ) -> Drawing:
+    """Draw `draw_distribution` on a figure of its own."""
+    with styled():
+        figure = Drawing(figsize=distribution_size(len(values), pooled=bool(pooled)))
+        draw_distribution(
+            figure.add_subplot(), label, values, colours, remark, ends=ends, pooled=pooled
+        )
+    return figure
+
+
+def draw_distribution(
+    axes: Axes,
+    label: str,
+    values: Mapping[str, Sequence[float]],
+    colours: Mapping[str, str],
+    remark: str = "",
+    *,
+    ends: Mapping[str, Sequence[tuple[float, float]]] | None = None,
+    pooled: Mapping[str, tuple[float, float, float]] | None = None,
+) -> None:
     """Draw a strip of points for each condition, with its median and quartiles beside it.
 
     Parameters
     ----------
+    axes : Axes
     label : str
         Of the vertical axis, with the unit.
     values : mapping of str to sequence of float
@@ -112,28 +149,23 @@ def distribution(
         An estimate from all of a condition and the ends of its interval, drawn as a square.
     """
     ends, pooled = ends or {}, pooled or {}
-    with styled():
-        width = 0.95 + 0.2 * bool(pooled)
-        figure = Drawing(figsize=(max(2.9, 0.9 + width * len(values)), 3.0))
-        axes = figure.add_subplot()
-        for position, (condition, sample) in enumerate(values.items()):
-            colour = colours[condition]
-            if len(sample):
-                intervals = np.reshape(ends.get(condition, []), (-1, 2))
-                _strip(axes, position, np.asarray(sample, dtype=np.float64), intervals, colour)
-            if condition in pooled:
-                _pooled(axes, position + _STRIP + _ASIDE, pooled[condition], colour)
-        axes.set_xlim(-0.55, len(values) - 0.45)
-        axes.set_xticks(
-            range(len(values)),
-            [f"{wrapped(name, 13)}\nn = {len(sample)}" for name, sample in values.items()],
-        )
-        axes.set_ylabel(label)
-        axes.tick_params(axis="x", length=0)
-        axes.grid(visible=False, axis="x")
-        axes.margins(y=0.08)
-        note(axes, remark)
-    return figure
+    for position, (condition, sample) in enumerate(values.items()):
+        colour = colours[condition]
+        if len(sample):
+            intervals = np.reshape(ends.get(condition, []), (-1, 2))
+            _strip(axes, position, np.asarray(sample, dtype=np.float64), intervals, colour)
+        if condition in pooled:
+            _pooled(axes, position + _STRIP + _ASIDE, pooled[condition], colour)
+    axes.set_xlim(-0.55, len(values) - 0.45)
+    axes.set_xticks(
+        range(len(values)),
+        [f"{wrapped(name, 13)}\nn = {len(sample)}" for name, sample in values.items()],
+    )
+    axes.set_ylabel(label)
+    axes.tick_params(axis="x", length=0)
+    axes.grid(visible=False, axis="x")
+    axes.margins(y=0.08)
+    note(axes, remark)
 
 
 def _strip(axes: Axes, position: int, sample: Array, intervals: Array, colour: str) -> None:

@@ -8,13 +8,13 @@ from typing import Any
 
 from markupsafe import Markup
 
-from rigidimeter.analysis.report.contents import INTERVAL, Block, Column, Section, Table, paragraph
+from rigidimeter.analysis.report.contents import Block, Section, paragraph
 from rigidimeter.analysis.report.method_words import interval_basis, method_title
-from rigidimeter.analysis.report.numbers import number
 from rigidimeter.analysis.report.sections.recordings import longest_s
 from rigidimeter.analysis.study import StudyResult, result_table, split_pooled
 from rigidimeter.analysis.study.drawing import channel_facts
 from rigidimeter.core.records import PARAMETER_VECTORS, PARAMETERS, Delay, Fit
+from rigidimeter.core.words import INTERVAL, Column, Table, number
 
 ALL_CONDITIONS = "(all)"
 """What the column of conditions holds for the fit to all epochs of all of them."""
@@ -144,16 +144,16 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
     )
     band, in_which = _band(analysis.fits)
     found: tuple[Column, ...] = ()
-    doubts: tuple[Column, ...] = ()
+    cautions: tuple[Column, ...] = ()
     if any(fit.findings for fit in analysis.fits):
         found = (Column("n_findings", "Findings", "count"),)
-    if any(fit.doubts for fit in analysis.fits):
-        doubts = (Column("doubts", "Doubted by", "reason"),)
+    if any(fit.cautions for fit in analysis.fits):
+        cautions = (Column("cautions", "Caution", "reason"),)
     estimates = result_table(result, "estimates")
     yield Table(
         "estimates",
         f"Inertia, damping and stiffness, epoch by epoch{in_which}",
-        (*WHO, *HOW, *_parameters(), *_quality(), *band, *found, *doubts),
+        (*WHO, *HOW, *_parameters(), *_quality(), *band, *found, *cautions),
         estimates,
         empty="No epoch was fitted.",
         folding=True,
@@ -171,7 +171,7 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
             Column(f"{prefix}reason", "Reason", "reason"),
             *_parameters(prefix),
             *_quality(prefix),
-            *doubts,
+            *cautions,
         ),
         estimates,
         empty="No epoch was fitted with the inertia fixed.",

@@ -6,22 +6,20 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from rigidimeter.analysis.report.contents import (
-    INTERVAL,
     Block,
-    Column,
     Figure,
     Section,
-    Table,
     from_study_folder,
     paragraph,
 )
-from rigidimeter.analysis.report.numbers import condition_name, interval, number
 from rigidimeter.analysis.report.style import GREY, INK, styled, wrapped
 from rigidimeter.analysis.statistics import Effects, largest_r
 from rigidimeter.analysis.study import Comparison, StudyResult, result_table
+from rigidimeter.core.words import INTERVAL, Column, Table, condition_name, interval, number
 
 COHEN = (0.1, 0.3, 0.5)
 """What is called a small, a medium and a large r."""
@@ -32,7 +30,6 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
     if not found:
         return
     percent = f"{100 * found[0][1].confidence:g} %"
-    reference, other = condition_name(result.reference), condition_name(result.other)
     yield Figure(
         "effects",
         f"Effect sizes r with {percent} intervals from resampling {result.resampled}. Dotted "
@@ -40,7 +37,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
         "these group sizes allow, which differs between measures.",
         f"Effect sizes r with {percent} intervals. "
         f"{'; '.join(f'{c.measure.title} {_in_words(effects)}' for c, effects in found)}.",
-        partial(forest, found, f"Effect size r; above zero: {reference} larger than {other}"),
+        partial(forest, found, forest_label(result)),
     )
     without_overlap = [c.measure.title for c, effects in found if effects.method == "Newcombe"]
     if without_overlap:
@@ -87,48 +84,63 @@ def forest(found: Sequence[tuple[Comparison, Effects]], label: str) -> Drawing:
     label : str
         Of the horizontal axis.
     """
-    most = [largest_r(effects.test.n_x, effects.test.n_y) for _, effects in found]
     with styled():
-        figure = Drawing(figsize=(7.4, 0.9 + 0.42 * len(found)))
-        axes = figure.add_subplot()
-        for size in COHEN:
-            for x in (-size, size):
-                axes.axvline(x, color=GREY, linewidth=0.6, dashes=(1, 3), zorder=0)
-        axes.axvline(0.0, color=GREY, linewidth=0.9, zorder=1)
-        for place, (_, effects) in enumerate(found):
-            low, high = effects.r_low, effects.r_high
-            if np.isfinite(low) and np.isfinite(high):
-                axes.hlines(place, low, high, color=INK, linewidth=1.6)
-                axes.plot([low, high], [place] * 2, "|", color=INK, markersize=7)
-            axes.plot(effects.r, place, "s", color=INK, markersize=6)
-            for x in (-most[place], most[place]):
-                axes.plot(x, place, "|", color=GREY, markersize=13, markeredgewidth=0.7, alpha=0.7)
-            axes.text(
-                1.02,
-                place,
-                _in_words(effects),
-                transform=axes.get_yaxis_transform(),
-                va="center",
-                fontsize=8,
-            )
-        values = [x for _, effects in found for x in (effects.r_low, effects.r_high, effects.r)]
-        drawn = [x for x in values if np.isfinite(x)]
-        reach = 1.05 * max(0.5, *most, *map(abs, drawn))
-        low = -reach if min(drawn) < -0.15 else min(1.1 * min(drawn), -0.15)
-        high = reach if max(drawn) > 0.15 else max(1.1 * max(drawn), 0.15)
-        axes.set_xlim(low, high)
-        axes.set_yticks(
-            range(len(found)),
-            [
-                f"{wrapped(c.measure.title, 28, 2)}\nn = {effects.test.n_x} and {effects.test.n_y}"
-                for c, effects in found
-            ],
-        )
-        axes.set_ylim(len(found) - 0.5, -0.5)
-        axes.tick_params(axis="y", length=0)
-        axes.grid(visible=False)
-        axes.set_xlabel(label)
+        figure = Drawing(figsize=forest_size(len(found)))
+        draw_forest(figure.add_subplot(), found, label)
     return figure
+
+
+def forest_label(result: StudyResult) -> str:
+    """Return what the horizontal axis shows."""
+    reference, other = condition_name(result.reference), condition_name(result.other)
+    return f"Effect size r; above zero: {reference} larger than {other}"
+
+
+def forest_size(rows: int) -> tuple[float, float]:
+    """Return the size of the figure in inches."""
+    return 7.4, 0.9 + 0.42 * rows
+
+
+def draw_forest(axes: Axes, found: Sequence[tuple[Comparison, Effects]], label: str) -> None:
+    """Draw `forest` on axes; the numbers are to the right of them."""
+    most = [largest_r(effects.test.n_x, effects.test.n_y) for _, effects in found]
+    for size in COHEN:
+        for x in (-size, size):
+            axes.axvline(x, color=GREY, linewidth=0.6, dashes=(1, 3), zorder=0)
+    axes.axvline(0.0, color=GREY, linewidth=0.9, zorder=1)
+    for place, (_, effects) in enumerate(found):
+        low, high = effects.r_low, effects.r_high
+        if np.isfinite(low) and np.isfinite(high):
+            axes.hlines(place, low, high, color=INK, linewidth=1.6)
+            axes.plot([low, high], [place] * 2, "|", color=INK, markersize=7)
+        axes.plot(effects.r, place, "s", color=INK, markersize=6)
+        for x in (-most[place], most[place]):
+            axes.plot(x, place, "|", color=GREY, markersize=13, markeredgewidth=0.7, alpha=0.7)
+        axes.text(
+            1.02,
+            place,
+            _in_words(effects),
+            transform=axes.get_yaxis_transform(),
+            va="center",
+            fontsize=8,
+        )
+    values = [x for _, effects in found for x in (effects.r_low, effects.r_high, effects.r)]
+    drawn = [x for x in values if np.isfinite(x)]
+    reach = 1.05 * max(0.5, *most, *map(abs, drawn))
+    low = -reach if min(drawn) < -0.15 else min(1.1 * min(drawn), -0.15)
+    high = reach if max(drawn) > 0.15 else max(1.1 * max(drawn), 0.15)
+    axes.set_xlim(low, high)
+    axes.set_yticks(
+        range(len(found)),
+        [
+            f"{wrapped(c.measure.title, 28, 2)}\nn = {effects.test.n_x} and {effects.test.n_y}"
+            for c, effects in found
+        ],
+    )
+    axes.set_ylim(len(found) - 0.5, -0.5)
+    axes.tick_params(axis="y", length=0)
+    axes.grid(visible=False)
+    axes.set_xlabel(label)
 
 
 SECTION = Section("effects", "Effect sizes", _blocks, from_study_folder)

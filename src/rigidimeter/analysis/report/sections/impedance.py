@@ -18,12 +18,12 @@ from matplotlib.ticker import LogLocator, MultipleLocator, NullLocator
 from numpy.typing import NDArray
 
 from rigidimeter.analysis.report.contents import Block, Figure, Section, paragraph
-from rigidimeter.analysis.report.numbers import condition_name, number
 from rigidimeter.analysis.report.style import GREY, condition_colours, listed, plain_ticks, styled
 from rigidimeter.analysis.study import StudyResult, split_pooled
 from rigidimeter.analysis.study.drawn_signals import Response
 from rigidimeter.analysis.study.over_frequency import responses
 from rigidimeter.core.records import Fit
+from rigidimeter.core.words import condition_name, number
 from rigidimeter.model import JointDynamics
 
 Array = NDArray[np.float64]

@@ -13,17 +13,13 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import MaxNLocator
 
 from rigidimeter.analysis.report.contents import (
-    INTERVAL,
     Block,
-    Column,
     Figure,
     Section,
-    Table,
     bullets,
     from_study_folder,
     paragraph,
 )
-from rigidimeter.analysis.report.numbers import axis_unit, condition_name, interval, number
 from rigidimeter.analysis.report.style import GREY, INK, drawable, styled, wrapped
 from rigidimeter.analysis.study import (
     Measure,
@@ -31,6 +27,15 @@ from rigidimeter.analysis.study import (
     StudyResult,
     method_caveats,
     result_table,
+)
+from rigidimeter.core.words import (
+    INTERVAL,
+    Column,
+    Table,
+    axis_unit,
+    condition_name,
+    interval,
+    number,
 )
 
 _OTHER = "#0072B2"

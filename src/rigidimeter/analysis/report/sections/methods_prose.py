@@ -15,13 +15,13 @@ from markupsafe import Markup
 
 from rigidimeter.analysis.report.contents import Block, Section, from_study_folder, paragraph
 from rigidimeter.analysis.report.method_words import method_of
-from rigidimeter.analysis.report.numbers import condition_name, number, plural, series
 from rigidimeter.analysis.report.prose_statistics import rating_sentences, test_sentences
 from rigidimeter.analysis.report.references import Cited, Prose
 from rigidimeter.analysis.study import Condition, StudyResult
 from rigidimeter.analysis.study.drawing import channel_facts
 from rigidimeter.core.records import WEIGHT_IN_STIFFNESS, Epoch, Fit
 from rigidimeter.core.version import __version__
+from rigidimeter.core.words import condition_name, number, plural, series
 
 
 def _blocks(result: StudyResult) -> Iterator[Block]:
@@ -193,9 +193,8 @@ def _estimation(result: StudyResult, cite: Cited) -> list[str]:
             else f"of all conditions ({number(analysis.inertia_kg_m2)} kg·m²)"
         )
         sentences.append(
-            f"J was then held at its median over all included epochs {of_whom}, and "
-            f"B and K were estimated again, as in {cite.by_name('paper')}; these values are "
-            "compared."
+            f"These J, B and K are compared. B and K with J held at its median over all included "
+            f"epochs {of_whom}, as in {cite.by_name('paper')}, are among the other methods."
         )
     return sentences
 

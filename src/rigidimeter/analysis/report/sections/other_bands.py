@@ -9,8 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 from scipy.stats import norm
 
-from rigidimeter.analysis.report.contents import Block, Figure, Section, Table, paragraph
-from rigidimeter.analysis.report.numbers import condition_name, number
+from rigidimeter.analysis.report.contents import Block, Figure, Section, paragraph
 from rigidimeter.analysis.report.style import (
     GREY,
     condition_colours,
@@ -20,6 +19,7 @@ from rigidimeter.analysis.report.style import (
 )
 from rigidimeter.analysis.study import StudyResult, split_pooled
 from rigidimeter.core.records import PARAMETERS, BandEstimate
+from rigidimeter.core.words import Table, condition_name, number
 
 _WIDE = float(norm.ppf(0.975))
 _BESIDE = 0.5
@@ -44,8 +44,8 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
     own = found[0]
     yield paragraph(
         "The estimates change with the band by no more than chance where the joint is inertia, "
-        "damping and stiffness alone. A check doubts them where they change by more "
-        "(band_sensitivity)."
+        "damping and stiffness alone. Where they change by more, they carry a "
+        "finding (band_sensitivity)."
     )
     yield Figure(
         "band_sensitivity",

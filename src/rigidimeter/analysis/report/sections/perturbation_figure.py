@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from rigidimeter.analysis.report.contents import Block, Figure, Section
-from rigidimeter.analysis.report.numbers import condition_name, number, short_names
 from rigidimeter.analysis.report.representative import origin_s
 from rigidimeter.analysis.report.style import GREY, INK, note, plain_ticks, styled
 from rigidimeter.analysis.study import StudyResult
 from rigidimeter.analysis.study.examples import perturbed_epoch
 from rigidimeter.core.records import Channel
+from rigidimeter.core.words import condition_name, number, short_names
 
 _BAND = "#009E73"
 
@@ -69,20 +69,27 @@ def perturbation(channel: Channel, origin_s: float, first_s: float = 7.0) -> Dra
     first_s : float
         How much of it the upper panel shows.
     """
-    time_s, values = changes(channel)
-    time_s = time_s - origin_s
     with styled():
         figure = Drawing(figsize=(7.4, 3.1))
-        above, below = figure.subplots(2, 1)
-        for axes in (above, below):
-            axes.step(time_s, values, where="post", color=INK, linewidth=0.9)
-            axes.set_ylabel("Perturbation\n(N·m)")
-        above.set_xlim(time_s[0], min(time_s[0] + first_s, time_s[-1]))
-        below.set_xlim(time_s[0], time_s[-1])
-        below.set_xlabel("Time since the start of the epoch (s)")
-        note(above, f"first {min(first_s, time_s[-1] - time_s[0]):.3g} s")
-        note(below, "complete")
+        draw_perturbation(figure.subplots(2, 1), channel, origin_s, first_s)
     return figure
+
+
+def draw_perturbation(
+    panels: Sequence[Axes], channel: Channel, origin_s: float, first_s: float = 7.0
+) -> None:
+    """Draw `perturbation` on two axes."""
+    time_s, values = changes(channel)
+    time_s = time_s - origin_s
+    above, below = panels
+    for axes in (above, below):
+        axes.step(time_s, values, where="post", color=INK, linewidth=0.9)
+        axes.set_ylabel("Perturbation\n(N·m)")
+    above.set_xlim(time_s[0], min(time_s[0] + first_s, time_s[-1]))
+    below.set_xlim(time_s[0], time_s[-1])
+    below.set_xlabel("Time since the start of the epoch (s)")
+    note(above, f"first {min(first_s, time_s[-1] - time_s[0]):.3g} s")
+    note(below, "complete")
 
 
 def spectrum(channel: Channel, wanted_hz: tuple[float, float]) -> Drawing:
@@ -97,6 +104,14 @@ def spectrum(channel: Channel, wanted_hz: tuple[float, float]) -> Drawing:
     wanted_hz : (float, float)
         The band that the perturbation is meant to excite.
     """
+    with styled():
+        figure = Drawing(figsize=(7.4, 2.7))
+        draw_spectrum(figure.add_subplot(), channel, wanted_hz)
+    return figure
+
+
+def draw_spectrum(axes: Axes, channel: Channel, wanted_hz: tuple[float, float]) -> None:
+    """Draw `spectrum` on axes."""
     rate_hz = channel.rate_hz
     count = int((channel.time_s[-1] - channel.time_s[0]) * rate_hz) + 1
     grid = channel.time_s[0] + np.arange(count) / rate_hz
@@ -106,20 +121,16 @@ def spectrum(channel: Channel, wanted_hz: tuple[float, float]) -> Drawing:
     low, high = wanted_hz
     shown = (frequency_hz > 0) & (frequency_hz <= max(4 * high, 5 * frequency_hz[1]))
     frequency_hz, density = frequency_hz[shown], density[shown]
-    with styled():
-        figure = Drawing(figsize=(7.4, 2.7))
-        axes = figure.add_subplot()
-        axes.axvspan(low, high, color=_BAND, alpha=0.12, linewidth=0)
-        floor = density.max() * 1e-5
-        axes.loglog(frequency_hz, np.maximum(density, floor), color=INK, linewidth=0.8)
-        axes.set_ylim(floor, density.max() * 6)
-        axes.set_xlim(min(frequency_hz[0], low / 2), max(frequency_hz[-1], 2 * high))
-        axes.set_xlabel("Frequency (Hz)")
-        axes.set_ylabel("Power spectral density\n((N·m)²/Hz)")
-        plain_ticks(axes.xaxis, axes.yaxis)
-        axes.grid(visible=False, which="minor")
-        _label_band(axes, low, high)
-    return figure
+    axes.axvspan(low, high, color=_BAND, alpha=0.12, linewidth=0)
+    floor = density.max() * 1e-5
+    axes.loglog(frequency_hz, np.maximum(density, floor), color=INK, linewidth=0.8)
+    axes.set_ylim(floor, density.max() * 6)
+    axes.set_xlim(min(frequency_hz[0], low / 2), max(frequency_hz[-1], 2 * high))
+    axes.set_xlabel("Frequency (Hz)")
+    axes.set_ylabel("Power spectral density\n((N·m)²/Hz)")
+    plain_ticks(axes.xaxis, axes.yaxis)
+    axes.grid(visible=False, which="minor")
+    _label_band(axes, low, high)
 
 
 def _label_band(axes: Axes, low: float, high: float) -> None:

@@ -10,17 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from rigidimeter.analysis.report.contents import (
-    INTERVAL,
-    SESSION,
     Block,
-    Column,
     Figure,
     Section,
-    Table,
     from_study_folder,
     paragraph,
 )
-from rigidimeter.analysis.report.numbers import condition_name, interval, number
 from rigidimeter.analysis.report.style import (
     GREY,
     MARKERS,
@@ -31,6 +26,15 @@ from rigidimeter.analysis.report.style import (
     wrapped,
 )
 from rigidimeter.analysis.study import RatingMean, RatingsFound, StudyResult, result_table
+from rigidimeter.core.words import (
+    INTERVAL,
+    SESSION,
+    Column,
+    Table,
+    condition_name,
+    interval,
+    number,
+)
 
 _LANES = 0.66
 """The width of a condition that its examiners share."""

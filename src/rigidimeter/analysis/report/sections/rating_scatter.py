@@ -10,16 +10,12 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from rigidimeter.analysis.report.contents import (
-    INTERVAL,
     Block,
-    Column,
     Figure,
     Section,
-    Table,
     from_study_folder,
     paragraph,
 )
-from rigidimeter.analysis.report.numbers import axis_unit, condition_name, interval, number, plural
 from rigidimeter.analysis.report.style import (
     condition_colours,
     condition_markers,
@@ -28,6 +24,16 @@ from rigidimeter.analysis.report.style import (
     styled,
 )
 from rigidimeter.analysis.study import Relation, StudyResult, agreement, relations, result_table
+from rigidimeter.core.words import (
+    INTERVAL,
+    Column,
+    Table,
+    axis_unit,
+    condition_name,
+    interval,
+    number,
+    plural,
+)
 
 
 def _blocks(result: StudyResult) -> Iterator[Block]:

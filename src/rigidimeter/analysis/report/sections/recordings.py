@@ -11,13 +11,13 @@ import numpy as np
 from markupsafe import Markup
 from pydantic import BaseModel
 
-from rigidimeter.analysis.report.contents import SESSION, Block, Column, Section, Table, paragraph
-from rigidimeter.analysis.report.numbers import number, plural
+from rigidimeter.analysis.report.contents import Block, Section, paragraph
 from rigidimeter.analysis.study import StudyResult, result_table
 from rigidimeter.analysis.study.drawing import channel_facts
 from rigidimeter.analysis.study.drawn_signals import ChannelFacts
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.units import rad_from_deg
+from rigidimeter.core.words import SESSION, Column, Table, number, plural
 
 _TASKS = {"prbs": "torque perturbation", "sinusoid": "imposed sinusoid", None: "not stated"}
 
@@ -41,10 +41,10 @@ def _about(result: StudyResult) -> Iterator[Block]:
             "A robot moved a joint while torque and motion were recorded. Each epoch with a torque "
             "perturbation gives the joint’s inertia J, viscous damping B and stiffness K: the "
             'values with which <span class="formula">J θ″ + B θ′ + K θ = M</span> comes closest to '
-            "the measured torque M. B and K are then estimated again with J held at {} over all "
-            "included epochs; those values are compared. Each epoch with an imposed sinusoid gives "
-            "two scores per cycle: the angular impulse ∑|M|Δt and the work, which is the area of "
-            "the torque–angle loop."
+            "the measured torque M. These are compared. B and K with J held at {} over all "
+            "included epochs, as in the paper, are among the other methods. Each epoch with an "
+            "imposed sinusoid gives two scores per cycle: the angular impulse ∑|M|Δt and the work, "
+            "which is the area of the torque–angle loop."
         ).format(median)
     )
     yield paragraph(

@@ -6,17 +6,9 @@ from collections.abc import Iterator
 
 from markupsafe import Markup
 
-from rigidimeter.analysis.report.contents import (
-    Block,
-    Column,
-    Kind,
-    Section,
-    Table,
-    bullets,
-    from_study_folder,
-)
-from rigidimeter.analysis.report.numbers import condition_name, plural, series
+from rigidimeter.analysis.report.contents import Block, Section, bullets, from_study_folder
 from rigidimeter.analysis.study import StudyResult, result_table, traffic_light
+from rigidimeter.core.words import Column, Kind, Table, condition_name, plural, series
 
 _STIMULATION: tuple[tuple[str, str, Kind], ...] = (
     ("title", "Description", "text"),

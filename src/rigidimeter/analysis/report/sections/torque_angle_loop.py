@@ -11,11 +11,11 @@ from matplotlib.figure import Figure as Drawing
 
 from rigidimeter.analysis.estimation import Cycles, scoring_cycles
 from rigidimeter.analysis.report.contents import Block, Figure, Section, paragraph
-from rigidimeter.analysis.report.numbers import condition_name, number
 from rigidimeter.analysis.report.representative import place
 from rigidimeter.analysis.report.style import condition_colours, listed, note, styled
 from rigidimeter.analysis.study import StudyResult
 from rigidimeter.analysis.study.examples import analysed_epoch, representative_scores
+from rigidimeter.core.words import condition_name, number
 
 _POINTS = 2000
 """Enough for any number of cycles at the size of the figure."""

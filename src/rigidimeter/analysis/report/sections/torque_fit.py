@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -13,17 +13,21 @@ from numpy.typing import NDArray
 from rigidimeter.analysis.estimation import Signals, epoch_signals
 from rigidimeter.analysis.report.contents import Block, Figure, Section, paragraph
 from rigidimeter.analysis.report.method_words import is_least_squares
-from rigidimeter.analysis.report.numbers import amount, condition_name, number
 from rigidimeter.analysis.report.representative import origin_s, place, slug
 from rigidimeter.analysis.report.style import GREY, INK, condition_colours, note, styled
 from rigidimeter.analysis.study import StudyResult
 from rigidimeter.analysis.study.examples import analysed_epoch, representative_fits
 from rigidimeter.core.records import Fit
+from rigidimeter.core.words import amount, condition_name, number
 
 Array = NDArray[np.float64]
 
 WINDOW_S = 7.0
 """How much of an epoch the figures show: more would be too dense to read."""
+
+TORQUE_SIZE = (7.4, 7.4)
+TORQUE_HEIGHTS = (1.4, 0.7, 1.0, 1.0, 1.0)
+"""Of the figure of torques in inches, and of its panels beside each other."""
 
 
 def _blocks(result: StudyResult) -> Iterator[Block]:
@@ -114,6 +118,27 @@ def torque_parts(
     window_s: float,
     limit_nm: float,
 ) -> Drawing:
+    """Draw `draw_torque_parts` on a figure of its own."""
+    with styled():
+        figure = Drawing(figsize=TORQUE_SIZE)
+        panels = figure.subplots(5, 1, sharex=True, height_ratios=TORQUE_HEIGHTS)
+        draw_torque_parts(
+            list(panels), signals, fit, colour, origin_s=origin_s, window_s=window_s,
+            limit_nm=limit_nm,
+        )  # fmt: skip
+    return figure
+
+
+def draw_torque_parts(
+    panels: Sequence[Axes],
+    signals: Signals,
+    fit: Fit,
+    colour: str,
+    *,
+    origin_s: float,
+    window_s: float,
+    limit_nm: float,
+) -> None:
     """Draw the torque of an epoch, the model, the residual below, and the terms of the model.
 
     The panel of each term also shows what is left for it to explain: the measured torque less the
@@ -144,26 +169,22 @@ def torque_parts(
         f"Damping term B θ′, B = {amount(fit.damping_nm_s_rad, 'N·m·s/rad')}",
         f"Stiffness term K θ, K = {amount(fit.stiffness_nm_rad, 'N·m/rad')}",
     )
-    with styled():
-        figure = Drawing(figsize=(7.4, 7.4))
-        panels = list(figure.subplots(5, 1, sharex=True, height_ratios=(1.4, 0.7, 1, 1, 1)))
-        top, left, *below = panels
-        _pair(top, time_s, signals.torque_nm[shown], model[shown], colour, ("measured", "model"))
-        top.set_title("Torque")
-        note(top, f"VAF {fit.vaf_percent:.4g} %, R² {fit.r_squared:.4g}")
-        left.plot(time_s, residual[shown], color=INK, linewidth=0.8)
-        left.set_title("Residual: measured less model")
-        for axes, title, part in zip(below, titles, parts, strict=True):
-            labels = ("measured less the other terms", "this term of the model")
-            _pair(axes, time_s, (residual + part)[shown], part[shown], colour, labels)
-            axes.set_title(title)
-        for axes in panels:
-            reach = 0.7 if axes is left else 1.35
-            axes.set_ylim(-reach * limit_nm, reach * limit_nm)
-            axes.set_ylabel("Torque (N·m)")
-        below[-1].set_xlabel("Time since the start of the epoch (s)")
-        below[-1].set_xlim(time_s[0], time_s[-1])
-    return figure
+    top, left, *below = panels
+    _pair(top, time_s, signals.torque_nm[shown], model[shown], colour, ("measured", "model"))
+    top.set_title("Torque", loc="left")
+    note(top, f"VAF {fit.vaf_percent:.4g} %, R² {fit.r_squared:.4g}")
+    left.plot(time_s, residual[shown], color=INK, linewidth=0.8)
+    left.set_title("Residual: measured less model", loc="left")
+    for axes, title, part in zip(below, titles, parts, strict=True):
+        labels = ("measured less the other terms", "this term of the model")
+        _pair(axes, time_s, (residual + part)[shown], part[shown], colour, labels)
+        axes.set_title(title, loc="left")
+    for axes in panels:
+        reach = 0.7 if axes is left else 1.35
+        axes.set_ylim(-reach * limit_nm, reach * limit_nm)
+        axes.set_xlim(time_s[0], time_s[-1])
+        axes.set_ylabel("Torque (N·m)")
+    below[-1].set_xlabel("Time since the start of the epoch (s)")
 
 
 def _pair(

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from rigidimeter.analysis.report.contents import Block, Figure, Section, paragraph
 from rigidimeter.analysis.report.method_words import is_least_squares
-from rigidimeter.analysis.report.numbers import condition_name, number
 from rigidimeter.analysis.report.style import condition_colours, listed, plain_ticks, styled
 from rigidimeter.analysis.study import StudyResult
 from rigidimeter.analysis.study.over_frequency import unexplained_spectra
 from rigidimeter.core.spectrum import SEGMENT_S
+from rigidimeter.core.words import condition_name, number
 
 Array = NDArray[np.float64]
 

@@ -106,7 +106,7 @@ class BeforeView:
         with ui.row():
             self._start = ui.button("Start session", on_click=self._ask).mark("start")
             self._start.props("size=lg")
-            ui.button("Predict precision, margin, epochs needed", on_click=self._predict)
+            ui.button("Predict precision, margin, days needed", on_click=self._predict)
             ui.button("Dry run on the virtual rig", on_click=self._dry_run)
         self._answer = ui.html("", sanitize=False).classes("answer")
         self._check()
@@ -225,7 +225,7 @@ class BeforeView:
 
     def _may_act(self) -> bool:
         if not self._in_control():
-            ui.notify("this page can only look: another one has control")
+            ui.notify("this page is read-only: another one has control")
         elif self._state.busy:
             ui.notify("not while a session runs or the rig is checked")
         else:

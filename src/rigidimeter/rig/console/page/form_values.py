@@ -53,7 +53,7 @@ def parse_integer(text: str, what: str) -> int:
     """
     value = parse_number(text, what)
     if value != int(value):
-        raise UserError(f"{what}: {text.strip()} is no whole number")
+        raise UserError(f"{what}: {text.strip()} is not a whole number")
     return int(value)
 
 

@@ -166,7 +166,7 @@ class LiveSockets:
         if message.kind == "hello":
             return
         if not presence.has_control(page.secret):
-            why = "this page can only look: another one has control"
+            why = "this page is read-only: another one has control"
             page.send(_refused(why) if message.kind == "note" else json.dumps({"say": why}))
             return
         if message.kind == "leave":

@@ -117,7 +117,7 @@ def parse_message(text: str) -> PageMessage:
     if kind == "save":
         folder = _text(message, "folder", LONGEST_TEXT)
         if not folder.startswith(("/", "~/")):
-            raise RefusedMessage("name the whole path of a new folder, as in /media/disk/session")
+            raise RefusedMessage("name the full path of a new folder, as in /media/disk/session")
         return PageMessage(kind, folder=folder)
     return PageMessage(kind, note=_note(message) if kind == "note" else None)
 

@@ -12,23 +12,21 @@ SYMBOLS = {"inertia_kg_m2": "J", "damping_nm_s_rad": "B", "stiffness_nm_rad": "K
 Z95 = NormalDist().inv_cdf(0.975)
 """Standard errors on either side in a 95 % interval."""
 
-GOOD_POWER = 0.8
-
 
 def prediction_lines(document: Mapping[str, Any], wanted: MarginsSettings) -> list[str]:
-    """Return the sentences on stability, precision, epochs needed and limits.
+    """Return the sentences on stability, precision, days needed and limits.
 
     Parameters
     ----------
     document : mapping
-        A `rigidimeter.design/1`.
+        A `rigidimeter.design/2`.
     wanted : MarginsSettings
         The margins that are required.
     """
     return [
         _stability(document["stability"], wanted),
         *_precision(document["precision"]),
-        *_epochs(document["detection"]),
+        *_days(document["detection"]),
         *(f"! {text}." for text in (*document["warnings"], *document["remarks"])),
     ]
 
@@ -87,26 +85,40 @@ def _precision(found: Mapping[str, Any]) -> list[str]:
     return lines or ["The protocol has no epoch of PRBS, which alone gives J, B and K."]
 
 
-def _epochs(found: list[Mapping[str, Any]]) -> list[str]:
-    """Say how many epochs a condition show a difference, and whether as many are planned."""
+def _days(found: list[Mapping[str, Any]]) -> list[str]:
+    """Say how many days like the planned one show a difference, and what that assumes."""
     lines = []
     for one in found:
-        needed, planned, power = one["epochs_needed"], one["planned_epochs"], one["planned_power"]
-        line = (
-            f"{needed} epochs a condition show a difference of {one['difference']:.3g} in the "
-            f"{one['parameter']} ({100.0 * one['power']:.0f} % power)"
+        percent = 100.0 * one["difference"] / one["value"]
+        what = (
+            f"a {one['parameter']} {'lower' if percent > 0 else 'higher'} by {abs(percent):.3g} % "
+            f"({abs(one['difference']):.3g} {one['unit']})"
         )
+        planned = one["planned"]
         if planned is None:
-            line += "; there are not two conditions with PRBS in the protocol to compare"
-        elif power is not None and power >= GOOD_POWER:
-            line = f"✓ {line}; the {planned[0]} and {planned[1]} planned are enough"
-        else:
-            line = (
-                f"! {line}; the {planned[0]} and {planned[1]} planned have "
-                f"{100.0 * (power or 0.0):.0f} %: plan {needed}"
+            lines.append(
+                f"! To show {what} a day needs PRBS in two conditions, which the protocol has not."
             )
-        lines.append(f"{line}.")
+            continue
+        days, holm, subjects = (
+            "more than 1000" if planned[key] is None else f"{planned[key]}"
+            for key in ("days_needed", "days_needed_holm", "subjects_needed")
+        )
+        lines.append(
+            f"{days} days like this one, with {' and '.join(map(str, planned['epochs_a_day']))} "
+            f"epochs, show {what} with {100.0 * one['power']:.0f} % power; {holm} if J, B and K "
+            f"are all tested (Holm); of subjects with one day each {subjects}. Assumed: "
+            f"{_assumed(one['scatter'])}."
+        )
     return lines
+
+
+def _assumed(scatter: Mapping[str, Any]) -> str:
+    return (
+        f"SD of {scatter['between_epochs_percent']:.2g} % between epochs and "
+        f"{scatter['condition_in_day_percent']:.2g} % of one condition between days "
+        f"({scatter['source']})"
+    )
 
 
 def dry_run_lines(good: int, planned: int) -> list[str]:

@@ -1,5 +1,6 @@
 """The tests of the lack of fit: Fisher's distribution for noise, and what was put in is found."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -163,11 +164,12 @@ def test_what_is_not_the_joint_is_told_in_each_epoch_and_of_all(softened_epochs,
     fits, pooled = found(softened_epochs, method)
     for fit in (*fits, *pooled):
         (finding,) = (f for f in fit.findings if f.name == "lack_of_fit")
-        assert finding.level == "doubt"
-        assert finding.value > finding.threshold
-        assert "is not J, B and K" in finding.text
-        assert "the lower half of the band gives J" in finding.text
-        assert "band_sensitivity" in fit.doubts
+        assert finding.level == "caution"
+        assert finding.value > finding.limit
+        assert finding.p < 1e-4
+        assert all(math.isfinite(finding.facts[f"half_{name}"]) for name in "JBK")
+        assert (finding.condition, len(finding.epochs)) == (fit.condition, len(fits))
+        assert "band_sensitivity" in fit.cautions
 
 
 @pytest.mark.parametrize("count", [1, 4])
@@ -183,7 +185,7 @@ def test_stamps_of_real_time_change_nothing(simulated, count):
     assert values[1] == pytest.approx(values[0], rel=0.05)
 
 
-def test_an_epoch_that_does_not_count_is_neither_looked_at_nor_doubted(simulated):
+def test_an_epoch_that_does_not_count_has_no_findings_of_the_others(simulated):
     settings, epochs = simulated(2, seed=4)
     prepared = prepare([softened(epoch) for epoch in epochs], settings)
     fits, _ = fit_epochs([p.epoch for p in prepared], "iv", settings)

@@ -68,10 +68,12 @@ def test_an_epoch_without_a_tenth_of_a_second_gives_what_the_whole_gives(
     assert np.all(part.high - part.low < 2.0 * (whole.high - whole.low))
     named = {found.name: found for found in part.findings}
     assert named.keys() - {found.name for found in whole.findings} <= {LOST_SAMPLES}
-    text = named[LOST_SAMPLES].text
-    assert named[LOST_SAMPLES].level == "note"
-    assert text.startswith("samples of 0.1 s are lost, 0.5 % of the epoch (at most 50 %): batch 7")
-    assert f"left out, from {start_s:.4g} to {start_s + 0.1:.4g} s; 19.9 of 20 s" in text
+    lost = named[LOST_SAMPLES]
+    assert (lost.level, lost.facts["variant"], lost.limit) == ("note", "left_out", 50.0)
+    assert (lost.value, lost.facts["lost_s"]) == pytest.approx((0.5, 0.1), rel=0.01)
+    assert lost.facts["reason"].startswith("batch 7")
+    assert lost.facts["spans"] == f"from {start_s:.4g} to {start_s + 0.1:.4g} s"
+    assert lost.facts["used_s"] == pytest.approx(19.9, abs=0.01)
 
 
 def test_an_epoch_of_which_most_is_lost_is_excluded(simulated):
@@ -81,7 +83,7 @@ def test_an_epoch_of_which_most_is_lost_is_excluded(simulated):
     (fit,), _ = method_named("iv").fit([prepared], None, lambda _: None, False)
     fit = checked(prepared, fit)
     assert fit.outcome.kind == "excluded"
-    assert "samples of 11 s are lost, 55 % of the epoch (at most 50 %)" in fit.outcome.reason
+    assert "55 % of the epoch's samples are lost" in fit.outcome.reason
 
 
 def test_periods_are_found_although_the_perturbation_is_not_known_throughout(simulated, truth):

@@ -7,7 +7,6 @@ import pytest
 from scipy import signal
 
 from rigidimeter.analysis.estimation import epoch_signals, fit_inertia_damping_stiffness
-from rigidimeter.analysis.estimation.diagnostics import CHECKS
 from rigidimeter.core.records import Channel, Epoch
 from rigidimeter.core.settings import DiagnosticsSettings, EstimationSettings
 from rigidimeter.model import JointDynamics
@@ -16,16 +15,6 @@ SETTINGS = DiagnosticsSettings()
 TRUTH = np.array([0.0045, 0.1368, 1.751])
 RATE_HZ, N = 200.0, 4000
 T = np.arange(N) / RATE_HZ
-
-
-def judged(function):
-    """Return a check that says what was found, of a function that says what was seen."""
-    (check,) = (check for check in CHECKS if check.name == function.__name__)
-
-    def found(*arguments, settings=SETTINGS):
-        return check.finding(function(*arguments), settings)
-
-    return found
 
 
 def perturbed(seed=0, noise_nm=0.005, voluntary_nm=0.0):
@@ -87,12 +76,12 @@ def with_channel(epoch, name, values):
     return replace(epoch, channels={**epoch.channels, name: Channel(name, T, values)})
 
 
-def passed(finding):
-    return finding.level == "note" and finding.remedy == ""
+def passed(look):
+    return not look.failed
 
 
-def assert_failed(finding, *words):
-    assert finding.remedy
-    assert finding.level == getattr(SETTINGS.levels, finding.name)
-    for word in words:
-        assert word in finding.text
+def assert_failed(look, variant="", **facts):
+    """Assert that a check failed, with these words and at least these facts."""
+    assert look.failed
+    assert look.variant == variant
+    assert {name: look.facts[name] for name in facts} == facts

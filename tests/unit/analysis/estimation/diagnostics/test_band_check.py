@@ -26,10 +26,19 @@ def changes(percent, p, part="all"):
 
 def test_a_band_that_contradicts_is_told():
     (found,) = band_finding(FIT, changes(-6.0, 1e-6), SETTINGS)
-    assert (found.name, found.level, found.threshold) == ("band_sensitivity", "doubt", 3.0)
+    assert (found.name, found.level, found.limit) == ("band_sensitivity", "caution", 3.0)
     assert found.value == pytest.approx(6.0)
-    assert "from 0.1 to 21 Hz K is 6 ± 0.1 % less than from 0.1 to 30 Hz" in found.text
-    assert "1.2 times half its interval" in found.text
+    facts = found.facts
+    assert (facts["symbol"], facts["way"], facts["low_hz"], facts["high_hz"]) == (
+        "K",
+        "less",
+        0.1,
+        21,
+    )
+    assert (facts["error"], facts["of_half"]) == pytest.approx((0.1, 1.2))
+    assert found.p == pytest.approx(3e-6)
+    assert found.effect.percent == pytest.approx((0.0, 0.0, 6.0))
+    assert found.effect.half_intervals == pytest.approx((0.0, 0.0, 1.2))
 
 
 @pytest.mark.parametrize(

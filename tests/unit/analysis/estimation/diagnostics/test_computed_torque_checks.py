@@ -44,7 +44,7 @@ def recorded(torque, **more):
 def test_a_torque_that_was_computed_is_excluded(torque, origin):
     look = computed_torque(recorded(torque), SETTINGS)
     assert look.failed
-    assert f"computed from {origin}" in look.meaning
+    assert look.facts["origin"] == origin
     assert SETTINGS.levels.computed_torque == "exclude"
     assert computed_torque(recorded(torque, virtual=True), SETTINGS) is None
 
@@ -54,7 +54,7 @@ def test_a_binary_torque_that_was_computed_is_not_called_a_sensor_at_its_limit()
     (fit,), _ = method_named("bandlimited").fit([prepared], None, lambda _: None, False)
     found = checked(prepared, fit)
     assert "saturation" in {finding.name for finding in found.findings}
-    assert "the torque was computed from the perturbation" in found.outcome.reason
+    assert "The torque was computed from the perturbation" in found.outcome.reason
 
 
 def test_a_torque_with_the_noise_of_a_good_sensor_was_measured():

@@ -36,11 +36,11 @@ def test_a_delay_that_is_not_corrected_is_said_where_it_matters(name, late_ms, r
         assert found == []
         return
     (finding,) = found
-    assert finding.level == "doubt"
+    assert finding.level == "caution"
     assert finding.value == pytest.approx(late_ms, rel=0.1)
     # B τ off J is less than half its interval below that delay.
     J = analysis.fits[0]
-    assert finding.threshold <= 1e3 * 0.5 * (J.high[0] - J.low[0]) / J.value[1] * 1.001
+    assert finding.limit <= 1e3 * 0.5 * (J.high[0] - J.low[0]) / J.value[1] * 1.001
 
 
 @pytest.mark.parametrize("name", ["drive PI 20 Hz with load", "drive PI 30 Hz, 500/s"])

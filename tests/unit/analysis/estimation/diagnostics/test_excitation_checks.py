@@ -12,7 +12,6 @@ from tests.unit.analysis.estimation.diagnostics.sound_epoch import (
     N,
     T,
     assert_failed,
-    judged,
     passed,
     perturbed,
     pushed,
@@ -22,18 +21,17 @@ from tests.unit.analysis.estimation.diagnostics.sound_epoch import (
 
 from rigidimeter.analysis.estimation import Signals
 from rigidimeter.analysis.estimation.bandlimited import bandlimited_signals
-from rigidimeter.analysis.estimation.diagnostics import excitation_checks
+from rigidimeter.analysis.estimation.diagnostics.excitation_checks import (
+    band_share,
+    coherence,
+    conditioning,
+    imposed_sinusoid,
+)
 from rigidimeter.core.records import Channel
 from rigidimeter.core.settings import EstimationSettings
 from rigidimeter.model import JointDynamics
 
 __all__ = ["pushed", "sound"]
-
-
-band_share = judged(excitation_checks.band_share)
-coherence = judged(excitation_checks.coherence)
-conditioning = judged(excitation_checks.conditioning)
-imposed_sinusoid = judged(excitation_checks.imposed_sinusoid)
 
 
 def narrow(low_hz, high_hz):
@@ -48,22 +46,21 @@ def narrow(low_hz, high_hz):
 
 def test_a_narrow_motion_cannot_tell_inertia_from_stiffness():
     finding = conditioning(narrow(1.95, 2.05), SETTINGS)
-    assert_failed(finding, "cannot distinguish J from K", "90 % of the velocity's power", "Hz")
-    low, high = (float(part) for part in finding.text.split("between ")[1][:-3].split(" and "))
-    assert 1.8 < low < 2.0 < high < 2.2
+    assert_failed(finding, first="J", second="K")
+    assert 1.8 < finding.facts["low_hz"] < 2.0 < finding.facts["high_hz"] < 2.2
     assert passed(conditioning(narrow(0.2, 8.0), SETTINGS))
 
 
 def test_a_push_in_one_direction_cannot_tell_damping_from_stiffness():
     signals = narrow(0.2, 8.0)
     away = replace(signals, velocity_rad_s=np.exp(T / 5), angle_rad=5 * np.exp(T / 5) + 1e-3 * T)
-    assert_failed(conditioning(away, SETTINGS), "cannot distinguish B from K")
+    assert_failed(conditioning(away, SETTINGS), first="B", second="K")
 
 
 def test_a_joint_that_did_not_move_is_told(sound):
     still = replace(sound[1], angle_rad=np.zeros_like(sound[1].angle_rad))
     finding = conditioning(still, SETTINGS)
-    assert_failed(finding, "did not move")
+    assert_failed(finding, "at_rest")
     assert math.isinf(finding.value)
 
 
@@ -73,15 +70,15 @@ def test_coherence_is_the_share_that_follows(sound, pushed):
     epoch, signals, _ = sound
     other = perturbed(seed=5).channels["perturbation_nm"].values
     finding = coherence(with_channel(epoch, "perturbation_nm", other), signals, SETTINGS)
-    assert_failed(finding, "follows the perturbation")
+    assert_failed(finding, percent=100.0 * finding.value)
     assert finding.value < 0.35
 
 
 def test_drift_below_the_band_is_told(sound):
     epoch, signals, _ = sound
     drifting = epoch.channels["torque_nm"].values + 3.0 * np.sin(2 * np.pi * 0.05 * T)
-    assert_failed(band_share(with_channel(epoch, "torque_nm", drifting), signals, SETTINGS),
-                  "the torque's power lies in the band")  # fmt: skip
+    drifted = band_share(with_channel(epoch, "torque_nm", drifting), signals, SETTINGS)
+    assert_failed(drifted, signal="torque")
     assert passed(band_share(epoch, signals, SETTINGS))
 
 
@@ -104,5 +101,5 @@ def test_an_imposed_sinusoid_is_no_prbs(sound):
     x = 0.3 * np.sin(2 * np.pi * T)
     sine = replace(epoch, channels={"torque_nm": Channel("torque_nm", T, x),
                                     "angle_rad": Channel("angle_rad", T, x)})  # fmt: skip
-    assert_failed(imposed_sinusoid(sine, SETTINGS), "the motion is a sinusoid")
+    assert_failed(imposed_sinusoid(sine, SETTINGS))
     assert passed(imposed_sinusoid(epoch, SETTINGS))

@@ -7,8 +7,12 @@ import pytest
 
 from rigidimeter.analysis.estimation import fit_epochs
 from rigidimeter.analysis.estimation.diagnostics import checked
+from rigidimeter.analysis.estimation.diagnostics.movement_checks import loop_bias
+from rigidimeter.analysis.estimation.found import found as made
 from rigidimeter.analysis.estimation.prepared import prepare
-from rigidimeter.core.settings import parse_settings
+from rigidimeter.core.findings import Effect
+from rigidimeter.core.records import Fit, Outcome
+from rigidimeter.core.settings import DiagnosticsSettings, parse_settings
 from rigidimeter.model import JointDynamics
 from rigidimeter.virtual.batch import simulate_epochs
 
@@ -34,12 +38,61 @@ def test_a_level_that_was_set_is_used_in_any_case(level):
 @pytest.mark.parametrize(
     ("push_nm", "r_squared", "doubted"), [(0.5, 0.29, True), (0.5, 0.31, False), (0.0, 0.29, True)]
 )
-def test_a_small_r_squared_is_a_doubt_for_least_squares(push_nm, r_squared, doubted):
+def test_a_small_r_squared_asks_for_caution_with_least_squares(push_nm, r_squared, doubted):
     settings = parse_settings({"subject": {"OFF": {"voluntary_sd_nm": push_nm}}})
     epochs = [simulate_epochs(settings, 1, joints=[JOINT], conditions="OFF", seed=3).epoch(0)]
     (prepared,) = prepare(epochs, settings)
-    for method, level in (("bandlimited", "doubt"), ("iv", "note")):
+    for method, level in (("bandlimited", "caution"), ("iv", "note")):
         (fit,), _ = fit_epochs(epochs, method, settings)
         findings = checked(prepared, replace(fit, r_squared=r_squared)).findings
         assert [f.level for f in findings if f.name == "r_squared"] == [level] * doubted
     assert np.isfinite(fit.value).all()
+
+
+SMALL = Effect((0.4, -0.9, 0.0), (0.8, -0.7, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("effect", "levels", "level"),
+    [
+        (SMALL, {}, "note"),
+        (Effect((0.4, 1.2, 0.0), (0.8, 0.7, 0.0)), {}, "caution"),
+        (Effect((0.4, 0.9, 0.0), (0.8, 1.7, 0.0)), {}, "caution"),
+        (Effect((0.4, 0.9, np.nan), (0.8, 0.7, np.nan)), {}, "caution"),
+        (SMALL, {"loop_bias": "exclude"}, "exclude"),
+    ],
+    ids=["small", "over 1 %", "beyond the interval", "one unknown", "set by the user"],
+)
+def test_the_level_follows_what_a_finding_does_to_the_answer(effect, levels, level):
+    settings = DiagnosticsSettings.model_validate({"levels": levels})
+    finding = made("loop_bias", settings, 80.0, 50.0, effect=effect)
+    assert finding.level == level
+    assert ("below 1 % of each" in finding.details) == (level == "note")
+
+
+def test_a_bias_of_the_loop_below_a_percent_and_the_interval_is_a_note():
+    """80 % of half the interval passes the limit of 50 %, and is 0.8 % of K."""
+    value = np.array([0.0045, 0.1368, 1.751])
+    fit = Fit(
+        "a", "1", "OFF", "bandlimited", Outcome(), value=value, low=0.99 * value, high=1.01 * value
+    )
+    for percent, level in ((0.8, "note"), (1.2, "caution")):
+        look = loop_bias(fit, value * [1.0, 1.0, 1 - percent / 100], DiagnosticsSettings())
+        assert look.failed
+        assert look.effect.percent == pytest.approx((0.0, 0.0, percent))
+        assert look.effect.half_intervals == pytest.approx((0.0, 0.0, percent))
+        finding = made(
+            "loop_bias", DiagnosticsSettings(), look.value, look.limit, effect=look.effect
+        )
+        assert finding.level == level
+
+
+@pytest.mark.parametrize("method", ["iv", "bandlimited"])
+def test_a_push_says_what_it_does_to_the_method_used(method):
+    push = found(method, {"voluntary_sd_nm": 0.3})
+    effect = push["voluntary_torque"].effect
+    if method == "iv":
+        assert effect.percent == effect.half_intervals == (0.0, 0.0, 0.0)
+    else:
+        assert effect == push["loop_bias"].effect
+        assert 100 * np.max(np.abs(effect.half_intervals)) == pytest.approx(push["loop_bias"].value)

@@ -1,6 +1,5 @@
 """What a term that is left out does to J, B and K, and what the finding says of it."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -15,12 +14,12 @@ from rigidimeter.analysis.estimation.prepared import prepare
 from rigidimeter.analysis.study import estimate
 
 JOINTS = {
-    "coulomb": {"coulomb_nm": 0.1},
+    "friction": {"coulomb_nm": 0.1},
     "reflex": {"reflex_nm_s_rad": 0.15, "reflex_delay_s": 0.045},
-    "damping": {"damping_asymmetry": 0.5},
-    "cubic": {"cubic_nm_rad3": 40.0},
+    "directional damping": {"damping_asymmetry": 0.5},
+    "cubic stiffness": {"cubic_nm_rad3": 40.0},
     "coupling": {"cuff_nm_rad": 60.0, "cuff_nm_s_rad": 0.05},
-    "reflex: the torque holds a reflex of both directions": {
+    "a reflex": {
         "reflex_nm_s_rad": 0.3,
         "reflex_delay_s": 0.06,
         "reflex_sides": 2.0,
@@ -39,34 +38,29 @@ def fitted(method, joint=None, subject=None, seed=1):
     return fit, truth, found
 
 
-def changes(text):
-    """Return by what share J, B and K change if the terms are included."""
-    said = re.findall(r"J by ([^ ]+) %, B by ([^ ]+) %, K by ([^ ]+) %", text)[-1]
-    return 1.0 + np.array([float(number) for number in said]) / 100.0
-
-
 @pytest.mark.parametrize("method", ["iv", "bandlimited"])
 @pytest.mark.parametrize("term", list(JOINTS))
 def test_a_term_is_named_and_its_bias_told(method, term):
     fit, truth, found = fitted(method, JOINTS[term])
     finding = found["missing_term"]
-    assert finding.text.startswith(term)
-    assert finding.level == "doubt"
-    command = f"rigidimeter model --terms inertia,{'' if term == 'damping' else 'damping,'}"
-    assert command in finding.remedy or term == "coupling"
-    error, corrected = fit.value / truth - 1, fit.value * changes(finding.text) / truth - 1
+    assert finding.facts.get("terms", finding.facts.get("variant")) == term
+    assert finding.level == "caution"
+    asked = f"inertia,{'' if term == 'directional damping' else 'damping,'}stiffness,"
+    assert term == "coupling" or finding.facts["asked"].startswith(asked)
+    included = fit.value * (1.0 - np.array(finding.effect.percent) / 100.0)
+    error, corrected = fit.value / truth - 1, included / truth - 1
     # A damping of two directions has no single B; its mean is not what either direction has.
-    told = [0, 2] if term == "damping" else [0, 1, 2]
+    told = [0, 2] if term == "directional damping" else [0, 1, 2]
     for i in told:
         assert abs(corrected[i]) < max(0.4 * abs(error[i]), 0.06), "JBK"[i]
 
 
 def test_what_follows_the_perturbation_is_not_said_to_leave_the_estimate_unbiased():
     """A reflex of both directions: K of `iv` is more than twice the joint's own."""
-    fit, truth, found = fitted("iv", JOINTS["reflex: the torque holds a reflex of both directions"])
+    fit, truth, found = fitted("iv", JOINTS["a reflex"])
     assert fit.value[2] > 2 * truth[2]
-    assert "bias" not in found["residual_perturbation"].text
-    assert "lack_of_fit tests all epochs" in found["residual_perturbation"].text
+    assert found["residual_perturbation"].facts["variant"] == "chance"
+    assert np.isnan(found["residual_perturbation"].effect.percent).all()
 
 
 @pytest.mark.parametrize("method", ["iv", "bandlimited"])
@@ -81,11 +75,12 @@ def test_a_term_that_moves_less_than_the_intervals_is_a_note():
     (epoch,), _ = made.simulated(1, 1)
     (prepared,) = prepare([epoch], made.analysed_with())
     (fit,), _ = method_named("iv").fit([prepared], None, lambda _: None, False)
-    for width, level in ((0.05, "doubt"), (0.5, "note")):
+    for width, level in ((0.05, "caution"), (0.5, "note")):
         wide = replace(fit, low=(1 - width) * fit.value, high=(1 + width) * fit.value)
         (finding,) = (f for f in checked(prepared, wide).findings if f.name == "missing_term")
         assert finding.level == level
-        assert ("less than half their intervals" in finding.text) == (level == "note")
+        assert (finding.facts.get("variant") == "within") == (level == "note")
+        assert np.max(np.abs(finding.effect.half_intervals)) == pytest.approx(finding.value / 100)
 
 
 class TestTremor:
@@ -93,13 +88,10 @@ class TestTremor:
     def test_a_tremor_is_told_with_its_frequency_and_size(self, method):
         *_, found = fitted(method, subject={"tremor_nm": 0.3, "tremor_hz": (5.0, 5.0)})
         finding = found["tremor"]
-        frequency_hz, amplitude_nm = re.findall(
-            r"line at ([\d.]+) Hz of ([\d.]+) N·m", finding.text
-        )[0]
-        assert float(frequency_hz) == pytest.approx(5.0, abs=0.3)
-        assert float(amplitude_nm) == pytest.approx(0.3, rel=0.25)
+        assert finding.facts["frequency_hz"] == pytest.approx(5.0, abs=0.3)
+        assert finding.facts["amplitude_nm"] == pytest.approx(0.3, rel=0.25)
         # iv is not biased by it.
-        assert finding.level == ("note" if method == "iv" else "doubt")
+        assert finding.level == ("note" if method == "iv" else "caution")
 
     @pytest.mark.parametrize(
         "subject", [{}, {"voluntary_nm": 0.2}, {"voluntary_nm": 0.5}, {"bursts_nm": 0.3}]
@@ -113,27 +105,26 @@ class TestTremor:
 def test_so_little_friction_may_be_the_drives(coulomb_nm, said):
     _, _, found = fitted("bandlimited", {"coulomb_nm": coulomb_nm})
     finding = found["missing_term"]
-    assert finding.text.startswith("coulomb")
-    assert ("it is friction of the drive" in finding.text) == said
+    assert finding.facts["terms"] == "friction"
+    assert (finding.facts.get("variant") == "of_drive") == said
 
 
 @pytest.mark.parametrize(
     ("name", "doubted"),
     [("friction in the drive 3 N·m", True), ("friction in the joint 0.02 N·m", False)],
 )
-def test_without_the_command_friction_of_the_drive_leaves_the_inertia_in_doubt(name, doubted):
+def test_without_the_command_friction_of_the_drive_leaves_the_inertia_uncertain(name, doubted):
     """J is 6 % too small with that drive, and its interval does not say so."""
     (epoch,), _ = SCENARIOS[name].simulated(0, 1)
     settings = SCENARIOS[name].analysed_with()
     (fit,) = estimate([measured_alone(epoch)], "bandlimited", settings=settings).fits
-    doubts = {finding.name for finding in fit.findings if finding.level == "doubt"}
+    doubts = {finding.name for finding in fit.findings if finding.level == "caution"}
     assert "missing_term" in doubts
     assert ("between_samples" in doubts) == doubted
 
 
 def test_what_goes_with_the_angle_and_misses_a_term_may_have_one_cause():
-    _, _, found = fitted("iv", JOINTS["cubic"])
+    _, _, found = fitted("iv", JOINTS["cubic stiffness"])
     finding = found["varying_with_angle"]
-    assert finding.level == "doubt"
-    assert "cubic stiffness, which missing_term names" in finding.text
-    assert finding.remedy.startswith("include what missing_term names")
+    assert finding.level == "caution"
+    assert (finding.facts["variant"], finding.facts["terms"]) == ("with_term", "cubic stiffness")

@@ -88,11 +88,12 @@ def test_a_stiffness_that_rises_by_half_is_found_with_both_its_ends(relaxed):
     found = varying_findings(settings, stepping, "iv")
     assert found.keys() == {"varying_with_time"}
     finding = found["varying_with_time"]
-    assert finding.level == "doubt"
+    assert finding.level == "caution"
     assert finding.value == pytest.approx(40.0, abs=15.0)
-    assert finding.threshold == 10.0
-    assert "K goes from 1." in finding.text
-    assert "N·m/rad" in finding.text
+    assert finding.limit == 10.0
+    assert (finding.facts["symbol"], finding.facts["size_unit"]) == ("K", "N·m/rad")
+    assert 1.5 < finding.facts["low"] < 2.0 < finding.facts["high"] < 3.0
+    assert finding.p < 0.005
 
 
 @pytest.mark.parametrize("method", ["iv", "bandlimited"])
@@ -102,7 +103,7 @@ def test_a_stiffness_that_changes_with_the_angle_is_found(relaxed, method):
     curved = with_torque(epoch, lambda t, angle: K * 0.4 / np.radians(10) * angle**2 / 2)
     found = varying_findings(settings, curved, method)
     assert found.keys() == {"varying_with_angle"}
-    assert "deg from the mean angle" in found["varying_with_angle"].text
+    assert found["varying_with_angle"].facts["high_at"].endswith("° from the mean")
 
 
 def test_damping_that_drifts_is_not_called_stiffness(relaxed):
@@ -114,8 +115,8 @@ def test_damping_that_drifts_is_not_called_stiffness(relaxed):
 
     found = varying_findings(settings, with_torque(epoch, more_nm), "iv")
     assert found.keys() == {"varying_with_time"}
-    assert "B goes from" in found["varying_with_time"].text
-    assert "K goes" not in found["varying_with_time"].text
+    facts = found["varying_with_time"].facts
+    assert (facts["symbol"], facts["others"]) == ("B", "")
 
 
 def test_a_change_below_the_share_that_is_set_is_no_finding(relaxed):
@@ -132,10 +133,10 @@ def test_a_stiffness_that_follows_the_phase_of_a_movement_is_found_from_end_to_e
     epoch = open_loop(lambda t, phase: 40.5 + 22.5 * np.cos(phase), movement_rad=0.15)
     found = varying_findings(Settings(), epoch, "bandlimited")
     assert found.keys() == {"varying_with_phase"}
-    text = found["varying_with_phase"].text
-    assert "K goes from 18" in text
-    assert "to 63" in text or "to 62" in text
-    assert "cycle of 2 s" in text
+    facts = found["varying_with_phase"].facts
+    assert facts["symbol"] == "K"
+    assert (facts["low"], facts["high"]) == pytest.approx((18.0, 63.0), abs=1.0)
+    assert facts["high_at"].endswith("of the 2 s cycle")
 
 
 @pytest.mark.parametrize("movement_rad", [0.0, 0.15])

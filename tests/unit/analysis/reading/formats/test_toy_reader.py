@@ -67,7 +67,7 @@ def test_it_is_estimated_by_the_command_line(toy, path, tmp_path, rigidimeter):
 
 def test_it_is_listed(toy, tmp_path, rigidimeter):
     assert "toy recordings (.toy)" in formats_text()
-    assert "toy recordings (.toy)" in " ".join(rigidimeter("estimate", "--help").out.split())
+    assert "toy recordings (.toy)" in " ".join(rigidimeter("estimate", "--help-all").out.split())
     (tmp_path / "r.xyz").write_bytes(b"x")
     with pytest.raises(UserError, match=r"what can be read is .*\.mat, .* or \.toy"):
         recording.read(tmp_path / "r.xyz")

@@ -48,7 +48,7 @@ def test_what_no_number_of_the_computer_holds_is_refused(read, text):
 
 def test_epochs_are_whole():
     assert parse_integer("4", "epochs") == 4
-    with pytest.raises(UserError, match="no whole number"):
+    with pytest.raises(UserError, match="not a whole number"):
         parse_integer("4,5", "epochs")
 
 

@@ -68,7 +68,7 @@ def test_a_note_has_one_answer_that_says_whether_it_was_taken(said):
         assert answer["noted"] is False
         assert why in answer["say"]
     (answer,) = say(note, "another")
-    assert (answer["noted"], "only look" in answer["say"]) == (False, True)
+    assert (answer["noted"], "read-only" in answer["say"]) == (False, True)
 
 
 def test_a_rating_outside_the_scale_of_the_study_is_noted_and_said(said, tmp_path):
@@ -90,8 +90,8 @@ def test_another_folder_is_taken_when_the_disk_takes_nothing(said, tmp_path):
     assert "the recorder can write" in say(order)
     assert status.asked_folder() is None
     status.set_condition(Role.RECORDER, ProcessCondition.TROUBLE, "the disk is full")
-    assert "can only look" in say(order, "another")
-    assert "whole path" in say(order | {"folder": "disk"})
+    assert "is read-only" in say(order, "another")
+    assert "full path" in say(order | {"folder": "disk"})
     assert status.asked_folder() is None
     assert say(order) == f"ordered: save to {tmp_path / 'disk'}"
     assert status.asked_folder() == tmp_path / "disk"
@@ -235,7 +235,7 @@ def test_a_page_that_only_looks_orders_nothing_and_its_beat_is_nobodys(operator)
     assert operator.orders() == []
     assert not any(operator.status.flag(flag) for flag in Flag)
     assert operator.status.age_s(Role.CONSOLE) == math.inf
-    assert ["only look" in said for said in operator.told] == [True] * 3
+    assert ["read-only" in said for said in operator.told] == [True] * 3
     operator.sends("beat")
     assert operator.status.age_s(Role.CONSOLE) < math.inf
 

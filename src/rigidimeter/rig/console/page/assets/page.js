@@ -53,7 +53,7 @@
     control = message.control;
     const { session, finished, starting, checking } = message.state;
     $("take").hidden = control;
-    show("role", control ? "" : "this page can only look");
+    show("role", control ? "" : "this page is read-only");
     $("emergency").disabled = !(control && (session || checking || starting));
     $("save-form").hidden = !(control && session && session.save);
     const can = session ? session.orders : [];
@@ -157,7 +157,7 @@
     setInterval(() => {
       const fine = connected();
       if (fine && !away) say({ kind: "beat" });
-      if (!fine) banner("The connection to the program is lost. The arm is stopped without it; look at the arm, then reload this page.");
+      if (!fine) banner("The connection to the program is lost. The arm is stopped without it; check the arm, then reload this page.");
     }, BEAT_MS);
     traces.begin();
     view("before");

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from pathlib import PurePath
 
 SMALLEST_P = 1e-300
 """Below this a p-value has run out of floating point."""
@@ -82,19 +81,19 @@ def interval(low: float, high: float, digits: int = 4) -> str:
     return f"[{number(low, digits)} to {number(high, digits)}]"
 
 
-def p_value(p: float) -> str:
+def p_value(p: float, digits: int = 3) -> str:
     """Return a p-value, never as zero.
 
     Examples
     --------
-    >>> p_value(0.0004), p_value(1.234e-6), p_value(0.0496), p_value(0.0)
-    ('0.0004', '1.2e-06', '0.0496', '< 1e-300')
+    >>> p_value(0.0004), p_value(1.234e-6), p_value(0.0496), p_value(0.0), p_value(0.0336, 2)
+    ('0.0004', '1.2e-06', '0.0496', '< 1e-300', '0.034')
     """
     if math.isnan(p):
         return "–"
     if p < SMALLEST_P:
         return f"< {SMALLEST_P:.0e}"
-    return f"{p:.3g}" if p >= 1e-4 else f"{p:.1e}"
+    return f"{p:.{digits}g}" if p >= 1e-4 else f"{p:.1e}"
 
 
 def p_and_r(p: float, r: float) -> str:
@@ -107,11 +106,6 @@ def p_and_r(p: float, r: float) -> str:
     """
     text = f"p = {p_value(p)}, r = {r:.2f}".replace("= <", "<").replace("= -", "= −")
     return text.replace(" =", "\N{NO-BREAK SPACE}=").replace("= ", "=\N{NO-BREAK SPACE}")
-
-
-def plural(count: int, noun: str) -> str:
-    """Return ``1 epoch`` or ``2 epochs``."""
-    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def series(items: Sequence[str]) -> str:
@@ -135,12 +129,31 @@ def condition_name(condition: str) -> str:
     return condition or "(no condition)"
 
 
-def short_names(sources: Iterable[str]) -> dict[str, str]:
-    """Return the last parts of each path: as few as keep the sources apart."""
-    unique = list(dict.fromkeys(sources))
-    parts = {source: PurePath(source).parts for source in unique}
-    for depth in range(1, max(map(len, parts.values()), default=1) + 1):
-        names = {source: "/".join(parts[source][-depth:]) or source for source in unique}
-        if len(set(names.values())) == len(unique):
-            return names
-    return {source: source for source in unique}
+def decimals(half: float, value: float, two_below: float = 5.0) -> int:
+    """Return to how many decimals a value is written whose interval has this half-width.
+
+    The half-width has two digits if its first is below `two_below`, else one; where there is none
+    the value has two.
+
+    Examples
+    --------
+    >>> decimals(0.1, 26.0), decimals(8.0, 18.0), decimals(0.38, -0.083), decimals(math.nan, 17.8)
+    (2, 0, 2, 0)
+    """
+    size, below = (half, two_below) if 0 < half < math.inf else (abs(value), 10.0)
+    if not 0 < size < math.inf:
+        return 0
+    power = math.floor(math.log10(size))
+    return max((size < below * 10.0**power) - power, 0)
+
+
+def fixed(value: float, places: int, *, sign: bool = False) -> str:
+    """Return a number with so many decimals, with its sign if asked for; zero has none.
+
+    Examples
+    --------
+    >>> fixed(-0.17, 2), fixed(3.0, 0, sign=True), fixed(-0.001, 1, sign=True)
+    ('−0.17', '+3', '0.0')
+    """
+    text = f"{value:{'+' if sign else ''}.{places}f}"
+    return (text if float(text) else text.lstrip("+-")).replace("-", "−")

@@ -2,13 +2,13 @@
 
 The drive is known by how it explains the velocity at its samples. Drives that explain it as well
 give other parameters where the samples are too few to tell them apart. The largest change is δ;
-where it is more than a tenth of the parameter, what the drive tells is itself in doubt, its sign
+where it is more than a tenth of the parameter, what the drive tells is itself uncertain, its sign
 included, and δ is at least twice what it changes. δ is added to both ends of the interval,
 
     low = p̂ − t s − δ        high = p̂ + t s + δ
 
 with s the standard error and t Student's quantile; pooled epochs share the drive, so δ does not
-fall with their number. Where δ is more than a share of the parameter, the estimate is doubted.
+fall with their number. Where δ is more than a share of the parameter, it has the finding.
 """
 
 from __future__ import annotations
@@ -17,11 +17,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.closedloop.between_finding import doubt_of
+from rigidimeter.analysis.estimation.closedloop.between_finding import between_finding
 from rigidimeter.analysis.estimation.closedloop.linear_problems import Problem
 from rigidimeter.analysis.estimation.closedloop.observation import Observation
 from rigidimeter.analysis.estimation.signals import Array
-from rigidimeter.core.records import Epoch, Finding
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import Epoch
 from rigidimeter.core.settings import DiagnosticsSettings
 
 UNSETTLED = 0.1
@@ -80,6 +81,6 @@ def between_samples(
     settings : DiagnosticsSettings
     """
     share = 100.0 * between / np.abs(values)
-    worst = int(np.argmax(share))
-    name = "JBK"[len("JBK") - values.size :][worst]
-    return doubt_of(epoch, name, float(share[worst]), observation.drive_known, settings)
+    percent = np.concatenate([np.zeros(3 - values.size), share])  # J that was held is not moved
+    about = int(np.argmax(percent))
+    return between_finding(epoch, percent, about, observation.drive_known, settings)

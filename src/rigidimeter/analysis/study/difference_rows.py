@@ -1,0 +1,77 @@
+"""The table of differences as terminal and page show it: a row of cells for each measure."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from rigidimeter.analysis.study.conclusions import Conclusion, Conclusions
+from rigidimeter.analysis.study.differences import Difference, Three
+from rigidimeter.core.words import decimals, fixed, number, p_value, scaled
+
+VERDICTS = {
+    "lower": "lower",
+    "higher": "higher",
+    "no difference shown": "not shown",
+    "not supported": "not supported",
+    "cannot be decided": "undecided",
+}
+"""What a cell says of each verdict."""
+
+
+class DifferenceRow(NamedTuple):
+    """One measure of two conditions; differences are other − reference."""
+
+    conclusion: Conclusion
+    measure: str
+    unit: str
+    reference: str
+    other: str
+    difference: str
+    simulated: str
+    interval: str
+    p: str
+    verdict: str
+
+
+def difference_rows(concluded: Conclusions) -> list[DifferenceRow]:
+    """Return a row for each measure that was compared.
+
+    Differences are in % where that has a meaning. p is adjusted for all measures.
+    """
+    return [_row(one) for one in concluded.each]
+
+
+def _row(one: Conclusion) -> DifferenceRow:
+    d, measure = one.difference, one.comparison.measure
+    factor, unit = scaled(max(abs(d.reference), abs(d.other)), measure.unit)
+    difference, ends = _cells(d.percent, d.tested, factor)
+    return DifferenceRow(
+        one,
+        measure.short,
+        unit,
+        number(factor * d.reference, 3),
+        number(factor * d.other, 3),
+        difference,
+        "" if one.simulated is None else _simulated(one.simulated, factor),
+        ends,
+        "" if math.isnan(one.p) else p_value(one.p, 2),
+        VERDICTS[one.verdict],
+    )
+
+
+def _cells(percent: Three, own: Three, factor: float) -> tuple[str, str]:
+    in_percent = not math.isnan(percent[0])
+    estimate, low, high = percent if in_percent else (factor * size for size in own)
+    if math.isnan(estimate):
+        return "–", ""
+    after = " %" * in_percent
+    places = decimals((high - low) / 2, estimate)
+    ends = ""
+    if not math.isnan(low):
+        ends = f"{fixed(low, places, sign=True)} to {fixed(high, places, sign=True)}{after}"
+    return f"{fixed(estimate, places, sign=True)}{after}", ends
+
+
+def _simulated(d: Difference, factor: float) -> str:
+    return _cells(d.percent, d.tested, factor)[0] if d.estimate else "0"

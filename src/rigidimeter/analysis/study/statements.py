@@ -1,0 +1,206 @@
+"""What was measured, what was tested, and what is concluded, in words.
+
+Always in this order, the same on the terminal, on the page and in documents. The first speaks of
+these recordings alone, whatever their number; only the last speaks of the conditions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Literal, NamedTuple
+
+from rigidimeter.analysis.study.conclusions import Conclusion, Conclusions, conclude
+from rigidimeter.analysis.study.days_to_decide import WANTED
+from rigidimeter.analysis.study.differences import Three
+from rigidimeter.analysis.study.reached_precision import precisions
+from rigidimeter.analysis.study.results import StudyResult
+from rigidimeter.core.words import (
+    amount,
+    condition_name,
+    decimals,
+    fixed,
+    number,
+    p_value,
+    plural,
+    series,
+    within,
+)
+
+LEAST_P = 0.0001
+"""Below this a sentence does not say how small p is; tables do."""
+
+
+class Statements(NamedTuple):
+    """Three statements on two conditions; `concluded` has a sentence for each verdict."""
+
+    measured: str
+    tested: str
+    concluded: tuple[str, ...]
+
+
+def statements(result: StudyResult) -> Statements | None:
+    """Return the statements on a pair of conditions; None where no two were compared."""
+    concluded = conclude(result)
+    if concluded is None:
+        return None
+    return Statements(_measured(concluded), _tested(concluded), tuple(_concluded(concluded)))
+
+
+def lead(result: StudyResult) -> str:
+    """Return the sentence to quote."""
+    prefix = ""
+    if result.virtual or any(epoch.virtual for epoch in result.epochs):
+        prefix = "Virtual data. "
+    if result.blinded:
+        prefix += "Blinded: the names of the conditions are codes. "
+    concluded = conclude(result)
+    if concluded is None:
+        return prefix + _only_condition(result)
+    shown = concluded.of("lower", "higher")
+    said = _quoted(shown) if shown else f"{_measured(concluded)} {_concluded(concluded)[0]}"
+    paths = {out.path for out in result.left_out}
+    if paths:
+        total = len(paths | {session.source for session in result.sessions})
+        are = "is" if len(paths) == 1 else "are"
+        said += f" {len(paths)} of {plural(total, 'session')} {are} left out."
+    return prefix + said
+
+
+def _quoted(shown: Sequence[Conclusion]) -> str:
+    """Return ``Stiffness K was 18 % lower in DBS than in OFF (95 % interval …, p = 0.004)``."""
+    parts: list[str] = []
+    for one in shown:
+        c, d = one.comparison, one.difference
+        size = _size(d.percent, d.tested, c.measure.unit)
+        against = "" if parts else f" in {c.other} than in {c.reference}"
+        inside = [f"95 % interval {size.ends}"] if size.ends else []
+        inside += [one.test] if one.test and one.test != (shown[0].test if parts else "") else []
+        title = within(c.measure.title) if parts else c.measure.title
+        was = " was" if not parts else ""
+        inside.append(_p_text(one.p))
+        parts.append(f"{title}{was} {size.value} {one.verdict}{against} ({', '.join(inside)})")
+    return f"{series(parts)}."
+
+
+class _Size(NamedTuple):
+    went: str
+    value: str
+    ends: str
+
+
+def _size(percent: Three, own: Three, unit: str, two_below: float = 5.0) -> _Size:
+    """Return a difference without its sign, and its interval in the same direction."""
+    known = not math.isnan(percent[0])
+    estimate, low, high = percent if known else own
+    after = " %" if known else f" {unit}".rstrip()
+    digits = decimals((high - low) / 2, estimate, two_below)
+    went = "changed" if not round(estimate, digits) else "fell" if estimate < 0 else "rose"
+    if estimate < 0:
+        estimate, low, high = -estimate, -high, -low
+    ends = "" if math.isnan(low) else f"{fixed(low, digits)} to {fixed(high, digits)}{after}"
+    return _Size(went, f"{fixed(estimate, digits)}{after}", ends)
+
+
+def _measured(concluded: Conclusions) -> str:
+    """Return ``Between these recordings K fell by 26 % (25.9 to 26.1), …``."""
+    parts: list[str] = []
+    before = ""
+    for one in concluded.each:
+        c, d = one.comparison, one.difference
+        if math.isnan(d.estimate):
+            continue
+        size = _size(d.measured_percent, d.measured, c.measure.unit, 1.0)
+        ends = f" ({size.ends.removesuffix(' %')})" if size.ends else ""
+        went = f" {size.went}" * (size.went != before)
+        parts.append(f"{c.measure.short}{went} by {size.value}{ends}")
+        before = size.went
+    if not parts:
+        return "No measure has values in both conditions."
+    pair = concluded.each[0].comparison
+    change = f"from {condition_name(pair.reference)} to {condition_name(pair.other)}"
+    alone = " In brackets: 95 % of the measurement alone." if "(" in "".join(parts) else ""
+    return f"Between these recordings, {change}, {series(parts)}.{alone}"
+
+
+def _tested(concluded: Conclusions) -> str:
+    """Return by what the measures were tested, and for how many tests p is adjusted."""
+    tests: dict[str, list[str]] = {}
+    for one in concluded.each:
+        if one.test and not math.isnan(one.p):
+            tests.setdefault(one.test, []).append(one.comparison.measure.short)
+    if not tests:
+        return "Nothing could be tested."
+    of = len(tests) > 1
+    text = "; ".join(f"{test} ({', '.join(own)})" if of else test for test, own in tests.items())
+    count = concluded.adjusted_for
+    what = "measures" if count == concluded.tested else "tests"
+    holm = f"; p adjusted by Holm’s method for {count} {what}, intervals not"
+    adjusted = holm if count > 1 else ""
+    return f"{text[:1].upper()}{text[1:]}{adjusted}."
+
+
+def _concluded(concluded: Conclusions) -> list[str]:
+    """Return a sentence for each verdict and reason, the most important first."""
+    pair = concluded.each[0].comparison
+    reference, other = condition_name(pair.reference), condition_name(pair.other)
+    both = f"{reference} and {other}"
+
+    def names(members: Iterable[Conclusion]) -> str:
+        return series([one.comparison.measure.short for one in members])
+
+    found = []
+    sides: tuple[Literal["lower", "higher"], ...] = ("lower", "higher")
+    for side in sides:
+        if own := concluded.of(side):
+            are = "is" if len(own) == 1 else "are"
+            found.append(f"{names(own)} {are} {side} in {other} than in {reference}")
+    for reason, withheld in _by_reason(concluded.of("not supported")):
+        found.append(f"a difference in {names(withheld)} is not supported: {reason}")
+    for reason, withheld in _by_reason(concluded.of("no difference shown")):
+        why = f": {reason}" if reason else ""
+        found.append(f"no difference between {both} is shown in {names(withheld)}{why}")
+    for reason, withheld in _by_reason(concluded.of("cannot be decided")):
+        found.append(
+            f"whether {both} differ in {names(withheld)} cannot be decided: {reason}"
+            f"{_would_decide(withheld)}"
+        )
+    return [f"{sentence[:1].upper()}{sentence[1:]}." for sentence in found]
+
+
+def _would_decide(withheld: Iterable[Conclusion]) -> str:
+    """Return how many days would show a difference, for the first measure where that is known."""
+    for one in withheld:
+        if one.days_to_decide is not None:
+            return (
+                f"; {one.days_to_decide} days with both conditions would show a difference of "
+                f"{100 * WANTED:.0f} % in {one.comparison.measure.short}"
+            )
+    return ""
+
+
+def _by_reason(members: Iterable[Conclusion]) -> list[tuple[str, list[Conclusion]]]:
+    """Return the conclusions that share a reason, in the order of the first of each."""
+    found: dict[str, list[Conclusion]] = {}
+    for one in members:
+        found.setdefault(one.reason, []).append(one)
+    return list(found.items())
+
+
+def _only_condition(result: StudyResult) -> str:
+    """Return the values of the only condition, where there is nothing to compare."""
+    parts = []
+    for one in precisions(result):
+        ends = "" if math.isnan(one.percent) else f" ± {number(one.percent, 2)} %"
+        parts.append(f"{within(one.measure.title)} {amount(one.value, one.measure.unit, 3)}{ends}")
+    if not parts:
+        return "No epoch could be included; the reasons are listed under “Exclusions”."
+    name = f"{condition_name(result.reference)}: " if result.reference else ""
+    text = f"{name}{', '.join(parts)} (95 % intervals)."
+    return text[:1].upper() + text[1:]
+
+
+def _p_text(p: float) -> str:
+    """Return a p-value as a sentence quotes it."""
+    text = p_value(p, 2) if p >= LEAST_P else f"< {LEAST_P:.4f}"
+    return f"p {text if text.startswith('<') else f'= {text}'}"

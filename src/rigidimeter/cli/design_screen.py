@@ -1,0 +1,149 @@
+"""The first screen of a design: what is commanded, what to expect, and the days that it takes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from rigidimeter.cli.terminal_tables import Block, Heading, Table
+from rigidimeter.core.records import PARAMETERS
+from rigidimeter.core.units import deg_from_rad
+from rigidimeter.core.words import number, scaled
+from rigidimeter.model import Margins
+from rigidimeter.planning import Design, Detection, chip_count
+
+
+def first_screen(design: Design) -> Iterator[Block]:
+    """Yield the perturbation, the loop, the precision of an epoch, and the days needed."""
+    yield _perturbation(design)
+    yield _loop(design)
+    if design.precision:
+        yield ""
+        yield from _precision(design)
+    if design.detections:
+        yield ""
+        yield from days_needed(design.detections)
+    yield from _found_by_search(design)
+    remarks = [f"{text}." for text in design.remarks]
+    warnings = [f"Warning: {text}." for text in (*design.warnings, *design.stability.warnings)]
+    yield from (*remarks, *warnings)
+    if design.detections:
+        yield "--full: everything · --out DIR: a folder of the plan · --json FILE: every number"
+    else:
+        yield ""
+        yield "--detect damping=20%: the days, epochs and subjects it takes · --full: all"
+
+
+def days_needed(detections: Sequence[Detection]) -> Iterator[Block]:
+    """Yield the table of days by epochs a day, and the scatter that it assumes."""
+    first = detections[0]
+    yield Heading(
+        f"Days with both conditions that show a difference from {first.condition}: power "
+        f"{first.power:g}, level {first.alpha:g}"
+    )
+    heads = [f"{each.epochs[0]}" for each in first.needed]
+    if first.planned is not None:
+        heads.append("plan {}+{}".format(*first.planned.epochs))
+    rows = []
+    for found in detections:
+        each = [*found.needed, *([] if found.planned is None else [found.planned])]
+        rows += [
+            (f"{_difference(found)}: days", *(_count(one.days) for one in each)),
+            ("  days, Holm for J, B and K", *(_count(one.days_holm) for one in each)),
+            ("  subjects, one day each", *(_count(one.subjects) for one in each)),
+        ]
+    align = "<" + ">" * len(heads)
+    yield Table(("epochs a day and condition", *heads), rows, align, 1)
+    yield from _scatter(detections)
+
+
+def _perturbation(design: Design) -> str:
+    prbs = design.settings.prbs
+    motion = ", ".join(
+        f"{name} {deg_from_rad(found.angle_sd_rad):.1f}°"
+        for name, found in design.precision.items()
+    )
+    return (
+        f"PRBS     ±{prbs.amplitude_nm:g} N·m, {chip_count(prbs)} chips at {prbs.clock_hz:g} Hz, "
+        f"{prbs.duration_s:g} s" + (f"; SD of the angle {motion}" if motion else "")
+    )
+
+
+def _loop(design: Design) -> str:
+    unstable = [n for n, found in design.stability.conditions.items() if not found.stable]
+    if unstable:
+        return f"loop     UNSTABLE with {', '.join(unstable)}"
+    return (
+        f"loop     stable, margins {_smallest(design.stability.conditions)}; worst joint "
+        f"{_smallest(design.stability.worst)}"
+    )
+
+
+def _smallest(found: Mapping[str, Margins]) -> str:
+    gain_db = min(margins.gain_margin_db for margins in found.values())
+    phase_deg = min(margins.phase_margin_deg for margins in found.values())
+    gain = "any gain" if math.isinf(gain_db) else f"{gain_db:.3g} dB"
+    return f"{gain} and {'any phase' if math.isinf(phase_deg) else f'{phase_deg:.3g}°'}"
+
+
+def _precision(design: Design) -> Iterator[Block]:
+    low, high = next(iter(design.precision.values())).iv_band_hz
+    yield Heading(f"Predicted standard error of one epoch (iv, {low:.2g}–{high:.2g} Hz)")
+    sizes = [found.values for found in design.precision.values()]
+    scales = [
+        scaled(max(values), parameter.unit)
+        for values, parameter in zip(zip(*sizes, strict=True), PARAMETERS, strict=True)
+    ]
+    rows = []
+    for name, found in design.precision.items():
+        cells = []
+        for value, error, (factor, _) in zip(found.values, found.iv.free, scales, strict=True):
+            share = f" ± {100 * error / value:.2g} %" if value else ""
+            cells.append(f"{number(factor * value, 3)}{share}")
+        rows.append((name, *cells))
+    heads = [f"{each.symbol}, {unit}" for each, (_, unit) in zip(PARAMETERS, scales, strict=True)]
+    yield Table(("", *heads), rows, "<===", 1)
+
+
+def _difference(found: Detection) -> str:
+    percent = -100.0 * found.difference / found.value
+    return f"{found.wanted.parameter} {percent:+.3g} %".replace("-", "−")
+
+
+def _count(needed: int | None) -> str:
+    return "> 1000" if needed is None else f"{needed}"
+
+
+def _scatter(detections: Sequence[Detection]) -> Iterator[Block]:
+    by_source: dict[str, list[str]] = {}
+    for found in detections:
+        s = found.scatter
+        by_source.setdefault(s.source, []).append(
+            f"{found.wanted.parameter} {s.between_epochs_percent:.2g}, "
+            f"{s.between_days_percent:.2g}, {s.condition_in_day_percent:.2g} %"
+        )
+    share = 100.0 * detections[0].scatter.between_subjects
+    yield (
+        f"SD of epochs, of days, of one condition on a day; effect between subjects {share:.0f} %"
+    )
+    for source, texts in by_source.items():
+        yield f" {'; '.join(dict.fromkeys(texts))} ({source})"
+
+
+def _found_by_search(design: Design) -> Iterator[Block]:
+    """Yield the best sequence of the search and the multisine, a line each."""
+    if design.ranked and design.present:
+        best = design.ranked[0]
+        yield (
+            f"Best PRBS of {len(design.ranked)} ({design.criterion}): {best.prbs.register_bits} "
+            f"bits at {best.prbs.clock_hz:.4g} Hz, ±{best.prbs.amplitude_nm:.3g} N·m: error "
+            f"{best.cost_percent:.2g} %, now {design.present.cost_percent:.2g} %."
+        )
+    if design.multisine is not None:
+        name, errors = next(iter(design.multisine.errors.items()))
+        pairs = zip("JBK", errors["same_peak_torque"], errors["prbs"], strict=True)
+        ratios = ", ".join(f"{symbol} {other / own:.2f}" for symbol, other, own in pairs if own)
+        yield (
+            f"Multisine of the same peak torque: standard errors {ratios} times those of the PRBS "
+            f"({name})."
+        )

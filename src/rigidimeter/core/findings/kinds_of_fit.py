@@ -1,0 +1,247 @@
+"""Findings of the fit: can J, B and K be told apart, and do they explain the torque."""
+
+from __future__ import annotations
+
+from rigidimeter.core.findings.kind import Kind
+
+OF_SUBJECT = {
+    "instrument": {
+        "meaning": "{method} uses only the motion that the perturbation causes: J, B and K are not "
+        "biased, and their intervals include it."
+    },
+    "small_bias": {
+        "meaning": "In this loop it biases J, B and K by {share:.2g} % of half their intervals at "
+        "most."
+    },
+    "negligible": {"meaning": "It biases {changes}: below 1 % of each and half their intervals."},
+}
+"""Why torque that something but the robot adds does not matter to an estimate."""
+
+OF_SUBJECT_EXAMPLE = {"method": "iv", "share": 12.0, "percent_of": (-0.4, 0.31, 0.0)}
+
+FIT_KINDS = (
+    Kind(
+        "conditioning",
+        "1",
+        "caution",
+        "condition number of acceleration, velocity and angle, each scaled to unit length; which "
+        "two are indistinguishable, and the band of the motion's power",
+        headline="The motion cannot tell {first} from {second}",
+        measured="The condition number of the motion is {value:.3g} (at most {limit:g}): 90 % of "
+        "the velocity's power lies between {low_hz:.2g} and {high_hz:.2g} Hz.",
+        meaning="{first} and {second} trade against each other, so neither is known.",
+        remedy="Use a perturbation with more frequencies, or hold J at the median of other epochs.",
+        setting="max_condition_number",
+        variants={
+            "at_rest": {
+                "headline": "The joint did not move",
+                "measured": "The condition number of the motion is infinite (at most {limit:g}).",
+                "meaning": "The joint did not move, so J, B and K are not in the torque.",
+            }
+        },
+        example={
+            "value": 34.0,
+            "limit": 10.0,
+            "first": "J",
+            "second": "K",
+            "low_hz": 1.8,
+            "high_hz": 2.3,
+        },
+    ),
+    Kind(
+        "imposed_sinusoid",
+        "%",
+        "exclude",
+        "share of the angle's variance in its strongest line, where that line also holds half of "
+        "the velocity's: steps to and fro are no sinusoid",
+        headline="The motion is a sinusoid: one frequency holds {value:.0f} % of it",
+        measured="The strongest line holds {value:.0f} % of the angle's variance (at most "
+        "{limit:g} %) and {velocity:.0f} % of the velocity's.",
+        meaning="At a single frequency J and K are one number, K − J ω², so neither is known.",
+        remedy="Score it as an imposed sinusoid (--task sinusoid), or use a PRBS.",
+        setting="max_single_frequency_percent",
+        example={"value": 97.0, "limit": 85.0, "velocity": 94.0},
+    ),
+    Kind(
+        "static_torque",
+        "%",
+        "exclude",
+        "share of the torque's variance that is not a function of the angle: squared differences "
+        "of the torque between samples sorted by angle",
+        headline="The torque is a function of the angle alone",
+        measured="Only {value:.2g} % of the torque's variance is not a function of the angle (at "
+        "least {limit:g} %).",
+        meaning="The torque was computed from the angle, or the joint moved too slowly for inertia "
+        "and damping: J and B are not in it.",
+        remedy="Record what the torque sensor measured, or use a faster perturbation.",
+        setting="min_static_torque_percent",
+        example={"value": 0.02, "limit": 0.5},
+    ),
+    Kind(
+        "band_share",
+        "%",
+        "caution",
+        "share of the power of torque and velocity about their means, as recorded, that lies in "
+        "the band of the fit or less than 0.75 spectral lines from it; the smaller. Epochs below "
+        "14 s cannot tell drift from the slowest part of a band that begins at 0.15 Hz",
+        headline="Only {value:.0f} % of the {signal}'s power lies in the band",
+        measured="Only {value:.0f} % of the {signal}'s power lies in the band, {low_hz:g} to "
+        "{high_hz:.3g} Hz (at least {limit:g} %).",
+        meaning="Most of what was measured is drift below or noise above the band, so J, B and K "
+        "are from a small part of it.",
+        remedy="Look for drift and slow pushes, check rate and unit of the time, and set the band "
+        "to what was perturbed (--band-hz).",
+        setting="min_band_share_percent",
+        example={"value": 21.0, "limit": 50.0, "signal": "torque", "low_hz": 0.15, "high_hz": 10.0},
+    ),
+    Kind(
+        "coherence",
+        "1",
+        "caution",
+        "median coherence of the perturbation with torque and velocity in the band; the smaller. "
+        "Unrelated signals show about 0.2",
+        headline="Only {percent:.0f} % of the {signal}'s power follows the perturbation",
+        measured="The coherence of perturbation and {signal} has a median of {value:.2f} in the "
+        "band (at least {limit:g}); the rest is torque that something but the robot adds, noise, "
+        "or a joint that is not linear.",
+        meaning="That may bias J, B and K.",
+        remedy="Perturb more strongly, pool epochs, or repeat while the robot alone moves the "
+        "joint.",
+        setting="min_coherence",
+        variants=OF_SUBJECT,
+        example={
+            "value": 0.31,
+            "limit": 0.5,
+            "percent": 31.0,
+            "signal": "torque",
+            **OF_SUBJECT_EXAMPLE,
+        },
+    ),
+    Kind(
+        "residual_whiteness",
+        "1",
+        "note",
+        "spectral flatness of the residual in the band, 1 for white",
+        headline="What J, B and K leave is not white: flatness {value:.2f}",
+        measured="The residual's spectral flatness in the band is {value:.2f} (at least {limit:g}; "
+        "1 is white): something but the robot adds torque, or the model lacks something.",
+        meaning="Standard errors for white noise would be too small.",
+        remedy="Use the intervals, which allow for a residual of any colour.",
+        setting="min_residual_flatness",
+        variants=OF_SUBJECT,
+        example={"value": 0.42, "limit": 0.7, **OF_SUBJECT_EXAMPLE},
+    ),
+    Kind(
+        "residual_perturbation",
+        "%",
+        "caution",
+        "largest correlation of residual and perturbation up to 1 s either way, times the "
+        "residual's SD, in % of the torque's SD",
+        headline="{value:.2g} % of the torque follows the perturbation and is not explained",
+        measured="What J, B and K leave follows the perturbation by {value:.2g} % of the torque's "
+        "SD (at most {limit:g} %), with a correlation of {correlation:.2f} at a lag of {lag_s:.2g} "
+        "s (by chance up to {chance:.2f}).",
+        meaning="The model lacks something that the perturbation causes; J, B and K may take it "
+        "for their own.",
+        remedy="Look for a delay, a reflex or stiffness that changes with the angle; torque from "
+        "elsewhere does this to least squares too.",
+        setting="max_residual_perturbation_percent",
+        variants={
+            "chance": {
+                "meaning": "The model lacks something, unless this is the one epoch in 20 that "
+                "shows as much by chance; lack_of_fit tests all epochs together."
+            }
+        },
+        example={"value": 14.0, "limit": 10.0, "correlation": 0.21, "lag_s": 0.06, "chance": 0.14},
+    ),
+    Kind(
+        "held_out_vaf",
+        "%",
+        "exclude",
+        "variance of the second half's torque explained by J, B and K of the first half",
+        headline="The first half's J, B, K explain {value:.1f} % of the second",
+        measured="J, B and K of the epoch's first half explain {value:.1f} % of the second half's "
+        "torque (at least {limit:g} %).",
+        meaning="The fit does not predict torque that it has not seen, so its "
+        "numbers mean nothing.",
+        remedy="Look for torque from elsewhere than the robot, and for a change during the epoch.",
+        setting="min_held_out_vaf_percent",
+        variants=OF_SUBJECT,
+        example={"value": -40.2, "limit": 0.0, **OF_SUBJECT_EXAMPLE},
+    ),
+    Kind(
+        "r_squared",
+        "1",
+        "caution",
+        "R² of the fit",
+        headline="J, B and K explain little of the torque: R² {value:.2g}",
+        measured="R² is {value:.2g} (at least {limit:g}).",
+        meaning="Most of the torque is not J, B and K, and least squares puts a part of it into "
+        "them.",
+        remedy="Look for torque from elsewhere than the robot, or record the perturbation and use "
+        "iv.",
+        setting="min_r_squared",
+        variants={"instrument": OF_SUBJECT["instrument"]},
+        example={"value": 0.21, "limit": 0.3, **OF_SUBJECT_EXAMPLE},
+    ),
+    Kind(
+        "gravity",
+        "N·m/rad",
+        "note",
+        "K without the slope m g l cos θ of the limb's weight, in N·m/rad, beside K itself; m g l "
+        "is `gravity_nm`, and θ the angle from hanging straight down, `gravity_angle_deg` where "
+        "the recorded angle is 0. Not looked at while `gravity_nm` is 0",
+        headline="K without the limb's weight is {value:.4g} N·m/rad",
+        measured="K of {stiffness:.4g} N·m/rad includes {slope:.4g} of the limb's weight (m g l "
+        "cos θ).",
+        meaning="Without it K is {value:.4g} N·m/rad.",
+        remedy="State which of the two is given.",
+        setting="gravity_nm",
+        example={"value": 1.404, "stiffness": 1.75, "slope": 0.346},
+    ),
+    Kind(
+        "negative_parameters",
+        "1",
+        "caution",
+        "number of J, B and K that are not positive",
+        headline="{names}: not above zero",
+        measured="{names}: not above zero.",
+        meaning="No joint is like that: something but the robot may have pushed, or the channels "
+        "are delayed relative to each other.",
+        remedy="Check the time stamps of torque and motion, and see the torque beyond J, B and K.",
+        variants={
+            "noise": {
+                "meaning": "Not all of their intervals lie below zero, so the torque says little "
+                "of a joint.",
+                "remedy": "Check which column is the torque.",
+            },
+            "reaction": {
+                "headline": "J, B and K are below zero: the torque's sign is wrong",
+                "meaning": "The torque has the sign of the joint's reaction.",
+                "remedy": "Say --reaction.",
+            },
+        },
+        example={"value": 1.0, "limit": 0.0, "names": "J and B"},
+    ),
+    Kind(
+        "implausible_parameters",
+        "1",
+        "caution",
+        "largest factor by which J, B or K exceeds `min_inertia_kg_m2`, `max_inertia_kg_m2`, "
+        "`max_damping_nm_s_rad` or `max_stiffness_nm_rad`",
+        headline="{symbol} = {size:.3g} {size_unit} is too {side} for a joint",
+        measured="{symbol} = {size:.3g} {size_unit} is {value:.3g} times beyond the end of its "
+        "range.",
+        meaning="No joint of a person or an animal is like that; a machine's axis may be.",
+        remedy="Check the units of torque (N·m), angle (rad, not degrees) and time (s); for such "
+        "an axis set the ranges in [diagnostics].",
+        example={
+            "value": 57.0,
+            "limit": 1.0,
+            "symbol": "K",
+            "size": 114000.0,
+            "size_unit": "N·m/rad",
+            "side": "large",
+        },
+    ),
+)

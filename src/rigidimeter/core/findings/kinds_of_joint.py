@@ -1,0 +1,221 @@
+"""Findings of the subject: who moved the joint, and whether it stayed the same."""
+
+from __future__ import annotations
+
+from rigidimeter.core.findings.kind import Kind
+from rigidimeter.core.findings.kinds_of_fit import OF_SUBJECT, OF_SUBJECT_EXAMPLE
+
+_VARYING = {
+    "value": 42.0,
+    "limit": 10.0,
+    "p": 4e-5,
+    "symbol": "K",
+    "size_unit": "N·m/rad",
+    "low": 1.34,
+    "low_half": 0.1,
+    "high": 2.05,
+    "high_half": 0.12,
+    "others": "",
+}
+_GOES = (
+    "{symbol} goes from {low:.3g} ± {low_half:.2g} {size_unit} at {low_at} to {high:.3g} ± "
+    "{high_half:.2g} {size_unit} at {high_at}, {value:.0f} % of its mean (at most {limit:g} %; {p})"
+    "{others}."
+)
+_HEADLINE = "{symbol} goes from {low:.3g} to {high:.3g} {size_unit} "
+_MEAN = "The estimate is a mean over a joint that changed, and its interval "
+_ABOUT = "use a smaller perturbation about each angle of interest, and state the angle."
+
+JOINT_KINDS = (
+    Kind(
+        "loop_bias",
+        "%",
+        "caution",
+        "bias of least squares from torque of the subject that comes back as motion by the loop, "
+        "computed from the recording; the largest of J, B and K, in % of half the interval. Above "
+        "56 % an interval for 95 % holds the truth in less than 80 %",
+        headline="Torque from elsewhere biases {changes}",
+        measured="Torque beyond J, B and K, which the loop turns into motion, moves {changes}, "
+        "{value:.2g} % of half their intervals at most (at most {limit:g} %).",
+        meaning="Least squares takes it for the joint, and the intervals do not include that.",
+        remedy="Record the perturbation and use iv, or repeat while the robot alone moves the "
+        "joint.",
+        setting="max_loop_bias_percent",
+        variants={
+            "unknown": {
+                "headline": "Torque from elsewhere biases J, B and K too far to compute",
+                "measured": "No J, B and K go with this torque in this loop.",
+                "meaning": "Least squares takes torque beyond J, B and K for the joint, and how "
+                "much cannot be computed.",
+            },
+            "negligible": OF_SUBJECT["negligible"],
+        },
+        example={"value": 180.0, "limit": 50.0, "percent_of": (-17.0, -16.0, -7.2)},
+    ),
+    Kind(
+        "voluntary_torque",
+        "%",
+        "caution",
+        "power of M_sub = J θ″ + B θ′ + K θ − M between `voluntary_low_hz` and "
+        "`voluntary_high_hz`, in % of the torque's variance",
+        headline="Torque beyond J, B, K is {value:.2g} % of the torque's variance",
+        measured="The torque beyond J, B and K has an SD of {sd_nm:.3g} N·m; from {low_hz:g} to "
+        "{high_hz:g} Hz it is {value:.2g} % of the torque's variance (at most {limit:g} %).",
+        meaning="Least squares takes part of it for the joint: in a closed loop J and B come out "
+        "low.",
+        remedy="Record the perturbation, use iv and pool epochs, or leave the epoch out.",
+        setting="max_voluntary_share_percent",
+        variants=OF_SUBJECT,
+        example={
+            "value": 23.0,
+            "limit": 15.0,
+            "sd_nm": 0.21,
+            "low_hz": 0.3,
+            "high_hz": 4.0,
+            **OF_SUBJECT_EXAMPLE,
+        },
+    ),
+    Kind(
+        "active_movement",
+        "%",
+        "caution",
+        "share of seconds in which the SD of M_sub passes `active_torque_nm` and "
+        "`active_share_percent` of the torque's SD",
+        headline="Something but the robot pushed in {value:.0f} % of the seconds",
+        measured="The torque beyond J, B and K exceeds {above_nm:.2g} N·m in {value:.0f} % of the "
+        "seconds (at most {limit:g} %), first at {first_s:.1f} s: the joint was not at rest.",
+        meaning="Least squares takes part of such torque for the joint.",
+        remedy="Repeat while the robot alone moves the joint, or leave these seconds out.",
+        setting="max_active_percent",
+        variants=OF_SUBJECT,
+        example={
+            "value": 44.0,
+            "limit": 20.0,
+            "above_nm": 0.1,
+            "first_s": 3.0,
+            **OF_SUBJECT_EXAMPLE,
+        },
+    ),
+    Kind(
+        "emg_activity",
+        "%",
+        "caution",
+        "share of the time in which the EMG's mean rectified value over `emg_window_s` passes "
+        "`emg_baseline_factor` times its own quietest fifth",
+        headline="The muscle was active in {value:.0f} % of the time",
+        measured="The EMG exceeds {factor:g} times its baseline of {baseline_uv:.3g} µV in "
+        "{value:.0f} % of the time (at most {limit:g} %).",
+        meaning="The muscle was active, so J, B and K are not those of a relaxed joint.",
+        remedy="Ask the subject to relax and repeat, or leave the active part out.",
+        setting="max_emg_active_percent",
+        variants=OF_SUBJECT,
+        example={
+            "value": 38.0,
+            "limit": 20.0,
+            "factor": 3.0,
+            "baseline_uv": 12.0,
+            **OF_SUBJECT_EXAMPLE,
+        },
+    ),
+    Kind(
+        "tremor",
+        "%",
+        "caution",
+        "power of M_sub in the strongest 1 Hz between `tremor_low_hz` and `tremor_high_hz`, in % "
+        "of the torque's variance, if it is three times that beside it; frequency and amplitude in "
+        "N·m",
+        headline="Torque oscillates at {frequency_hz:.2g} Hz with {amplitude_nm:.2g} N·m",
+        measured="The torque beyond J, B and K has a line at {frequency_hz:.2g} Hz of "
+        "{amplitude_nm:.2g} N·m (amplitude), {value:.2g} % of the torque's variance (at most "
+        "{limit:g} %) and {stands_out:.2g} times what lies beside it: a tremor or another "
+        "oscillation.",
+        meaning="Least squares takes part of it for the joint; in a closed loop J and B come out "
+        "low.",
+        remedy="Record the perturbation and use iv, or leave the epoch out.",
+        setting="max_tremor_share_percent",
+        variants=OF_SUBJECT,
+        example={
+            "value": 8.0,
+            "limit": 3.0,
+            "frequency_hz": 4.6,
+            "amplitude_nm": 0.3,
+            "stands_out": 12.0,
+            **OF_SUBJECT_EXAMPLE,
+        },
+    ),
+    Kind(
+        "varying_with_time",
+        "%",
+        "caution",
+        "range over the epoch of J, B or K as a smooth function of time, in % of its mean, for "
+        "each that varies by more than chance (`varying_chance`, for all kinds of change together)",
+        headline=_HEADLINE + "within the epoch",
+        measured="With time " + _GOES,
+        meaning=_MEAN + "does not say how far it went.",
+        remedy="Cut the epoch into shorter ones, or fit the part in which the joint did not "
+        "change.",
+        setting="max_varying_percent",
+        example={**_VARYING, "low_at": "3.1 s", "high_at": "18.0 s"},
+    ),
+    Kind(
+        "varying_with_angle",
+        "%",
+        "caution",
+        "the same as a function of the angle, where this covers at least 5°; without the "
+        "perturbation, of the slow angle (below 0.5 Hz)",
+        headline=_HEADLINE + "with the angle",
+        measured="With the angle " + _GOES,
+        meaning=_MEAN + "holds for no angle in particular.",
+        remedy=f"To settle it, {_ABOUT}",
+        setting="max_varying_percent",
+        variants={
+            "with_term": {
+                "meaning": "The estimate is a mean over a joint that changed; {terms}, which "
+                "missing_term names, may have the same effect.",
+                "remedy": "Include what missing_term names and see whether J, B and K still "
+                f"change, or {_ABOUT}",
+            }
+        },
+        example={
+            **_VARYING,
+            "low_at": "−6.2° from the mean",
+            "high_at": "+5.9° from the mean",
+            "terms": "cubic stiffness",
+        },
+    ),
+    Kind(
+        "varying_with_phase",
+        "%",
+        "caution",
+        "the same as a function of the phase of an imposed periodic movement, which is found in "
+        "the angle",
+        headline=_HEADLINE + "with the movement's phase",
+        measured="Over the cycle " + _GOES,
+        meaning=_MEAN + "holds for no phase in particular.",
+        remedy="Estimate each phase by itself, from many cycles, or hold the joint still.",
+        setting="max_varying_percent",
+        example={**_VARYING, "low_at": "90° of the 2 s cycle", "high_at": "270° of the 2 s cycle"},
+    ),
+    Kind(
+        "varying_between_epochs",
+        "%",
+        "note",
+        "range of J, B or K over the epochs of a condition, each drawn to the mean as far as its "
+        "standard error says, in % of the mean, if they scatter by more than their errors "
+        "(`varying_chance`); with the fit to all epochs, from three on",
+        headline="{symbol} differs between epochs, {low:.3g} to {high:.3g} {size_unit}",
+        measured="{symbol} goes from {low:.3g} {size_unit} in {low_at} to {high:.3g} in {high_at}, "
+        "{value:.0f} % of the mean (at most {limit:g} %; {p}), with an SD of {sd:.2g} beyond the "
+        "errors{trend}{others}.",
+        meaning="The estimate from all epochs is a mean over a joint that was not the same in all.",
+        remedy="Compare the epochs in order, and state the scatter between them beside the mean.",
+        setting="max_varying_percent",
+        example={
+            **_VARYING,
+            "low_at": "epoch 2",
+            "high_at": "epoch 5",
+            "sd": 0.21,
+            "trend": ", rising by 40 % over the epochs",
+        },
+    ),
+)

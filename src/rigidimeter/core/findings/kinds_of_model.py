@@ -1,0 +1,245 @@
+"""Findings of the model: what the torque holds beyond J, B and K, and how it was sampled."""
+
+from __future__ import annotations
+
+from rigidimeter.core.findings.kind import Kind
+
+_SAMPLE_FASTER = (
+    "sample the torque faster, filter it before it is sampled (estimation.torque_lowpass_hz), use "
+    "a slower drive, or hold J at a known value."
+)
+_INCLUDE = "Include it: rigidimeter model --terms {asked}."
+
+MODEL_KINDS = (
+    Kind(
+        "lack_of_fit",
+        "%",
+        "caution",
+        "part of the torque's response to the perturbation not explained by J, B and K, in %, in "
+        "one of three parts of the band, if significant with p < 1e-4 over all tests of a "
+        "condition; see below",
+        headline="{value:.2g} % of the response to the perturbation is not J, B, K",
+        measured="From {low_hz:.3g} to {high_hz:.3g} Hz {value:.2g} % of the torque's response to "
+        "the perturbation is not J, B and K (at most {limit:g} %; {p}). The lower half of the band "
+        "gives J {half_J:+.2g} %, B {half_B:+.2g} %, K {half_K:+.2g} %.",
+        meaning="Friction, a reflex, a soft cuff or a late channel is taken for the joint.",
+        remedy="Lower the upper edge of the band (--band-hz) and see whether J and B change; "
+        "`rigidimeter model --compare` tries terms.",
+        setting="max_lack_of_fit_percent",
+        example={
+            "value": 6.4,
+            "limit": 2.0,
+            "p": 3e-9,
+            "low_hz": 10.0,
+            "high_hz": 30.0,
+            "half_J": 4.1,
+            "half_B": -2.0,
+            "half_K": 0.3,
+        },
+    ),
+    Kind(
+        "band_sensitivity",
+        "%",
+        "caution",
+        "change of J, B or K of all epochs of a condition together in a neighbouring band, in % of "
+        "it, if its probability by chance is below 0.01 over all bands and it is more than half of "
+        "half the estimate's interval; see below",
+        headline="{symbol} is {value:.2g} % {way} from {low_hz:.3g} to {high_hz:.3g} Hz",
+        measured="From {low_hz:.3g} to {high_hz:.3g} Hz {symbol} is {value:.2g} ± {error:.2g} % "
+        "{way} than from {own_low_hz:.3g} to {own_high_hz:.3g} Hz (at most {limit:g} %; {p}), "
+        "{of_half:.2g} times half its interval.",
+        meaning="The band decides what the estimate is, as it does where a term is missing.",
+        remedy="State the band, compare J, B and K in other bands, and try terms with `rigidimeter "
+        "model --compare`.",
+        setting="max_band_sensitivity_percent",
+        example={
+            "value": 6.0,
+            "limit": 3.0,
+            "p": 1e-5,
+            "symbol": "K",
+            "way": "less",
+            "low_hz": 0.1,
+            "high_hz": 21.0,
+            "error": 0.8,
+            "own_low_hz": 0.1,
+            "own_high_hz": 30.0,
+            "of_half": 1.2,
+        },
+    ),
+    Kind(
+        "between_samples",
+        "%",
+        "caution",
+        "largest change of J, B or K, in %, with another drive that explains the velocity by the "
+        "command as well ([why](../explanation/between-samples.md)); also found where the command "
+        "was recorded but no drive explains the velocity, or where it was not and the drive of the "
+        "settings would change J by more, or the torque holds a friction below 2 % of its SD, as a "
+        "drive with friction leaves",
+        headline="{symbol} may be {value:.2g} % off: motion between samples is not known",
+        measured="Drives that explain the velocity equally well give {symbol} up to {value:.2g} % "
+        "away (at most {limit:g} %).",
+        meaning="The samples do not show how the joint moved between them, so {symbol} may be as "
+        "much too high or too low.",
+        remedy="To settle it, " + _SAMPLE_FASTER,
+        setting="max_between_samples_percent",
+        variants={
+            "of_settings": {
+                "measured": "At the samples of the torque the drive of the settings makes {symbol} "
+                "{value:.2g} % wrong (at most {limit:g} %).",
+                "meaning": "Without velocity and command that is not corrected, so {symbol} may be "
+                "as much too high or too low.",
+            },
+            "no_drive": {
+                "headline": "No drive explains the velocity: J may be far too low",
+                "measured": "No drive explains the recorded velocity by the command.",
+                "meaning": "How the joint moved between the samples is not known, and J may be far "
+                "too low.",
+                "remedy": "Record the command at every tick at which it is sent, or "
+                + _SAMPLE_FASTER,
+            },
+            "friction": {
+                "headline": "J may be some percent too small: friction of the drive",
+                "measured": "The torque holds a friction below {little:g} % of its SD, as friction "
+                "of the drive leaves there.",
+                "meaning": "Without the command it is not known how the drive moved between the "
+                "samples, and J may be some percent too small.",
+                "remedy": "Record the command, or " + _SAMPLE_FASTER,
+            },
+            "as_sampled": {
+                "headline": "J is {value:.2g} % too {side}: the torque's samples miss acceleration",
+                "measured": "The torque was sampled where the acceleration is {seen:.3g} % of its "
+                "mean between the samples (at most {limit:g} % away).",
+                "meaning": "J is taken to be as much too {side}.",
+                "remedy": "Use --method iv with the perturbation recorded, which corrects it, or "
+                "sample faster.",
+            },
+        },
+        example={
+            "value": 4.0,
+            "limit": 1.0,
+            "symbol": "J",
+            "little": 2.0,
+            "seen": 96.0,
+            "side": "small",
+        },
+    ),
+    Kind(
+        "missing_term",
+        "%",
+        "caution",
+        "coupling compliance, friction, reflex, damping that differs between directions, cubic and "
+        "quadratic stiffness: tested on the part of the torque that no linear filter of the motion "
+        "explains ([why](../how-to/choose-model-terms.md#why-terms-are-compared-without-their-"
+        "linear-part)), adjusted by Holm's method, p < 0.001; how far J, B and K move if they are "
+        "included, in % of half their intervals (100 at most)",
+        headline="The torque holds {terms}: {changes}",
+        measured="The torque holds {sizes} ({p}). Left out, it moves {changes}, {value:.3g} % of "
+        "half their intervals (at most {limit:g} %).",
+        meaning="J, B and K take it for their own.",
+        remedy=_INCLUDE,
+        variants={
+            "several": {"headline": "The torque holds {terms}", "remedy": _INCLUDE},
+            "reflex": {
+                "measured": "The torque holds a reflex, {size:.3g} N·m·s/rad "
+                "{late_ms:.0f} ms late, {share:.0f} % of what J, B and K leave to a linear filter "
+                "({p}). Left out, it moves {changes}, {value:.3g} % of half their intervals (at "
+                "most {limit:g} %)."
+            },
+            "coupling": {
+                "headline": "Something gives between sensor and joint: {changes}",
+                "measured": "Between sensor and joint something gives with {size:.3g} N·m/rad, "
+                "{share:.0f} % of what J, B and K leave to a linear filter ({p}). It moves "
+                "{changes}, {value:.3g} % of half their intervals (at most {limit:g} %).",
+                "remedy": "Make the coupling stiffer, or lower the upper edge of the band "
+                "(--band-hz).",
+            },
+            "of_drive": {
+                "meaning": "Below 2 % of the torque's SD it may be friction of the drive; "
+                "including it then does not help."
+            },
+            "within": {"meaning": "That is less than half their intervals."},
+        },
+        example={
+            "value": 340.0,
+            "limit": 100.0,
+            "p": 2e-8,
+            "terms": "friction",
+            "sizes": "friction of 0.1 ± 0.004 N·m",
+            "asked": "inertia,damping,stiffness,coulomb",
+            "percent_of": (5.2, -3.1, 7.0),
+            "size": 60.0,
+            "late_ms": 48.0,
+            "share": 96.0,
+        },
+    ),
+    Kind(
+        "controller_misfit",
+        "%",
+        "caution",
+        "difference of the recorded velocity command from what the controller of the settings "
+        "makes of perturbation and torque, 0.5 to 10 Hz but for the line at which they differ "
+        "most, in % of the command",
+        headline="The recorded command differs by {value:.2g} % from the controller's",
+        measured="From perturbation and torque the controller of the settings makes a velocity "
+        "command that differs from the recorded one by {value:.2g} % (at most {limit:g} %) and is "
+        "{factor:.2g} times as large.",
+        meaning="What is computed of the loop holds for another controller.",
+        remedy="Give the values that were used, per radian: --controller J_C B_C, or inertia_kg_m2 "
+        "and damping_nm_s_rad in [controller].",
+        setting="max_controller_misfit_percent",
+        variants={
+            "shown": {
+                "remedy": "Give the values that the recording shows, per radian: --controller "
+                "{shown_inertia:.3g} {shown_damping:.3g}."
+            },
+            "per_degree": {
+                "remedy": "Give the values that the recording shows, per radian: --controller "
+                "{shown_inertia:.3g} {shown_damping:.3g}; those of the settings seem to be per "
+                "degree."
+            },
+            "per_degree_twice": {
+                "remedy": "Give the values that the recording shows, per radian: --controller "
+                "{shown_inertia:.3g} {shown_damping:.3g}; those of the settings seem to be "
+                "multiplied by 57.3."
+            },
+            "instrument": {"meaning": "{method} is less precise with it, not biased."},
+            "small_bias": {
+                "meaning": "By the loop that the recording shows, torque from elsewhere biases J, "
+                "B and K by {share:.2g} % of half their intervals at most."
+            },
+        },
+        example={
+            "value": 50.0,
+            "limit": 20.0,
+            "factor": 0.5,
+            "method": "iv",
+            "share": 12.0,
+            "shown_inertia": 0.0458,
+            "shown_damping": 1.6,
+        },
+    ),
+    Kind(
+        "unstable_loop",
+        "1/s",
+        "caution",
+        "growth of the slowest motion of the loop of the settings with the joint that was found, "
+        "per second",
+        headline="This controller would be unstable with this joint",
+        measured="With the controller of the settings and this joint the loop's slowest motion "
+        "grows by a factor of e^({value:.2g}) a second (at most 1).",
+        meaning="The joint or the controller was another one.",
+        remedy="Give the values that were used, per radian: --controller J_C B_C, or inertia_kg_m2 "
+        "and damping_nm_s_rad in [controller].",
+        variants={
+            "instrument": {
+                "meaning": "{method} takes the motion that the perturbation would cause without "
+                "feedback, so it is less precise, not biased."
+            },
+            "small_bias": {
+                "meaning": "By the loop, torque from elsewhere biases J, B and K by {share:.2g} % "
+                "of half their intervals at most."
+            },
+        },
+        example={"value": 3.1, "limit": 0.0, "method": "iv", "share": 12.0},
+    ),
+)

@@ -1,0 +1,153 @@
+"""A table: columns described once, for the terminal, the page, a file and a data frame.
+
+Rows are unrounded. A file has all of their values; the terminal and the page show some, rounded.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from rigidimeter.core.words.numbers import interval, number, p_value
+
+Kind = Literal[
+    "text",
+    "label",
+    "check",
+    "reason",
+    "source",
+    "condition",
+    "outcome",
+    "count",
+    "number",
+    "p",
+    "percent",
+    "setting",
+]
+
+WORDS = ("text", "label", "check", "reason", "source", "condition", "outcome")
+"""Kinds of columns that hold words; the others hold numbers, which are set to the right."""
+
+INTERVAL = "[95\N{NO-BREAK SPACE}%\N{NO-BREAK SPACE}interval]"
+"""What the heading of a column with `ends` says after the quantity."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table on the page.
+
+    Attributes
+    ----------
+    name : str
+        The key of its values in the rows.
+    heading : str
+    kind : str
+        How values are shown.
+    ends : (str, str) or None
+        The keys of the ends of this number's interval, which is shown below the number.
+    page_factor : float
+        The page shows the number times this, in the unit that the heading states.
+    digits : int
+        Significant digits that the page shows of a number.
+    group : str
+        Neighbouring columns of one group share a heading above their own.
+    below : str
+        The key of a second value, which is shown in brackets below the first.
+    """
+
+    name: str
+    heading: str
+    kind: Kind = "number"
+    ends: tuple[str, str] | None = None
+    page_factor: float = 1.0
+    digits: int = 4
+    group: str = ""
+    below: str = ""
+
+
+SESSION = (
+    Column("subject", "Subject", "label"),
+    Column("day", "Day", "label"),
+    Column("condition", "Condition", "condition"),
+)
+"""Columns of whatever belongs to a session of a study."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of the report, also written to ``tables/NAME.csv``.
+
+    Attributes
+    ----------
+    name : str
+        Of the file. Two tables of one name show different columns of the same rows.
+    title : str
+    columns : tuple of Column
+        What the page shows; none for a table that is written as a file only.
+    rows : sequence of mappings
+        Unrounded values by name with unit; the file has all of them. All rows have the same keys.
+    note : str or Markup
+        Below the table on the page, where it has rows.
+    empty : str
+        What the page says in place of a table without rows; a section of nothing else is not shown.
+    folding : bool
+        A long table, which the reader can fold away.
+    """
+
+    name: str
+    title: str
+    columns: tuple[Column, ...]
+    rows: Sequence[Mapping[str, Any]]
+    note: str = ""
+    empty: str = ""
+    folding: bool = False
+
+    def shown_columns(self, *, several_sources: bool) -> list[Column]:
+        """Return the columns without those that would say nothing.
+
+        A column of reasons is left out if all are empty, and that of sources if there is only one.
+        """
+        by_epoch = any(column.name == "epoch" for column in self.columns)
+        return [
+            column
+            for column in self.columns
+            if (column.kind != "reason" or any(row.get(column.name) for row in self.rows))
+            and (column.kind != "source" or several_sources or not by_epoch)
+        ]
+
+
+def shown_value(value: Any, column: Column, names: Mapping[str, str]) -> str:
+    """Return a value as the page prints it."""
+    if value is None or value == "":
+        return "(no condition)" if column.kind == "condition" else "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if column.kind == "source":
+        return names.get(str(value), str(value))
+    if column.kind == "p":
+        return p_value(value)
+    if column.kind == "percent":
+        return "–" if math.isnan(value) else f"{100 * value:.0f} %"
+    if isinstance(value, float):
+        if column.kind == "setting":
+            return f"{value:g}"
+        return number(value * column.page_factor, column.digits)
+    return str(value)
+
+
+def shown_below(row: Mapping[str, Any], column: Column, names: Mapping[str, str]) -> str:
+    """Return what is shown below a value: the second value of its column, or its interval.
+
+    A value that was held has no interval.
+    """
+    if column.below:
+        second = row.get(column.below)
+        return "" if second in (None, "") else f"({shown_value(second, column, names)})"
+    if column.ends is None:
+        return ""
+    low, high = (row.get(name) for name in column.ends)
+    if not isinstance(low, float) or not isinstance(high, float) or not low < high:
+        return ""
+    return interval(low * column.page_factor, high * column.page_factor, column.digits)

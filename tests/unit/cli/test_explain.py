@@ -1,0 +1,31 @@
+"""`rigidimeter explain`: every finding is listed, and each is explained."""
+
+import pytest
+
+from rigidimeter.core.findings import KINDS, explained
+
+
+def test_every_finding_is_listed_with_its_level(rigidimeter):
+    ran = rigidimeter("explain")
+    assert ran.status == 0
+    listed = [line.split() for line in ran.out.splitlines() if line.split()[:1]]
+    for kind in KINDS.values():
+        assert [kind.name, kind.level] in listed
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
+def test_a_finding_is_explained_with_its_settings(rigidimeter, kind):
+    ran = rigidimeter("explain", kind.name)
+    assert ran.status == 0
+    told = " ".join(ran.out.split())
+    for _, words in explained(kind):
+        for text in words:
+            assert text in told
+    assert f'diagnostics.levels.{kind.name} = "{kind.level}"' in told
+    assert not kind.setting or f"diagnostics.{kind.setting} = " in told
+
+
+def test_a_name_that_is_none_is_answered_with_the_nearest(rigidimeter):
+    ran = rigidimeter("explain", "tremer")
+    assert ran.status == 1
+    assert ran.err.strip() == "rigidimeter: no finding is called 'tremer'; is it tremor?"

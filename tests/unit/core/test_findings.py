@@ -1,0 +1,121 @@
+"""The words of each kind of finding, and findings as data."""
+
+import json
+import math
+import pickle
+import re
+from string import Formatter
+
+import pytest
+
+from rigidimeter.core.files import plain_values
+from rigidimeter.core.findings import (
+    KINDS,
+    Effect,
+    Finding,
+    Kind,
+    explained,
+    finding_from,
+    words_of,
+)
+from rigidimeter.core.settings import DiagnosticLevels, DiagnosticsSettings
+
+WORDINGS = [
+    pytest.param(words, id=f"{kind.name} {variant}".strip())
+    for kind in KINDS.values()
+    for variant, words in explained(kind)
+]
+TREMOR = Finding(
+    "tremor",
+    "caution",
+    8.0,
+    3.0,
+    "%",
+    effect=Effect((-4.0, math.nan, 0.0)),
+    facts={"frequency_hz": 4.6, "amplitude_nm": 0.3, "stands_out": 12.0, "variant": ""},
+)
+
+
+@pytest.mark.parametrize("words", WORDINGS)
+def test_words_are_few_and_complete(words):
+    assert 2 <= len(words.headline.split()) <= 15
+    assert words.headline[-1] not in ".,;:"
+    assert 5 <= len(words.details.split()) <= 60
+    assert words.details.endswith(".")
+    assert words.remedy.endswith(".")
+    assert not re.search(r"[.!?] [A-Z]", words.remedy)  # one sentence
+    for text in words:
+        assert not re.search(r"[{}]|\bnan\b|\binf\b|  ", text), text
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
+def test_a_kind_is_complete(kind):
+    assert kind.name in DiagnosticLevels.model_fields
+    assert kind.level == getattr(DiagnosticLevels(), kind.name)
+    assert kind.setting in {"", *DiagnosticsSettings.model_fields}
+    for variant in ("", *kind.variants):
+        told = words_of(kind.name, {**kind.example, "variant": variant, "unit": kind.unit})
+        assert ", limit " not in told.headline, f"{kind.name} {variant}: a fact is missing"
+    for parts in kind.variants.values():
+        assert parts.keys() <= {"headline", "measured", "meaning", "remedy"}
+    templates = [kind.headline, kind.measured, kind.meaning, kind.remedy]
+    templates += [text for parts in kind.variants.values() for text in parts.values()]
+    for text in templates:  # plain names and how they are rounded
+        for _, field, spec, conversion in Formatter().parse(text):
+            assert field is None or (field.isidentifier() and conversion is None)
+            assert spec is None or re.fullmatch(r"\+?(\.\d)?[fg]?", spec)
+
+
+def test_the_words_show_the_numbers():
+    assert TREMOR.headline == "Torque oscillates at 4.6 Hz with 0.3 N·m"
+    assert "8 % of the torque's variance (at most 3 %)" in TREMOR.details
+
+
+def test_a_value_beside_its_limit_has_the_digits_that_tell_them_apart():
+    low = Finding("r_squared", "caution", 0.2996, 0.3)
+    assert low.details.startswith("R² is 0.2996 (at least 0.3).")
+
+
+def test_the_last_variant_that_has_a_part_gives_it():
+    kind = KINDS["missing_term"]
+    assert kind.template("headline", "coupling within") == kind.variants["coupling"]["headline"]
+    assert kind.template("meaning", "coupling within") == kind.variants["within"]["meaning"]
+    assert kind.template("remedy", "within") == kind.remedy
+
+
+def test_a_kind_that_is_not_known_is_told_by_its_numbers(monkeypatch):
+    finding = Finding("near_range", "caution", 9.7, 9.0, "N·m")
+    assert finding.headline == "near range: 9.7 N·m, limit 9 N·m"
+    brought = Kind("near_range", "N·m", "note", "peak", "Peak {value:.2g}", "A.", "B.", "C.")
+    monkeypatch.setitem(KINDS, "near_range", brought)
+    assert (finding.headline, finding.details, finding.remedy) == ("Peak 9.7", "A. B.", "C.")
+    assert DiagnosticLevels().of("near_range") == "note"
+
+
+def test_a_finding_is_read_back_equal():
+    written = json.loads(json.dumps(plain_values(TREMOR.row()), allow_nan=False))
+    assert finding_from(written) == TREMOR
+    assert pickle.loads(pickle.dumps(TREMOR)) == TREMOR
+    assert finding_from({**written, "value": 8.1}) != TREMOR
+
+
+@pytest.mark.parametrize(
+    ("percent", "half_intervals", "negligible"),
+    [
+        ((0.9, -0.9, 0.0), (0.9, -0.9, 0.0), True),
+        ((1.1, 0.0, 0.0), (0.1, 0.0, 0.0), False),
+        ((0.1, 0.0, 0.0), (-1.1, 0.0, 0.0), False),
+        ((0.1, 0.0, math.nan), (0.1, 0.0, math.nan), False),
+        ((0.1, 0.0, 0.0), (math.nan,) * 3, False),
+    ],
+)
+def test_an_effect_is_negligible_below_one_percent_and_half_the_interval(
+    percent, half_intervals, negligible
+):
+    assert Effect(percent, half_intervals).negligible == negligible
+
+
+def test_an_effect_is_a_share_of_the_size_of_the_estimate_and_of_half_its_interval():
+    effect = Effect.of((-1e-4, 0.02, 0.0), (1e-3, -0.1, 2.0), (2e-4, 0.01, 0.1))
+    assert effect.percent == pytest.approx((-10.0, 20.0, 0.0))
+    assert effect.half_intervals == pytest.approx((-0.5, 2.0, 0.0))
