@@ -37,8 +37,8 @@ def compare(
         typer.Option(
             "--reference",
             metavar="NAME",
-            help="Reference condition. Differences are reference minus other. Default: OFF if "
-            "there is one, else the first.",
+            help="Reference condition. Default: OFF if there is one, else the first. Differences "
+            "are other minus reference; the rank-sum shift in --full is reference minus other.",
             rich_help_panel=COMPARE,
         ),
     ] = None,

@@ -6,13 +6,17 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from rigidimeter.cli.terminal_tables import Block, Heading, Table, shown_table
+from rigidimeter.cli.terminal_tables import Block, Heading, Table, paragraph, shown_table
+from rigidimeter.core.words import plural
 
 if TYPE_CHECKING:
     from rigidimeter.analysis.study import StudyResult
     from rigidimeter.core.records import Analysis, Fit, Score
 
 MOST_FINDINGS = 3
+
+NOTE_WIDTH = 67
+"""Letters of a line beside the label of a note, of the 80 of a line."""
 
 BY = {
     "protocol": "by the protocol",
@@ -43,7 +47,7 @@ def comparison_blocks(found: StudyResult, *, full: bool = False) -> Iterator[Blo
 def _about(found: StudyResult) -> str:
     """Return what was compared, and how much of it."""
     from rigidimeter.analysis.study import conclude
-    from rigidimeter.core.words import condition_name, plural
+    from rigidimeter.core.words import condition_name
 
     names = [found.reference, *(each.other for each in (found, *found.further_pairs))]
     parts = [" and ".join(condition_name(name) for name in dict.fromkeys(names) if name)]
@@ -115,14 +119,29 @@ def _left_out(found: StudyResult) -> Iterator[tuple[str, str]]:
 
 
 def finding_notes(analysis: Analysis, full: bool) -> Iterator[tuple[str, str]]:
-    """Yield each kind of finding once, the most serious first; without `full` the first few."""
+    """Yield each kind of finding once, the most serious first; without `full` the first few.
+
+    Without `full` each has two lines: where the epochs' names are too long for that, their number.
+    """
     groups = analysis.findings
-    shown = len(groups) if full else MOST_FINDINGS
-    for group in groups[:shown]:
-        yield group.finding.level, f"{group.finding.name}  {group.finding.headline}; {group.where}"
-    if groups[shown:]:
-        names = ", ".join(dict.fromkeys(group.finding.name for group in groups[shown:]))
-        yield "", f"and {names} (--full)"
+    shown = groups if full else groups[:MOST_FINDINGS]
+    for group in shown:
+        text = f"{group.finding.name}  {group.finding.headline}"
+        wheres = [group.where]
+        if not full:
+            named = sum(fit.epoch != "pooled" for fit in group.fits)
+            wheres += [f"{named} of {plural(len(analysis.fits), 'epoch')}"]
+        words = [f"{text}; {where}" for where in wheres]
+        yield group.finding.level, words[0] if full else two_lines(*words, text)
+    seen = {group.finding.name for group in shown}
+    rest = dict.fromkeys(one.finding.name for one in groups[len(shown) :])
+    if names := [name for name in rest if name not in seen]:
+        yield "", two_lines(f"and {', '.join(names)} (--full)", f"and {len(names)} more (--full)")
+
+
+def two_lines(*texts: str) -> str:
+    """Return the first text that two lines beside a label hold; else the last."""
+    return next((text for text in texts if len(paragraph(text, NOTE_WIDTH)) <= 2), texts[-1])
 
 
 def full_blocks(found: StudyResult, *, by_epoch: bool = False) -> Iterator[Block]:

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from rigidimeter.cli.comparison_text import finding_notes, full_blocks
-from rigidimeter.cli.terminal_tables import Block, Heading, Table
+from rigidimeter.cli.comparison_text import finding_notes, full_blocks, two_lines
+from rigidimeter.cli.terminal_tables import ROWS, Block, Heading, Table, text_lines
 
 if TYPE_CHECKING:
     from rigidimeter.analysis.study import Precision, StudyResult
@@ -17,7 +17,6 @@ MOST_EPOCHS, FIRST_EPOCHS = 8, 4
 """Of more epochs than the first number the second and the last are shown, of several recordings
 none."""
 
-MOST_NOTES = 3
 SIGNIFICANT = 3.0
 """Standard errors; a delay below is not shown."""
 
@@ -27,25 +26,27 @@ MORE = "--full: every table · --json FILE: every number · rigidimeter explain 
 def estimate_blocks(result: StudyResult, *, full: bool = False) -> Iterator[Block]:
     """Yield the first screen: J, B and K of the epochs and together, scores, what was found.
 
-    With `full` every finding, and the tables of the report.
+    With `full` every finding, and the tables of the report. Otherwise as many epochs one by one as
+    one screen has room for.
     """
     analysis = result.analysis
-    yield Heading(_about(result))
-    if analysis.fits and (fits := _fits(result)).rows:
-        yield ""
-        yield fits
-    if (scores := _scores(result)).rows:
-        yield ""
-        yield scores
-    found = (_method(analysis), _excluded(analysis), _short_scores(result), _delays(analysis))
+    found = (_method(analysis), _excluded(analysis), _short_scores(result), _delays(analysis, full))
     notes = [note for notes in (*found, finding_notes(analysis, full)) for note in notes]
-    if notes:
-        yield ""
-        yield Table((), notes, "<<", 1)
+
+    def first_screen(fits: Table) -> list[Block]:
+        blocks: list[Block] = [Heading(_about(result))]
+        tables = (fits, _scores(result), Table((), notes, "<<", 1))
+        for table in tables:
+            if table.rows:
+                blocks += ["", table]
+        return blocks if full else [*blocks, "", MORE]
+
+    screens = (first_screen(_fits(result, most)) for most in (MOST_EPOCHS, FIRST_EPOCHS + 2, 0))
+    yield from next(
+        (one for one in screens if len(text_lines(one)) <= ROWS), first_screen(_fits(result, 0))
+    )
     if full:
         yield from full_blocks(result, by_epoch=True)
-    else:
-        yield from ("", MORE)
 
 
 def _about(result: StudyResult) -> str:
@@ -72,8 +73,11 @@ def _about(result: StudyResult) -> str:
     return " · ".join(parts)
 
 
-def _fits(result: StudyResult) -> Table:
-    """Return a row for each epoch, ± one standard error, and the rows of all together."""
+def _fits(result: StudyResult, most: int) -> Table:
+    """Return a row for each epoch, ± one standard error, and the rows of all together.
+
+    Of more than `most` epochs of one recording the first and the last, of several none.
+    """
     from rigidimeter.core.records import PARAMETERS
     from rigidimeter.core.words import scaled, short_names, with_error
 
@@ -96,9 +100,9 @@ def _fits(result: StudyResult) -> Table:
 
     together = [*_together(result, [factor for factor, _ in scales])]
     rows: list[Sequence[str] | str] = []
-    if len(fits) <= MOST_EPOCHS:
+    if len(fits) <= most:
         rows += map(row, fits)
-    elif len(names) == 1:
+    elif len(names) == 1 and most:
         rows += [*map(row, fits[:FIRST_EPOCHS]), ("…", *[""] * 6), row(fits[-1])]
     else:
         together = together[1:]  # without the empty line
@@ -155,24 +159,32 @@ def _scores(result: StudyResult) -> Table:
 
 def _method(analysis: Analysis) -> Iterator[tuple[str, str]]:
     """Yield why a method was chosen that the subject's own torque biases."""
-    from rigidimeter.analysis.estimation import method_named, method_names
+    from rigidimeter.analysis.estimation import METHODS
 
-    known = analysis.fits and analysis.method in method_names()
-    if known and not method_named(analysis.method).uses_perturbation:
-        yield "method", f"{analysis.method}: {analysis.method_reason or 'as chosen'}"
+    chosen = [method for method in METHODS if method.name == analysis.method]
+    if analysis.fits and chosen and not any(method.uses_perturbation for method in chosen):
+        reason = analysis.method_reason or "as chosen"
+        texts = (reason, reason.rpartition(": ")[0] or reason)
+        yield "method", two_lines(*(f"{analysis.method}: {text}" for text in texts))
 
 
 def _excluded(analysis: Analysis) -> Iterator[tuple[str, str]]:
-    """Yield which epochs do not count, and why."""
-    why: dict[str, list[str]] = {}
+    """Yield which epochs do not count, and why, in two lines for each outcome."""
+    from rigidimeter.core.words import plural, short_names
+
     results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
+    names = short_names(one.source for one in results)
+    out: dict[str, list[Fit | Score]] = {}
     for one in results:
         if not one.outcome.included:
-            why.setdefault(f"{one.outcome.kind}: {one.outcome.reason}", []).append(one.epoch)
-    for reason, epochs in list(why.items())[:MOST_NOTES]:
-        kind, _, text = reason.partition(": ")
-        first = epochs[0] if len(epochs) == 1 else f"{len(epochs)} epochs, first {epochs[0]}"
-        yield kind, f"{first}: {text}"
+            out.setdefault(one.outcome.kind, []).append(one)
+    for kind, those in out.items():
+        first = f"epoch {those[0].epoch}"
+        if len(names) > 1:
+            first += f" of {names[those[0].source]}"
+        where = first if len(those) == 1 else f"{plural(len(those), 'epoch')}, first {first}"
+        reason = those[0].outcome.reason
+        yield kind, two_lines(f"{where}: {reason}", f"{where}: {reason.partition('. ')[0]}", where)
 
 
 def _short_scores(result: StudyResult) -> Iterator[tuple[str, str]]:
@@ -180,24 +192,43 @@ def _short_scores(result: StudyResult) -> Iterator[tuple[str, str]]:
     wanted, scores = result.settings.scores, result.analysis.scores
     short = [score.n_cycles for score in scores if 0 < score.n_cycles < wanted.cycles]
     if short:
-        yield (
-            "caution",
+        text = (
             f"{len(short)} of {len(scores)} sinusoids were scored over fewer than scores.cycles = "
-            f"{wanted.cycles} cycles, the fewest {min(short)}: the motion less scores.discard_s = "
-            f"{wanted.discard_s:g} s at each end holds no more",
+            f"{wanted.cycles} cycles, the fewest {min(short)}"
         )
+        yield "caution", text
 
 
-def _delays(analysis: Analysis) -> Iterator[tuple[str, str]]:
-    """Yield how late the torque is in each source, where that is known."""
-    for delay in analysis.delays[:MOST_NOTES]:
-        late_s = abs(delay.delay_s)
-        if math.isfinite(late_s):
-            if not delay.corrected and late_s < SIGNIFICANT * delay.delay_s_se:
-                continue
-            done = "corrected" if delay.corrected else delay.remark
-            side = "later" if delay.delay_s > 0 else "earlier"
-            size = f"{1e3 * late_s:.3g} ± {1e3 * delay.delay_s_se:.2g} ms"
-            yield "delay", f"torque {size} {side} than the motion in {delay.source}: {done}"
-        elif delay.remark and any(fit.source == delay.source for fit in analysis.fits):
-            yield "delay", f"{delay.source}: {delay.remark}"
+def _delays(analysis: Analysis, full: bool) -> Iterator[tuple[str, str]]:
+    """Yield how late the torque is in each source, where that is known; of several the largest."""
+    from rigidimeter.core.words import plural, short_names, with_error
+
+    names = short_names(delay.source for delay in analysis.delays)
+    late = [
+        delay
+        for delay in analysis.delays
+        if math.isfinite(delay.delay_s)
+        and (delay.corrected or abs(delay.delay_s) >= SIGNIFICANT * delay.delay_s_se)
+    ]
+    late.sort(key=lambda delay: -abs(delay.delay_s))
+    for delay in late if full else late[:1]:
+        done = "corrected" if delay.corrected else delay.remark
+        side = "later" if delay.delay_s > 0 else "earlier"
+        size = with_error(1e3 * abs(delay.delay_s), 1e3 * delay.delay_s_se)
+        text = f"torque {size} ms {side} than the motion in {names[delay.source]}"
+        if len(late) > 1 and not full:
+            text += f", the most of {plural(len(late), 'recording')}"
+        texts = [f"{text}: {done}", f"{text}: {done.partition(': ')[0]}", text]
+        yield "delay", texts[0] if full else two_lines(*texts)
+    unknown = [
+        delay
+        for delay in analysis.delays
+        if not math.isfinite(delay.delay_s)
+        and delay.remark
+        and any(fit.source == delay.source for fit in analysis.fits)
+    ]
+    for delay in unknown if full else unknown[:1]:
+        text = f"{names[delay.source]}: {delay.remark}"
+        if len(unknown) > 1 and not full:
+            text = f"{names[delay.source]} and {len(unknown) - 1} more: {delay.remark}"
+        yield "delay", text if full else two_lines(text, text.partition(": ")[0] + ": unknown")

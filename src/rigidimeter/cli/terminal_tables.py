@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
     from rigidimeter.core.words import Table as Description
 
+ROWS = 24
+"""Lines of a first screen."""
+
 WIDEST = 100
 """Longer lines are hard to read, however wide the terminal."""
 

@@ -81,3 +81,33 @@ def test_commands_on_files(rigidimeter, tmp_path: Path, monkeypatch) -> None:
     ran = rigidimeter("compare", "off.npz", "dbs.npz", *names, *options)
     assert ran.status == 0, ran.err
     assert_one_screen(ran.out.splitlines())
+
+
+@pytest.fixture
+def noisy(tmp_path: Path, monkeypatch) -> list[str]:
+    """Three recordings whose torque has friction, a tremor and noise, is late and is clipped."""
+    monkeypatch.chdir(tmp_path)
+    rng = np.random.default_rng(7)
+    time_s = np.arange(12_000) / 200
+    names = ["a.npz", "b.npz", "c.npz"]
+    for name in names:
+        parts = [(f, rng.uniform(0, 2 * np.pi)) for f in (0.3, 0.7, 1.3, 2.3, 3.7, 5.3, 7.1, 11.3)]
+        angle = sum(0.02 * np.sin(2 * np.pi * f * time_s + phase) for f, phase in parts)
+        velocity = np.gradient(angle, time_s)
+        torque = 0.0045 * np.gradient(velocity, time_s) + 0.137 * velocity + 1.7 * angle
+        torque += 0.15 * np.sign(velocity) + 0.3 * np.sin(2 * np.pi * 5.1 * time_s)
+        torque = np.roll(torque + 0.2 * rng.standard_normal(time_s.size), 2)
+        torque = np.clip(torque, -0.9, 0.9)
+        np.savez(name, time_s=time_s, torque_nm=torque, angle_rad=angle)
+    return names
+
+
+def test_estimates_of_three_noisy_recordings(rigidimeter, noisy) -> None:
+    """Three findings of two lines at most, and excluded epochs with their recordings."""
+    ran = rigidimeter("estimate", *noisy, "--epoch-length-s", 10)
+    assert ran.status == 0, ran.err
+    assert_one_screen(ran.out.splitlines())
+    assert ran.out.count("\n caution") + ran.out.count("\n exclude ") <= 3
+    excluded = [line for line in ran.out.splitlines() if line.startswith(" excluded ")]
+    assert len(excluded) == 1
+    assert ".npz: " in excluded[0]
