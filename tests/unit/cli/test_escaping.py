@@ -30,7 +30,7 @@ def test_names_reach_terminal_and_table_without_commands(rigidimeter, tmp_path, 
         np.savez(path, torque_nm=rng.standard_normal(2000), angle_rad=angle_rad, fs=100.0)
     table, document = tmp_path / "e.csv", tmp_path / "e.json"
     given = [part for name in names for part in ("--condition", name)]
-    ran = rigidimeter("estimate", *paths, *given, "--csv", table, "--json", document)
+    ran = rigidimeter("estimate", *paths, *given, "--full", "--csv", table, "--json", document)
     for text in (ran.out, ran.err, table.read_text()):
         assert "\x1b" not in text
         assert "\x07" not in text
