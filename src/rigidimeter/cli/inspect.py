@@ -9,6 +9,7 @@ import typer
 
 from rigidimeter.cli.help_pages import WRITE
 from rigidimeter.cli.inputs import keep_inputs, say
+from rigidimeter.cli.options import FullOption
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import Table, show
@@ -41,6 +42,7 @@ def inspect(
             rich_help_panel=WRITE,
         ),
     ] = None,
+    full: FullOption = False,
 ) -> None:
     """Show what is in a file and how it would be read.
 
@@ -59,7 +61,8 @@ def inspect(
     status = 0
     for paths in groups:
         try:
-            status |= _inspect(paths, recordings, write_mapping, plot)
+            columns = full or len(groups) == 1
+            status |= _inspect(paths, recordings, write_mapping, plot, columns=columns)
         except UserError as error:
             for line in error.lines:
                 echo(f"error: {line}", err=True)
@@ -68,9 +71,17 @@ def inspect(
 
 
 def _inspect(
-    paths: list[Path], recordings: Recordings, write_mapping: Path | None, plot: Path | None
+    paths: list[Path],
+    recordings: Recordings,
+    write_mapping: Path | None,
+    plot: Path | None,
+    *,
+    columns: bool,
 ) -> int:
-    """Inspect one file, or the files of one recording; return the exit status."""
+    """Inspect one file, or the files of one recording; return the exit status.
+
+    Without `columns` it is shown in a line and the command that reads it.
+    """
     from rigidimeter.analysis.reading.channels.inspection import (
         command_for,
         inspect_table,
@@ -105,7 +116,10 @@ def _inspect(
     found = inspect_table(table, options)
     rows = max((column.size for column in table.columns.values()), default=0)
     echo(f"{name}: {kind}, {len(table.columns)} columns of {rows} rows")
-    _show(found)
+    if columns:
+        _show(found)
+    elif found.proposal.unsaid:
+        show([f"  only you can state: {'; '.join(found.proposal.unsaid)}"])
     if not found.proposal.unsaid:
         echo(f"reads it: {command_for(paths, [*option_words(found), *joining])}")
     if write_mapping is not None:
@@ -137,4 +151,4 @@ def _show(found: Inspection) -> None:
     headings, *rows = column_rows(found)
     show([Table(headings, rows, "<<>>>><<"), *(f" {text}" for text in remarks(found))])
     if found.proposal.unsaid:
-        show(["only you can say:", *(f" {text}" for text in found.proposal.unsaid)])
+        show(["only you can state:", *(f" {text}" for text in found.proposal.unsaid)])

@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rigidimeter.cli.inputs import keep_inputs, say
-from rigidimeter.cli.options import JsonOption
+from rigidimeter.cli.options import FullOption, JsonOption
 from rigidimeter.cli.terminal_tables import Block, Heading, Table, show
 from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
     from rigidimeter.analysis.study import RatingsFound
+
+MOST_OFFSETS, MOST_PAIRS = 6, 3
+"""On the first screen."""
 
 
 def ratings(
@@ -65,6 +68,7 @@ def ratings(
             "first where it occurs.",
         ),
     ] = None,
+    full: FullOption = False,
 ) -> None:
     """Model ratings by several examiners, each with an offset.
 
@@ -77,7 +81,6 @@ def ratings(
     For example:
       rigidimeter ratings ratings.csv --json ratings.json
       rigidimeter ratings ratings.csv --score updrs --scale 0 4 --step 1
-      rigidimeter ratings ratings.csv --random subject/day --contrast OFF DBS
     """
     from rigidimeter.analysis.study.ratings_found import ratings_document
     from rigidimeter.analysis.study.ratings_model import model_ratings
@@ -110,11 +113,11 @@ def ratings(
     say(tuple(Notice("warning", text) for text in found.notices))
     if json_out is not None:
         write_json(json_out, ratings_document(found))
-    show(_blocks(found))
+    show(_blocks(found, full))
 
 
-def _blocks(found: RatingsFound) -> Iterator[Block]:
-    """Yield the table and its sentences."""
+def _blocks(found: RatingsFound, full: bool) -> Iterator[Block]:
+    """Yield the table and its sentences; with `full` every offset and every pair."""
     fit = found.fit
     offsets = " + ".join(f"offset of {name}" for name in fit.variances)
     yield Heading(f"{found.source}: {fit.n} ratings in {len(fit.conditions)} conditions")
@@ -129,7 +132,10 @@ def _blocks(found: RatingsFound) -> Iterator[Block]:
     for group, offsets_of in fit.offsets.items():
         counts = found.counts_of(group)
         groups = [(name, f"{counts[name]}", f"{value:.4f}") for name, value in offsets_of.items()]
-        yield from ("", Table((group, "n", "offset"), groups, "<>>"))
+        if full or len(groups) <= MOST_OFFSETS:
+            yield from ("", Table((group, "n", "offset"), groups, "<>>"))
+        else:
+            yield from ("", f"{len(groups)} offsets of {group}: --full")
         variance = fit.variances[group]
         yield f"Variance of {group}: {variance:.4g} (SD {math.sqrt(variance):.4g})."
     residual = fit.variance_residual
@@ -137,8 +143,8 @@ def _blocks(found: RatingsFound) -> Iterator[Block]:
     yield ""
     yield from _contrast(found)
     if len(fit.conditions) > 2:
-        yield from ("", "All pairs (p unadjusted; Holm's are in the JSON file):")
-        for pair in found.pairs:
+        yield from ("", f"{len(found.pairs)} pairs (p unadjusted; Holm's are in the JSON file):")
+        for pair in found.pairs if full else found.pairs[:MOST_PAIRS]:
             c = pair.contrast
             yield (
                 f"  {pair.first} minus {pair.second}: {c.estimate:.4g}, SE {c.se:.4g}, "

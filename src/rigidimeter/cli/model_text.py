@@ -1,0 +1,181 @@
+"""Models of the torque as they are shown on a terminal: one screen, or each epoch."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from statistics import median
+from typing import TYPE_CHECKING
+
+from rigidimeter.cli.terminal_tables import Block, Heading, Table
+from rigidimeter.core.words import plural, with_error
+
+if TYPE_CHECKING:
+    from rigidimeter.analysis.estimation.terms import Comparison, ModelRow
+    from rigidimeter.analysis.study.torque_models import ModelledEpoch
+
+_COMPARED = ("parameters", "VAF %", "held out, 95 %", "AIC", "BIC", "white p", "input p")
+MOST_FINDINGS = 3
+JOINT = "inertia+damping+stiffness"
+
+
+def model_blocks(found: Sequence[ModelledEpoch], *, full: bool = False) -> Iterator[Block]:
+    """Yield what the models are: of one epoch, or of several epochs together.
+
+    With `full` each epoch with all of its models.
+    """
+    fitted = [each for each in found if each.models is not None]
+    if full or len(found) == 1 or not fitted:
+        for place, each in enumerate(found):
+            yield from ([""] if place else [])
+            yield from _epoch_blocks(each)
+        return
+    bands = sorted({each.models.band_hz for each in fitted if each.models is not None})
+    low, high = bands[0]
+    count = plural(len(found), "epoch")
+    failed = f", {len(found) - len(fitted)} failed" if len(fitted) < len(found) else ""
+    yield Heading(f"{count}{failed}, {low:.4g} to {high:.4g} Hz")
+    yield ""
+    yield from _models(fitted) if fitted[0].compared else _parameters(fitted)
+    if notes := list(_findings(fitted)):
+        yield ""
+        yield Table((), notes, "<<", 1)
+    yield from ("", "--full: every epoch · --json FILE: every number")
+
+
+def _rows(fitted: Sequence[ModelledEpoch]) -> dict[str, list[ModelRow]]:
+    """Return the rows of each model, by its terms."""
+    found: dict[str, list[ModelRow]] = {}
+    for each in fitted:
+        for row in each.models.compared.rows if each.models is not None else ():
+            found.setdefault("+".join(row.terms), []).append(row)
+    return found
+
+
+def _parameters(fitted: Sequence[ModelledEpoch]) -> Iterator[Block]:
+    """Yield each parameter: median of the epochs ± the error of one, and the range of epochs."""
+    for terms, rows in _rows(fitted).items():
+        fits = [row.fit for row in rows if row.fit is not None]
+        if not fits:
+            yield f" {terms}: {rows[0].problem}"
+            continue
+        values: dict[tuple[str, str], list[tuple[float, float]]] = {}
+        for fit in fits:
+            for one in fit.parameters:
+                if not one.name.startswith("response"):
+                    key = f"{one.term} {one.name}".strip(), one.unit
+                    values.setdefault(key, []).append((one.value, one.standard_error))
+        cells: list[Sequence[str] | str] = []
+        for (name, unit), own in values.items():
+            middle, error = (median(sizes) for sizes in zip(*own, strict=True))
+            ends = [with_error(end(value for value, _ in own), 0.0) for end in (min, max)]
+            cells.append((name, unit, with_error(middle, error), " to ".join(ends)))
+        vaf = [fit.vaf_percent for fit in fits]
+        least = f"VAF {median(vaf):.2f} %, at least {min(vaf):.2f} %"
+        yield f" {terms}: {least}"
+        yield Table(("", "unit", "median of epochs", "range"), cells, "<<>>", 1)
+
+
+def _models(fitted: Sequence[ModelledEpoch]) -> Iterator[Block]:
+    """Yield in how many epochs each model is recommended, and how well it predicts."""
+    chosen: Counter[str] = Counter()
+    for each in fitted:
+        best = None if each.models is None else each.models.compared.recommended
+        chosen["" if best is None else "+".join(best.terms)] += 1
+    cells = []
+    for terms, rows in _rows(fitted).items():
+        fits = [row.fit for row in rows if row.fit is not None]
+        held_out = [row.held_out[0] for row in rows if row.held_out is not None]
+        cells.append(
+            (
+                terms.replace(JOINT, "J+B+K"),
+                f"{chosen[terms]} of {len(fitted)}",
+                f"{median(fit.vaf_percent for fit in fits):.2f}" if fits else "–",
+                f"{median(held_out):.2f}" if held_out else "–",
+            )
+        )
+    yield Table(("model", "recommended", "VAF, %", "held out, %"), cells, "=>>>", 1)
+    if chosen[""]:
+        yield f" no model is recommended in {plural(chosen[''], 'epoch')}"
+
+
+def _findings(fitted: Sequence[ModelledEpoch]) -> Iterator[tuple[str, str]]:
+    """Yield each kind of finding once, with the number of epochs that have it."""
+    found = [one for each in fitted if each.models for one in each.models.findings]
+    counts = Counter((one.level, one.name) for one in found)
+    for (level, name), count in counts.most_common(MOST_FINDINGS):
+        first = next(one for one in found if (one.level, one.name) == (level, name))
+        yield level, f"{name}  {first.headline}; {count} of {plural(len(fitted), 'epoch')}"
+
+
+def _epoch_blocks(found: ModelledEpoch) -> list[Block]:
+    if found.models is None:
+        return [f"{found.epoch.name}: failed, {found.problem}"]
+    low, high = found.models.band_hz
+    compared = found.models.compared
+    heading: list[Block] = [Heading(f"{found.epoch.name}, {low:.4g} to {high:.4g} Hz")]
+    if found.clock:
+        heading.append(f"  {found.clock}")
+    findings = [f"  {one.level}  {one.name}  {one.headline}" for one in found.models.findings]
+    if not found.compared:
+        fits = (block for row in compared.rows for block in _fit_blocks(row))
+        return [*heading, *fits, *findings]
+    recommended = compared.recommended
+    shown = _fit_blocks(recommended) if recommended is not None else []
+    return [*heading, *_table(compared), *shown, *findings]
+
+
+def _table(compared: Comparison) -> list[Block]:
+    rows: list[Sequence[str] | str] = []
+    for row in compared.rows:
+        if row.fit is None:
+            rows.append(f"  {row.name}: {row.problem}")
+            continue
+        fit = row.fit
+        rows.append(f"{'*' if row is compared.recommended else ' '} {row.name}")
+        rows.append(
+            (
+                f"{fit.n_parameters}",
+                f"{fit.vaf_percent:.2f}",
+                _held_out(row),
+                f"{fit.aic:.1f}",
+                f"{fit.bic:.1f}",
+                f"{fit.test.ljung_box_p:.2g}",
+                f"{fit.test.input_p:.2g}",
+            )
+        )
+    pushing = [f"  {row.name}: {row.problem}" for row in compared.rows if row.fit and row.problem]
+    verdict = "no model is recommended" if compared.recommended is None else "recommended"
+    table = Table(_COMPARED, rows, ">>=>>>>")
+    return [table, *pushing, f"  {verdict}: {compared.reason}"]
+
+
+def _held_out(row: ModelRow) -> str:
+    if row.held_out is None:
+        return ""
+    return "{:.2f} [{:.2f}, {:.2f}]".format(*row.held_out)
+
+
+def _fit_blocks(row: ModelRow) -> list[Block]:
+    if row.fit is None:
+        return [f"  {'+'.join(row.terms)}: {row.problem}"]
+    fit = row.fit
+    rows = [
+        (
+            f"{one.term} {one.name}".strip(),
+            with_error(one.value, one.standard_error),
+            one.unit,
+        )
+        for one in fit.parameters
+        if not one.name.startswith("response")
+    ]
+    return [
+        f"  {'+'.join(row.terms)}, VAF {fit.vaf_percent:.2f} %",
+        Table(("", "", "unit"), rows, "<>=", indent=4),
+        *(f"    {remark}" for remark in fit.remarks),
+        *(
+            f"    {one.term} from what no linear loop explains: "
+            f"{with_error(one.value, one.standard_error)} {one.unit}"
+            for one in row.beyond
+        ),
+    ]
