@@ -201,7 +201,7 @@ def shares(case: Case, draws: int, mixed: int, seed: list[int]) -> list[float]:
     found = np.full((draws, 8), np.nan)
     for k in range(draws):
         x, y = case.values(rng)
-        test = test_by_levels(by_day(case, x, y), ("x", "y"))
+        test = test_by_levels(by_day(case, x, y), ("x", "y"), "day")
         half = -float(stdtrit(test.df, LEVEL / 2)) * test.se
         for column, shift in enumerate((0.0, EFFECT * case.y_scale)):
             # What is subtracted from y is added to the difference, and to nothing else.

@@ -20,8 +20,8 @@ from rigidimeter.analysis.statistics import difference, fit_mixed, summarise
 from rigidimeter.analysis.study import Comparison
 from rigidimeter.analysis.study.examples import (
     analysed_epoch,
-    representative_fits,
     representative_scores,
+    representatives,
 )
 from rigidimeter.analysis.study.rating_table import groupings
 from rigidimeter.core.words import number, p_value
@@ -52,7 +52,8 @@ def torque_figure(name: str, context: Context) -> Claim:
     """
     part, shows = _PARTS[name]
     study = context.study
-    fit = next(fit for fit in representative_fits(study) if fit.condition == "OFF")
+    held = representatives(study, study.analysis.fixed_inertia, lambda one: one.stiffness_nm_rad)
+    fit = next(fit for fit in held if fit.condition == "OFF")
     joint = JointDynamics(fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad)
     epoch = analysed_epoch(study, fit)
     assert epoch is not None  # a fit of the study is of one of its epochs

@@ -353,7 +353,8 @@ def test_the_first_screen_of_estimates_has_the_numbers_of_the_document(study, js
     epochs = json["estimates"]["epochs"]
     assert len(epochs) > 8
     fits = tuple(replace(fit, source="x.csv") for fit in study.analysis.fits)
-    one_file = replace(study, analysis=replace(study.analysis, fits=fits, fixed_inertia=fits))
+    analysis = replace(study.analysis, fits=fits, fixed_inertia=fits, scores=())
+    one_file = replace(study, analysis=analysis)
     shown = first_screen(one_file, "epoch")[:6]
     assert first_screen(study, "epoch")[0][0] == "together"  # of several recordings
     assert shown[4][0] == "…"
