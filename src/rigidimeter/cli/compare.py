@@ -192,12 +192,9 @@ def _write(
 def _say_changes(found: StudyResult, folder: Path, *, kept: bool) -> None:
     from rigidimeter.analysis.study import UNCHANGED
 
-    echo("")
-    if found.changes == (UNCHANGED,):
-        echo(f"{UNCHANGED[:1].upper()}{UNCHANGED[1:]}.")
-    elif found.changes:
-        echo("Since the last analysis:")
+    if found.changes and found.changes != (UNCHANGED,):
+        echo("\nSince the last analysis:")
         for change in found.changes:
             echo(f"  {change}")
     if kept:
-        echo(f"Tables and JSON: {folder / 'analysis'}; here all but those of single epochs: --full")
+        echo(f"\nTables and JSON: {folder / 'analysis'}; most tables here: --full")

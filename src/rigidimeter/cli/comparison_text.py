@@ -46,7 +46,6 @@ def comparison_blocks(found: StudyResult, *, full: bool = False) -> Iterator[Blo
 
 def _about(found: StudyResult) -> str:
     """Return what was compared, and how much of it."""
-    from rigidimeter.analysis.study import conclude
     from rigidimeter.core.words import condition_name
 
     names = [found.reference, *(each.other for each in (found, *found.further_pairs))]
@@ -63,8 +62,6 @@ def _about(found: StudyResult) -> str:
     if results:
         used = sum(one.outcome.included for one in results)
         parts.append(f"{plural(len(results), 'epoch')}, {used} used")
-    if (concluded := conclude(found)) is not None and concluded.tested:
-        parts.append(f"tested by {concluded.units}")
     return " · ".join(parts)
 
 
@@ -119,12 +116,14 @@ def _left_out(found: StudyResult) -> Iterator[tuple[str, str]]:
 
 
 def finding_notes(analysis: Analysis, full: bool) -> Iterator[tuple[str, str]]:
-    """Yield each kind of finding once, the most serious first; without `full` the first few.
+    """Yield each kind of finding once, the most serious first.
 
-    Without `full` each has two lines: where the epochs' names are too long for that, their number.
+    Without `full` the first few that are more than a note, in two lines each: where the epochs'
+    names are too long for that, their number; and the names of the others.
     """
     groups = analysis.findings
-    shown = groups if full else groups[:MOST_FINDINGS]
+    serious = [group for group in groups if group.finding.level != "note"]
+    shown = groups if full else serious[:MOST_FINDINGS]
     for group in shown:
         text = f"{group.finding.name}  {group.finding.headline}"
         wheres = [group.where]
@@ -136,7 +135,9 @@ def finding_notes(analysis: Analysis, full: bool) -> Iterator[tuple[str, str]]:
     seen = {group.finding.name for group in shown}
     rest = dict.fromkeys(one.finding.name for one in groups[len(shown) :])
     if names := [name for name in rest if name not in seen]:
-        yield "", two_lines(f"and {', '.join(names)} (--full)", f"and {len(names)} more (--full)")
+        label = "" if shown else "note"
+        listed = f"{'and ' * bool(shown)}{', '.join(names)} (--full)"
+        yield label, two_lines(listed, f"{len(names)} more (--full)")
 
 
 def two_lines(*texts: str) -> str:
