@@ -98,7 +98,7 @@ def say(notices: Iterable[Notice]) -> None:
     same: dict[tuple[str, str, str], list[str]] = {}
     for notice in notices:
         place, colon, rest = notice.text.partition(": ")
-        # A path is told from words by its separator; only what it holds may be said for others.
+        # A separator marks a path; only what follows it may be the same of other files.
         key = (rest, Path(place).name) if colon and os.sep in place else (notice.text, "")
         same.setdefault((notice.level, *key), []).append(place)
     for (level, text, name), places in same.items():

@@ -8,7 +8,6 @@ markup. Bold letters are for a terminal alone.
 from __future__ import annotations
 
 import io
-import math
 import shutil
 import sys
 import textwrap
@@ -226,8 +225,3 @@ def shown_table(table: Description, names: Mapping[str, str]) -> Table:
     ]
     align = "".join("<" if c.kind in WORDS else ">" for c in columns)
     return Table(["\n".join(filter(None, (c.group, c.heading))) for c in columns], rows, align)
-
-
-def number_text(value: float, digits: str = ".2g") -> str:
-    """Return a number, or a dash where there is none."""
-    return "–" if math.isnan(value) else f"{value:{digits}}"

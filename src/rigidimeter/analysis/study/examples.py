@@ -65,13 +65,6 @@ def prepared_epochs(result: StudyResult) -> dict[tuple[str, str], PreparedEpoch]
     return {(one.epoch.source, one.epoch.label): one for one in prepared}
 
 
-def example_epochs(result: StudyResult) -> tuple[Epoch, ...]:
-    """Return the epochs that represent their condition, fitted ones first, each once."""
-    chosen: list[Fit | Score] = [*representative_fits(result), *representative_scores(result)]
-    found = {(one.source, one.epoch): analysed_epoch(result, one) for one in chosen}
-    return tuple(epoch for epoch in found.values() if epoch is not None)
-
-
 def perturbed_epoch(result: StudyResult) -> Epoch | None:
     """Return the epoch whose perturbation is drawn: an example, or the first that has one."""
     shown = [e for fit in representative_fits(result) if (e := analysed_epoch(result, fit))]
