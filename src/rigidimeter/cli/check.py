@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from rigidimeter.cli.commission import claimed, table
+from rigidimeter.cli.help_pages import OPTIONS, argument
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.operator_answers import operator
-from rigidimeter.cli.options import SettingsOption
+from rigidimeter.cli.options import SETTINGS
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.terminal_tables import show
 from rigidimeter.core.errors import UserError
@@ -24,51 +23,31 @@ if TYPE_CHECKING:
 
 
 def check(
-    rig: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="[RIG.toml]",
-            help="The rig file. Without one: the virtual rig on a simulated clock, to see how it "
-            "is done; nothing is recorded.",
-            show_default=False,
-        ),
-    ] = None,
-    settings: SettingsOption = None,
-    known_inertia: Annotated[
-        float | None,
-        typer.Option(
-            "--known-inertia-kg-m2",
-            metavar="J",
-            help="True inertia beyond the torque sensor. Such as a weight on the cuff; compared "
-            "in place of the reference.",
-        ),
-    ] = None,
-    new_reference: Annotated[
-        bool,
-        typer.Option(
-            "--new-reference",
-            help="Keep today's inertia as the reference. After the cuff or the handle was changed.",
-        ),
-    ] = False,
-    zero: Annotated[
-        bool,
-        typer.Option(
-            "--zero",
-            help="Only zero and noise of the torque sensor. Without power, by the limits of "
-            "[zeroing], as `run` does when it begins; nothing is recorded.",
-        ),
-    ] = False,
-    yes: Annotated[
-        bool,
-        typer.Option(
-            "--yes",
-            help="Consent in advance, for an emulated rig only.",
-        ),
-    ] = False,
-    piped: Annotated[
-        bool,
-        typer.Option("--piped", hidden=True, help="A program asks somebody and pipes the answer."),
-    ] = False,
+    rig: Path | None = argument(
+        "[RIG.toml]",
+        "The rig file. Without one: the virtual rig on a simulated clock, to see how it is done; "
+        "nothing is recorded.",
+        None,
+    ),
+    settings: Path | None = SETTINGS,
+    known_inertia: float | None = OPTIONS.option(
+        "--known-inertia-kg-m2 J",
+        "True inertia beyond the torque sensor. Such as a weight on the cuff; compared in place "
+        "of the reference.",
+    ),
+    new_reference: bool = OPTIONS.flag(
+        "--new-reference",
+        "Keep today's inertia as the reference. After the cuff or the handle was changed.",
+    ),
+    zero: bool = OPTIONS.flag(
+        "--zero",
+        "Only zero and noise of the torque sensor. Without power, by the limits of [zeroing], as "
+        "`run` does when it begins; nothing is recorded.",
+    ),
+    yes: bool = OPTIONS.flag("--yes", "Consent in advance, for an emulated rig only."),
+    piped: bool = OPTIONS.flag(
+        "--piped", "A program asks somebody and pipes the answer.", hidden=True
+    ),
 ) -> None:
     """Check a commissioned rig, every day before the first run.
 

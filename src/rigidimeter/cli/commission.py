@@ -10,13 +10,14 @@ import threading
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
+from rigidimeter.cli.help_pages import OPTIONS
 from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.operator_answers import operator
-from rigidimeter.cli.options import SettingsOption
+from rigidimeter.cli.options import SETTINGS
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.terminal_tables import Table, show
 from rigidimeter.core.errors import UserError
@@ -28,55 +29,32 @@ if TYPE_CHECKING:
 
 
 def commission(
-    rig: Annotated[
-        Path | None, typer.Option("--rig", metavar="RIG.toml", help="The rig file.")
-    ] = None,
-    settings: SettingsOption = None,
-    signed_by: Annotated[
-        str,
-        typer.Option(
-            "--signed-by", metavar="NAME", help="Who is responsible for the rig; recorded."
-        ),
-    ] = "",
-    yes: Annotated[
-        bool,
-        typer.Option(
-            "--yes",
-            help="Consent to every motion in advance. Checks that need a person are skipped, so "
-            "the record is valid for an emulated rig only.",
-        ),
-    ] = False,
-    known_torque: Annotated[
-        float | None,
-        typer.Option(
-            "--known-torque-nm",
-            metavar="NM",
-            help="Known torque, applied by hand or by a weight. It acts toward positive angles.",
-        ),
-    ] = None,
-    known_angle: Annotated[
-        float | None,
-        typer.Option(
-            "--known-angle-deg",
-            metavar="DEG",
-            help="Known angle by which you turn the joint. By hand, with the drive off.",
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", metavar="FILE", help="The record. Default: a file next to the rig file."
-        ),
-    ] = None,
-    eds: Annotated[
-        Path | None,
-        typer.Option(
-            "--eds",
-            metavar="FILE",
-            help="Only compare a CANopen drive's EDS. With what the rig file writes, or with the "
-            "driver's defaults without one; nothing is connected.",
-        ),
-    ] = None,
+    rig: Path | None = OPTIONS.option("--rig RIG.toml", "The rig file."),
+    settings: Path | None = SETTINGS,
+    signed_by: str = OPTIONS.option(
+        "--signed-by NAME", "Who is responsible for the rig; recorded.", ""
+    ),
+    yes: bool = OPTIONS.flag(
+        "--yes",
+        "Consent to every motion in advance. Checks that need a person are skipped, so the "
+        "record is valid for an emulated rig only.",
+    ),
+    known_torque: float | None = OPTIONS.option(
+        "--known-torque-nm NM",
+        "Known torque, applied by hand or by a weight. It acts toward positive angles.",
+    ),
+    known_angle: float | None = OPTIONS.option(
+        "--known-angle-deg DEG",
+        "Known angle by which you turn the joint. By hand, with the drive off.",
+    ),
+    out: Path | None = OPTIONS.option(
+        "--out FILE", "The record. Default: a file next to the rig file."
+    ),
+    eds: Path | None = OPTIONS.option(
+        "--eds FILE",
+        "Only compare a CANopen drive's EDS. With what the rig file writes, or with the driver's "
+        "defaults without one; nothing is connected.",
+    ),
 ) -> None:
     """Check a new rig with nobody in it, before its first run.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -19,7 +19,12 @@ from rigidimeter.cli.inputs import (
     study_files,
     study_of,
 )
-from rigidimeter.cli.options import CsvOption, FullOption, JsonOption, KeyOption
+from rigidimeter.cli.options import (
+    CSV,
+    FULL,
+    JSON,
+    KEY,
+)
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import show
@@ -32,80 +37,32 @@ if TYPE_CHECKING:
 @reads_recordings
 def compare(
     recordings: Recordings,
-    reference: Annotated[
-        str | None,
-        typer.Option(
-            "--reference",
-            metavar="NAME",
-            help="Reference condition. Default: OFF if there is one, else the first. Differences "
-            "are other minus reference; the rank-sum shift in --full is reference minus other.",
-            rich_help_panel=COMPARE,
-        ),
-    ] = None,
-    other: Annotated[
-        str | None,
-        typer.Option(
-            "--other",
-            metavar="NAME",
-            help="The other condition. Default: the next one, and each further one is compared "
-            "with the first, too.",
-            rich_help_panel=COMPARE,
-        ),
-    ] = None,
-    json_out: JsonOption = None,
-    csv_out: CsvOption = None,
-    value: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--value",
-            metavar="COLUMN",
-            help="Compare this column of one CSV table. Repeat for several.",
-            rich_help_panel=COMPARE,
-        ),
-    ] = None,
-    by: Annotated[
-        str,
-        typer.Option(
-            "--by",
-            metavar="COLUMN",
-            help="With --value: column of conditions.",
-            rich_help_panel=COMPARE,
-        ),
-    ] = "condition",
-    session: Annotated[
-        str | None,
-        typer.Option(
-            "--session",
-            metavar="COLUMN",
-            help="With --value: the bootstrap resamples the labels of this column. Default: rows.",
-            rich_help_panel=COMPARE,
-            hidden=True,
-        ),
-    ] = None,
-    seed: Annotated[
-        int,
-        typer.Option(
-            "--seed",
-            min=0,
-            metavar="N",
-            help="Seed of the bootstrap.",
-            rich_help_panel=ESTIMATE,
-            hidden=True,
-        ),
-    ] = 1,
-    resamples: Annotated[
-        int,
-        typer.Option(
-            "--resamples",
-            min=100,
-            metavar="N",
-            help="Resamples of the bootstrap.",
-            rich_help_panel=ESTIMATE,
-            hidden=True,
-        ),
-    ] = 9999,
-    key: KeyOption = None,
-    full: FullOption = False,
+    reference: str | None = COMPARE.option(
+        "--reference NAME",
+        "Reference condition. Default: OFF if there is one, else the first. Differences are "
+        "other minus reference; the rank-sum shift in --full is reference minus other.",
+    ),
+    other: str | None = COMPARE.option(
+        "--other NAME",
+        "The other condition. Default: the next one, and each further one is compared with the "
+        "first, too.",
+    ),
+    json_out: Path | None = JSON,
+    csv_out: Path | None = CSV,
+    value: list[str] | None = COMPARE.option(
+        "--value COLUMN", "Compare this column of one CSV table. Repeat for several."
+    ),
+    by: str = COMPARE.option("--by COLUMN", "With --value: column of conditions.", "condition"),
+    session: str | None = COMPARE.further(
+        "--session COLUMN",
+        "With --value: the bootstrap resamples the labels of this column. Default: rows.",
+    ),
+    seed: int = ESTIMATE.further("--seed N", "Seed of the bootstrap.", 1, min=0),
+    resamples: int = ESTIMATE.further(
+        "--resamples N", "Resamples of the bootstrap.", 9999, min=100
+    ),
+    key: Path | None = KEY,
+    full: bool = FULL,
 ) -> None:
     """Compare conditions in J, B, K, angular impulse and work.
 

@@ -9,12 +9,10 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from rigidimeter.cli.help_pages import PAGE
-from rigidimeter.cli.options import CpuOption, PriorityOption, RigOption
+from rigidimeter.cli.help_pages import OPTIONS, PAGE, argument
+from rigidimeter.cli.options import CPU, PRIORITY, RIG
 from rigidimeter.cli.output import echo
 from rigidimeter.core.errors import UserError
 
@@ -25,52 +23,26 @@ if TYPE_CHECKING:
 
 SHOWN_S = 3.0
 
-HostOption = Annotated[
-    str,
-    typer.Option(
-        "--host",
-        metavar="ADDRESS",
-        help="Address of the page. Any but this computer's own loopback needs a token, which is "
-        "printed.",
-        rich_help_panel=PAGE,
-    ),
-]
-PortOption = Annotated[
-    int,
-    typer.Option(
-        "--port",
-        metavar="N",
-        min=0,
-        max=65535,
-        help="Port; 0 for a free one.",
-        rich_help_panel=PAGE,
-    ),
-]
-TokenOption = Annotated[
-    str,
-    typer.Option(
-        "--token",
-        metavar="TEXT",
-        help="Token of the page. Default: a random one.",
-        rich_help_panel=PAGE,
-    ),
-]
+HOST = PAGE.option(
+    "--host ADDRESS",
+    "Address of the page. Any but this computer's own loopback needs a token, which is printed.",
+    "127.0.0.1",
+)
+PORT = PAGE.option("--port N", "Port; 0 for a free one.", 8765, min=0, max=65535)
+TOKEN = PAGE.option("--token TEXT", "Token of the page. Default: a random one.", "")
 
 
 def console(
-    protocol: Annotated[
-        Path | None,
-        typer.Argument(metavar="[PROTOCOL.toml]", help="Settings that the form begins with."),
-    ] = None,
-    rig: RigOption = None,
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder of the sessions.")
-    ] = Path("sessions"),
-    host: HostOption = "127.0.0.1",
-    port: PortOption = 8765,
-    token: TokenOption = "",
-    priority: PriorityOption = 80,
-    cpu: CpuOption = None,
+    protocol: Path | None = argument(
+        "[PROTOCOL.toml]", "Settings that the form begins with.", None
+    ),
+    rig: Path | None = RIG,
+    out: Path = OPTIONS.option("--out DIR", "Folder of the sessions.", Path("sessions")),
+    host: str = HOST,
+    port: int = PORT,
+    token: str = TOKEN,
+    priority: int = PRIORITY,
+    cpu: int | None = CPU,
 ) -> None:
     """Run sessions from a page in a browser: plan, run, look, repeat.
 

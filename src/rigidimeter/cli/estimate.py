@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from rigidimeter.cli.estimate_text import estimate_blocks
 from rigidimeter.cli.help_pages import WRITE
 from rigidimeter.cli.inputs import analyse_recordings, keep_inputs, say_analysed
-from rigidimeter.cli.options import CsvOption, FullOption, JsonOption
+from rigidimeter.cli.options import CSV, FULL, JSON
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import show
 
@@ -18,19 +17,14 @@ from rigidimeter.cli.terminal_tables import show
 @reads_recordings
 def estimate(
     recordings: Recordings,
-    json_out: JsonOption = None,
-    csv_out: CsvOption = None,
-    subject_torque_out: Annotated[
-        Path | None,
-        typer.Option(
-            "--subject-torque",
-            metavar="FILE",
-            help="Torque of the subject, .csv or .parquet. Measured, joint and subject's torque "
-            "of each epoch.",
-            rich_help_panel=WRITE,
-        ),
-    ] = None,
-    full: FullOption = False,
+    json_out: Path | None = JSON,
+    csv_out: Path | None = CSV,
+    subject_torque_out: Path | None = WRITE.option(
+        "--subject-torque FILE",
+        "Torque of the subject, .csv or .parquet. Measured, joint and subject's torque of each "
+        "epoch.",
+    ),
+    full: bool = FULL,
 ) -> None:
     """Estimate inertia J, damping B and stiffness K of each epoch.
 

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from rigidimeter.cli.help_pages import HOW_TO_READ, WRITE
 from rigidimeter.cli.inputs import analyse_recordings, say, say_analysed, study_of
-from rigidimeter.cli.options import KeyOption
+from rigidimeter.cli.options import KEY
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.core.errors import UserError
@@ -24,84 +24,23 @@ if TYPE_CHECKING:
 @reads_recordings
 def export(
     recordings: Recordings,
-    to: Annotated[
-        str,
-        typer.Option(
-            "--to",
-            metavar="FORMAT",
-            help="Format: nwb, bids, parquet, csv, mat.",
-            rich_help_panel=WRITE,
-        ),
-    ],
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out",
-            metavar="PATH",
-            help="File, or folder of several files.",
-            rich_help_panel=WRITE,
-        ),
-    ],
-    overwrite: Annotated[
-        bool,
-        typer.Option(
-            "--overwrite",
-            help="Replace files of the same name.",
-            rich_help_panel=WRITE,
-            hidden=True,
-        ),
-    ] = False,
-    estimates: Annotated[
-        bool,
-        typer.Option(
-            "--estimates/--no-estimates",
-            help="Whether J, B, K and scores travel along.",
-            rich_help_panel=WRITE,
-            hidden=True,
-        ),
-    ] = True,
-    subject: Annotated[
-        str,
-        typer.Option(
-            "--subject",
-            metavar="NAME",
-            help="The subject of single recordings.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = "",
-    day: Annotated[
-        str,
-        typer.Option(
-            "--day",
-            metavar="NAME",
-            help="The day of single recordings.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = "",
-    joint: Annotated[
-        str,
-        typer.Option(
-            "--joint",
-            metavar="NAME",
-            help="The joint of single recordings, as elbow.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = "",
-    started: Annotated[
-        datetime | None,
-        typer.Option(
-            "--started",
-            metavar="TIME",
-            formats=["%Y-%m-%dT%H:%M:%S%z", "%Y-%m-%dT%H:%M%z"],
-            help="When single recordings began that do not say so, as 2026-03-01T10:30+0100.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = None,
-    key: KeyOption = None,
+    to: str = WRITE.option("--to FORMAT", "Format: nwb, bids, parquet, csv, mat.", ...),
+    out: Path = WRITE.option("--out PATH", "File, or folder of several files.", ...),
+    overwrite: bool = WRITE.flag("--overwrite", "Replace files of the same name.", hidden=True),
+    estimates: bool = WRITE.further(
+        "--estimates/--no-estimates", "Whether J, B, K and scores travel along.", True
+    ),
+    subject: str = HOW_TO_READ.further("--subject NAME", "The subject of single recordings.", ""),
+    day: str = HOW_TO_READ.further("--day NAME", "The day of single recordings.", ""),
+    joint: str = HOW_TO_READ.further(
+        "--joint NAME", "The joint of single recordings, as elbow.", ""
+    ),
+    started: datetime | None = HOW_TO_READ.further(
+        "--started TIME",
+        "When single recordings began that do not say so, as 2026-03-01T10:30+0100.",
+        formats=["%Y-%m-%dT%H:%M:%S%z", "%Y-%m-%dT%H:%M%z"],
+    ),
+    key: Path | None = KEY,
 ) -> None:
     """Write sessions, recordings or a study in another format.
 

@@ -1,8 +1,8 @@
 """Help pages: `--help` on one screen, `--help-all` with everything.
 
-Both are made from what a command declares. `--help` shows the first paragraph and the examples of
-its docstring, and the first sentence of each option; an option that is declared `hidden` is shown
-by `--help-all` only. An option's `rich_help_panel` is the group that it is shown in.
+Both are made from what a command declares, each option in the `Group` under whose heading it is
+shown. `--help` shows the first paragraph and the examples of a command's docstring, and the first
+sentence of each option; an option declared by `Group.further` is shown by `--help-all` only.
 """
 
 from __future__ import annotations
@@ -16,17 +16,56 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
-READ = "What to read"
-HOW_TO_READ = "How to read it"
-COMPARE = "What to compare"
-PERTURB = "How to perturb"
-DETECT = "What to detect"
-ESTIMATE = "How to estimate"
-WRITE = "What to write"
-RUN = "How to run"
-PAGE = "The page in the browser"
-_OTHER = "Options"
-_ORDER = (READ, HOW_TO_READ, COMPARE, DETECT, PERTURB, ESTIMATE, RUN, PAGE, _OTHER, WRITE)
+
+class Group(str):
+    """A heading of help pages, which declares the options below it."""
+
+    __slots__ = ()
+
+    def option(self, declared: str, text: str, default: Any = None, **more: Any) -> Any:
+        """Return the default of a parameter of a command, which makes the parameter an option.
+
+        Parameters
+        ----------
+        declared : str
+            As the help page shows it, such as ``--out DIR``; a flag has its name alone.
+        text : str
+            Of which `--help` shows the first sentence.
+        default : object
+            ``...`` for an option that must be given.
+        **more
+            What typer takes, such as `min` and `max`.
+        """
+        name, _, metavar = declared.partition(" ")
+        return typer.Option(
+            default, name, metavar=metavar or None, help=text, rich_help_panel=self, **more
+        )
+
+    def flag(self, name: str, text: str, **more: Any) -> Any:
+        """Return an option that is given or not."""
+        return self.option(name, text, False, **more)
+
+    def further(self, declared: str, text: str, default: Any = None, **more: Any) -> Any:
+        """Return an option that `--help-all` alone shows."""
+        return self.option(declared, text, default, hidden=True, **more)
+
+
+def argument(metavar: str, text: str, default: Any = ..., **more: Any) -> Any:
+    """Return the default of a parameter that is given without a name, as an option is."""
+    return typer.Argument(default, metavar=metavar, help=text, show_default=False, **more)
+
+
+READ = Group("What to read")
+HOW_TO_READ = Group("How to read it")
+COMPARE = Group("What to compare")
+PERTURB = Group("How to perturb")
+DETECT = Group("What to detect")
+ESTIMATE = Group("How to estimate")
+WRITE = Group("What to write")
+RUN = Group("How to run")
+PAGE = Group("The page in the browser")
+OPTIONS = Group("Options")
+_ORDER = (READ, HOW_TO_READ, COMPARE, DETECT, PERTURB, ESTIMATE, RUN, PAGE, OPTIONS, WRITE)
 
 _WIDEST_NAME = 26
 _EVERYTHING = "rigidimeter.help_all"
@@ -165,7 +204,7 @@ def _options(
     for each in command.params:
         if each.name != "help_all" and (everything or each.name not in command.in_full_only):
             name, text = each.get_help_record(ctx)
-            group = _OTHER
+            group = OPTIONS
             if each.param_type_name == "argument":
                 name, group = each.metavar, READ
             words = full_text(each) if everything else first_sentence(each.help)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import shlex
 from itertools import pairwise
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 from typer.core import TyperArgument, TyperOption
@@ -62,106 +61,24 @@ class RegistryCommand(HelpCommand):
         return super().full_text(parameter)
 
 
-SettingsOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--settings",
-        metavar="FILE",
-        help="Settings in TOML. A value that the file does not give has its default; "
-        "examples/settings/study.toml is an example.",
-        rich_help_panel=READ,
-    ),
-]
-JsonOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--json",
-        metavar="FILE",
-        help="All results, as JSON.",
-        rich_help_panel=WRITE,
-    ),
-]
-FullOption = Annotated[
-    bool,
-    typer.Option("--full", help="Show every table below the first screen.", rich_help_panel=WRITE),
-]
-CsvOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--csv",
-        metavar="FILE",
-        help="The table, as CSV.",
-        rich_help_panel=WRITE,
-    ),
-]
-NewSessionOption = Annotated[
-    Path,
-    typer.Option("--out", metavar="DIR", help="New folder for the session.", rich_help_panel=WRITE),
-]
-RigOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--rig",
-        metavar="RIG.toml",
-        help="The rig file. Default: the virtual rig.",
-        rich_help_panel=READ,
-    ),
-]
-PriorityOption = Annotated[
-    int,
-    typer.Option(
-        "--priority",
-        metavar="N",
-        min=0,
-        max=99,
-        help="Real-time priority (SCHED_FIFO) of the loop; 0 for none.",
-        rich_help_panel=RUN,
-        hidden=True,
-    ),
-]
-CpuOption = Annotated[
-    int | None,
-    typer.Option(
-        "--cpu",
-        metavar="N",
-        help="Processor of the loop. Default: the last one.",
-        rich_help_panel=RUN,
-        hidden=True,
-    ),
-]
-NewStudyOption = Annotated[
-    Path,
-    typer.Option("--out", metavar="DIR", help="New folder for the study.", rich_help_panel=WRITE),
-]
-SeedOption = Annotated[
-    int | None,
-    typer.Option(
-        "--seed",
-        metavar="N",
-        help="Seed of all random numbers. Default: that of the settings.",
-        rich_help_panel=RUN,
-        hidden=True,
-    ),
-]
-StudySeedOption = Annotated[
-    int,
-    typer.Option(
-        "--seed",
-        metavar="N",
-        min=0,
-        max=2**31,
-        help="Seed of all random numbers.",
-        rich_help_panel=RUN,
-    ),
-]
-KeyOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--key",
-        metavar="FILE",
-        help="Blinding key of a study folder (columns code and condition), if it is stored "
-        "elsewhere.",
-        rich_help_panel=HOW_TO_READ,
-        hidden=True,
-    ),
-]
+SETTINGS = READ.option(
+    "--settings FILE",
+    "Settings in TOML. A value that the file does not give has its default; "
+    "examples/settings/study.toml is an example.",
+)
+JSON = WRITE.option("--json FILE", "All results, as JSON.")
+FULL = WRITE.flag("--full", "Show every table below the first screen.")
+CSV = WRITE.option("--csv FILE", "The table, as CSV.")
+NEW_SESSION = WRITE.option("--out DIR", "New folder for the session.", ...)
+RIG = READ.option("--rig RIG.toml", "The rig file. Default: the virtual rig.")
+PRIORITY = RUN.further(
+    "--priority N", "Real-time priority (SCHED_FIFO) of the loop; 0 for none.", 80, min=0, max=99
+)
+CPU = RUN.further("--cpu N", "Processor of the loop. Default: the last one.")
+NEW_STUDY = WRITE.option("--out DIR", "New folder for the study.", ...)
+SEED = RUN.further("--seed N", "Seed of all random numbers. Default: that of the settings.")
+STUDY_SEED = RUN.option("--seed N", "Seed of all random numbers.", 2023, min=0, max=2**31)
+KEY = HOW_TO_READ.further(
+    "--key FILE",
+    "Blinding key of a study folder (columns code and condition), if it is stored elsewhere.",
+)

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -18,7 +18,7 @@ from rigidimeter.cli.inputs import (
     say_analysed,
     study_of,
 )
-from rigidimeter.cli.options import KeyOption
+from rigidimeter.cli.options import KEY
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import Heading, show
@@ -31,25 +31,11 @@ if TYPE_CHECKING:
 @reads_recordings
 def report(
     recordings: Recordings,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out",
-            metavar="DIR",
-            help="Folder of the report.",
-            rich_help_panel=WRITE,
-        ),
-    ],
-    title: Annotated[
-        str | None,
-        typer.Option(
-            "--title",
-            metavar="TEXT",
-            help="Title of the page. Default: the title of the study, or Joint rigidity.",
-            rich_help_panel=WRITE,
-        ),
-    ] = None,
-    key: KeyOption = None,
+    out: Path = WRITE.option("--out DIR", "Folder of the report.", ...),
+    title: str | None = WRITE.option(
+        "--title TEXT", "Title of the page. Default: the title of the study, or Joint rigidity."
+    ),
+    key: Path | None = KEY,
 ) -> None:
     """Write one HTML page of results, with its tables and figures.
 

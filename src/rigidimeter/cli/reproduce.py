@@ -3,26 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
+from rigidimeter.cli.help_pages import OPTIONS
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.terminal_tables import Heading, Table, show
 from rigidimeter.core.errors import UserError
 
 
 def reproduce(
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder for page, ledger and figures.")
-    ],
-    seed: Annotated[
-        int, typer.Option("--seed", min=0, max=2**31, help="Seed of everything random.")
-    ] = 2023,
-    only: Annotated[
-        list[str] | None,
-        typer.Option("--only", metavar="ID", help="Only this row; repeat for several."),
-    ] = None,
+    out: Path = OPTIONS.option("--out DIR", "Folder for page, ledger and figures.", ...),
+    seed: int = OPTIONS.option("--seed", "Seed of everything random.", 2023, min=0, max=2**31),
+    only: list[str] | None = OPTIONS.option("--only ID", "Only this row; repeat for several."),
 ) -> None:
     """Recompute every equation, figure and table of the paper.
 

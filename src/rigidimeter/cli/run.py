@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from rigidimeter.cli.console import HostOption, PortOption, TokenOption, run_on_page
-from rigidimeter.cli.help_pages import RUN
+from rigidimeter.cli.console import (
+    HOST,
+    PORT,
+    TOKEN,
+    run_on_page,
+)
+from rigidimeter.cli.help_pages import OPTIONS, RUN, argument
 from rigidimeter.cli.options import (
-    CpuOption,
-    NewSessionOption,
-    PriorityOption,
-    RigOption,
-    SeedOption,
+    CPU,
+    NEW_SESSION,
+    PRIORITY,
+    RIG,
+    SEED,
 )
 from rigidimeter.cli.output import echo
 from rigidimeter.core.errors import UserError
@@ -26,52 +29,29 @@ if TYPE_CHECKING:
 
 
 def run(
-    out: NewSessionOption,
-    protocol: Annotated[
-        Path | None,
-        typer.Argument(metavar="[PROTOCOL.toml]", help="Settings with the protocol."),
-    ] = None,
-    rig: RigOption = None,
-    resume: Annotated[
-        Path | None,
-        typer.Option(
-            "--resume",
-            metavar="DIR",
-            help="Continue this session: run the epochs that are left.",
-            rich_help_panel=RUN,
-        ),
-    ] = None,
-    seed: SeedOption = None,
-    unattended: Annotated[
-        bool,
-        typer.Option(
-            "--unattended",
-            help="Run without an operator. What would pause the session ends it instead.",
-            rich_help_panel=RUN,
-        ),
-    ] = False,
-    priority: PriorityOption = 80,
-    cpu: CpuOption = None,
-    page: Annotated[
-        bool,
-        typer.Option(
-            "--console",
-            help="Lead the session from a page in a browser. As `rigidimeter console` does.",
-            rich_help_panel=RUN,
-        ),
-    ] = False,
-    blinded: Annotated[
-        bool,
-        typer.Option(
-            "--blinded",
-            help="Show codes in place of conditions. For an examiner who may see the screen; "
-            "also with `estimate --blinded`.",
-            rich_help_panel=RUN,
-        ),
-    ] = False,
-    host: HostOption = "127.0.0.1",
-    port: PortOption = 8765,
-    token: TokenOption = "",
+    out: Path = NEW_SESSION,
+    protocol: Path | None = argument("[PROTOCOL.toml]", "Settings with the protocol.", None),
+    rig: Path | None = RIG,
+    resume: Path | None = RUN.option(
+        "--resume DIR", "Continue this session: run the epochs that are left."
+    ),
+    seed: int | None = SEED,
+    unattended: bool = RUN.flag(
+        "--unattended", "Run without an operator. What would pause the session ends it instead."
+    ),
+    priority: int = PRIORITY,
+    cpu: int | None = CPU,
+    page: bool = RUN.flag(
+        "--console", "Lead the session from a page in a browser. As `rigidimeter console` does."
+    ),
+    blinded: bool = RUN.flag(
+        "--blinded",
+        "Show codes in place of conditions. For an examiner who may see the screen; also with "
+        "`estimate --blinded`.",
+    ),
+    host: str = HOST,
+    port: int = PORT,
+    token: str = TOKEN,
 ) -> None:
     """Run a protocol in real time, on a rig or the virtual rig.
 
@@ -189,16 +169,15 @@ def _offer(out: Path) -> None:
 
 
 def recover(
-    session: Annotated[
-        Path, typer.Argument(metavar="SESSION", help="Session folder.", show_default=False)
-    ],
-    reason: Annotated[
-        str, typer.Option("--reason", metavar="TEXT", help="Why it ended, if you know.")
-    ] = "the recording process ended without closing the session",
-    force: Annotated[
-        bool,
-        typer.Option("--force", help="Also a session that was closed and is damaged at its end."),
-    ] = False,
+    session: Path = argument("SESSION", "Session folder."),
+    reason: str = OPTIONS.option(
+        "--reason TEXT",
+        "Why it ended, if you know.",
+        "the recording process ended without closing the session",
+    ),
+    force: bool = OPTIONS.flag(
+        "--force", "Also a session that was closed and is damaged at its end."
+    ),
 ) -> None:
     """Close an interrupted session, keeping everything recorded.
 
