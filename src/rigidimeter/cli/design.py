@@ -72,7 +72,6 @@ def design(
       rigidimeter design --settings rig.toml --out planned --json numbers.json
       rigidimeter design --detect damping=20% --detect stiffness=20% --from study
     """
-    from rigidimeter.cli.design_screen import first_screen
     from rigidimeter.cli.design_text import design_blocks
     from rigidimeter.cli.progress import Meter
     from rigidimeter.core.files import write_json
@@ -97,7 +96,7 @@ def design(
             forearm=Forearm(**given) if given else None,
             progress=meter.advance,
         )
-    show(design_blocks(designed) if full else first_screen(designed))
+    show(design_blocks(designed, full=full))
     if out is not None:
         from rigidimeter.analysis.report.design_folder import write_design_folder
 
