@@ -8,8 +8,8 @@ from pathlib import Path
 import typer
 
 from rigidimeter.cli.help_pages import RUN, WRITE
-from rigidimeter.cli.inputs import keep_inputs
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.output import echo, keep_inputs
+from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.core.errors import UserError
 
@@ -43,7 +43,6 @@ def batch(
       rigidimeter batch study --out results.parquet --scheduler tcp://host:8786
     """
     from rigidimeter.analysis.batch import batch as run_batch
-    from rigidimeter.cli.progress import Meter
 
     _refuse(recordings)
     keep_inputs((out,), recordings.paths)

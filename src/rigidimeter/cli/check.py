@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 
 from rigidimeter.cli.commission import claimed, table
 from rigidimeter.cli.help_pages import OPTIONS, argument
-from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.operator_answers import operator
 from rigidimeter.cli.options import SETTINGS
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.output import echo, keep_inputs
 from rigidimeter.cli.terminal_tables import show
 from rigidimeter.core.errors import UserError
 

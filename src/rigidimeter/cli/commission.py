@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING
 import typer
 
 from rigidimeter.cli.help_pages import OPTIONS
-from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.operator_answers import operator
 from rigidimeter.cli.options import SETTINGS
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.output import echo, keep_inputs
 from rigidimeter.cli.terminal_tables import Table, show
 from rigidimeter.core.errors import UserError
 

@@ -8,24 +8,15 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from rigidimeter.cli.comparison_text import comparison_blocks
 from rigidimeter.cli.help_pages import COMPARE, ESTIMATE
-from rigidimeter.cli.inputs import (
-    analyse_recordings,
-    analyse_study_folder,
-    keep_inputs,
-    say,
-    say_analysed,
-    study_files,
-    study_of,
-)
 from rigidimeter.cli.options import (
     CSV,
     FULL,
     JSON,
     KEY,
 )
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.output import echo, keep_inputs, say
+from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import show
 from rigidimeter.core.errors import UserError
@@ -86,7 +77,14 @@ def compare(
       rigidimeter compare ratings.csv --value score --by condition
     """
     from rigidimeter.analysis import study as studies
-    from rigidimeter.cli.progress import Meter
+    from rigidimeter.cli.comparison_text import comparison_blocks
+    from rigidimeter.cli.inputs import (
+        analyse_recordings,
+        analyse_study_folder,
+        say_analysed,
+        study_files,
+        study_of,
+    )
 
     outputs = (json_out, csv_out)
     paths = recordings.paths

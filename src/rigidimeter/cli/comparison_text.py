@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
+from markupsafe import Markup
+
+from rigidimeter.analysis.report import shown_tables, source_names
+from rigidimeter.analysis.study import StudyResult, conclude, difference_rows, lead, statements
 from rigidimeter.cli.terminal_tables import Block, Heading, Table, paragraph, shown_table
-from rigidimeter.core.words import plural
-
-if TYPE_CHECKING:
-    from rigidimeter.analysis.study import StudyResult
-    from rigidimeter.core.records import Analysis, Fit, Score
+from rigidimeter.core.records import Analysis, Fit, Score
+from rigidimeter.core.words import condition_name, plural
 
 MOST_FINDINGS = 3
 
@@ -46,8 +46,6 @@ def comparison_blocks(found: StudyResult, *, full: bool = False) -> Iterator[Blo
 
 def _about(found: StudyResult) -> str:
     """Return what was compared, and how much of it."""
-    from rigidimeter.core.words import condition_name
-
     names = [found.reference, *(each.other for each in (found, *found.further_pairs))]
     parts = [" and ".join(condition_name(name) for name in dict.fromkeys(names) if name)]
     if found.virtual or any(epoch.virtual for epoch in found.epochs):
@@ -67,8 +65,6 @@ def _about(found: StudyResult) -> str:
 
 def difference_blocks(found: StudyResult) -> Iterator[Block]:
     """Yield what was found of each measure; of a virtual study beside what was simulated."""
-    from rigidimeter.analysis.study import conclude, difference_rows
-
     concluded = conclude(found)
     if concluded is None:
         return
@@ -92,8 +88,6 @@ def difference_blocks(found: StudyResult) -> Iterator[Block]:
 
 def statement_blocks(found: StudyResult) -> Iterator[Block]:
     """Yield what was measured, tested and concluded."""
-    from rigidimeter.analysis.study import lead, statements
-
     said = statements(found)
     if said is None:
         yield lead(found)
@@ -147,10 +141,6 @@ def two_lines(*texts: str) -> str:
 
 def full_blocks(found: StudyResult, *, by_epoch: bool = False) -> Iterator[Block]:
     """Yield the tables of the report; with `by_epoch` also those with a row for each epoch."""
-    from markupsafe import Markup
-
-    from rigidimeter.analysis.report import shown_tables, source_names
-
     names = source_names(found)
     for table in shown_tables(found):
         if by_epoch or not (table.folding and any(c.name == "epoch" for c in table.columns)):

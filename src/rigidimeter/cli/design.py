@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigidimeter.cli.help_pages import DETECT, PERTURB, WRITE
-from rigidimeter.cli.inputs import keep_inputs
 from rigidimeter.cli.options import JSON, SETTINGS
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.output import echo, keep_inputs, say
+from rigidimeter.cli.progress import Meter
+from rigidimeter.cli.reading_options import plain_recordings
 from rigidimeter.cli.terminal_tables import show
 from rigidimeter.core.errors import UserError
 
@@ -73,7 +74,6 @@ def design(
       rigidimeter design --detect damping=20% --detect stiffness=20% --from study
     """
     from rigidimeter.cli.design_text import design_blocks
-    from rigidimeter.cli.progress import Meter
     from rigidimeter.core.files import write_json
     from rigidimeter.model import refuse_unstable
     from rigidimeter.planning import Forearm, check_criterion, design_document
@@ -108,19 +108,16 @@ def design(
 
 def _scatter_of(folder: Path) -> dict[str, Scatter]:
     """Estimate every epoch of a study, and return how much inertia, damping and stiffness vary."""
-    from rigidimeter.analysis.study import day_scatter, estimate_study, read_study
-    from rigidimeter.cli.inputs import say
-    from rigidimeter.cli.progress import Meter
+    from rigidimeter.analysis.study import day_scatter
+    from rigidimeter.cli.inputs import estimate_study_inputs, read_study_inputs
     from rigidimeter.core.study_files import STUDY_FILE, is_study
     from rigidimeter.planning import CORRELATION, Scatter
 
     if not is_study(folder):
         raise UserError(f"--from {folder}: is no study folder: it has no {STUDY_FILE}")
-    with Meter("read", 1.0) as meter:
-        read = read_study(folder, progress=meter.advance)
-    with Meter("estimate", 1.0) as meter:
-        analysis, notices = estimate_study(read, meter.advance)
-    say((*read.notices, *notices))
+    read = read_study_inputs(folder, plain_recordings(folder))
+    analysis, notices = estimate_study_inputs(read)
+    say(notices)
     found = {}
     for one in day_scatter(read, analysis):
         source, of_one = f"{folder}, {one.epochs} epochs", one.condition_in_day_percent

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import typer
 
-from rigidimeter.cli.estimate_text import estimate_blocks
 from rigidimeter.cli.help_pages import WRITE
-from rigidimeter.cli.inputs import analyse_recordings, keep_inputs, say_analysed
 from rigidimeter.cli.options import CSV, FULL, JSON
+from rigidimeter.cli.output import keep_inputs
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import show
 
@@ -44,6 +43,8 @@ def estimate(
     from rigidimeter.analysis.reading import write_estimates_csv, write_estimates_json
     from rigidimeter.analysis.study import recording_result
     from rigidimeter.analysis.study.subject_torque_table import check_name, write_subject_torque
+    from rigidimeter.cli.estimate_text import estimate_blocks
+    from rigidimeter.cli.inputs import analyse_recordings, say_analysed
 
     keep_inputs((json_out, csv_out, subject_torque_out), recordings.paths)
     if subject_torque_out is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,9 +10,9 @@ from typing import TYPE_CHECKING
 import typer
 
 from rigidimeter.cli.help_pages import HOW_TO_READ, WRITE
-from rigidimeter.cli.inputs import analyse_recordings, say, say_analysed, study_of
 from rigidimeter.cli.options import KEY
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.output import echo, say
+from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.core.errors import UserError
 
@@ -55,7 +54,7 @@ def export(
       rigidimeter export elbow.csv --to mat --out elbow.mat --subject S1
     """
     from rigidimeter.analysis.export import export_sessions, format_named
-    from rigidimeter.cli.progress import Meter
+    from rigidimeter.cli.inputs import study_of
 
     format_named(to)
     if any((folder / "manifest.json").exists() for folder in (out, *out.resolve().parents)):
@@ -90,6 +89,7 @@ def _of_recordings(
     recordings: Recordings, said: Mapping[str, str], *, estimates: bool
 ) -> tuple[list[ExportedSession], int]:
     from rigidimeter.analysis.export import sessions_of_recording
+    from rigidimeter.cli.inputs import analyse_recordings, say_analysed
 
     analysis = None
     if estimates:
@@ -115,20 +115,9 @@ def _of_study(
     folder: Path, recordings: Recordings, key: Path | None, *, estimates: bool
 ) -> tuple[list[ExportedSession], int]:
     from rigidimeter.analysis.export import sessions_of_study
-    from rigidimeter.analysis.study import estimate_study, read_study
-    from rigidimeter.cli.progress import Meter
-    from rigidimeter.core.settings import load_settings
+    from rigidimeter.cli.inputs import estimate_study_inputs, read_study_inputs
 
-    chosen = load_settings(recordings.settings) if recordings.settings is not None else None
-    with Meter("read", 1.0) as meter:
-        read = read_study(
-            folder, key=key, settings=chosen, method=recordings.method, progress=meter.advance
-        )
-    read = replace(read, settings=recordings.adjust(read.settings))
-    notices, analysis = list(read.notices), None
-    if estimates:
-        with Meter("estimate", 1.0) as meter:
-            analysis, found = estimate_study(read, meter.advance)
-        notices += found
+    read = read_study_inputs(folder, recordings, key)
+    analysis, notices = estimate_study_inputs(read) if estimates else (None, read.notices)
     say(notices)
     return sessions_of_study(read, analysis), int(any(n.level == "error" for n in notices))

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import typer
 
 from rigidimeter.cli.help_pages import WRITE
-from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import FULL
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.output import echo, keep_inputs, say
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import Table, show
 from rigidimeter.core.errors import UserError

@@ -8,10 +8,9 @@ from pathlib import Path
 import typer
 
 from rigidimeter.cli.help_pages import ESTIMATE
-from rigidimeter.cli.inputs import keep_inputs, say
-from rigidimeter.cli.model_text import model_blocks
 from rigidimeter.cli.options import FULL, JSON
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.output import echo, keep_inputs, say
+from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import show
 from rigidimeter.core.errors import UserError
@@ -48,7 +47,7 @@ def model(
     """
     from rigidimeter.analysis.estimation.terms import candidates, parse_terms
     from rigidimeter.analysis.study.torque_models import model_document, model_recording
-    from rigidimeter.cli.progress import Meter
+    from rigidimeter.cli.model_text import model_blocks
     from rigidimeter.core.files import write_json
 
     if recordings.method not in ("auto", "bandlimited"):

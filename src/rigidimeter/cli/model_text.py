@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from statistics import median
-from typing import TYPE_CHECKING
 
+from rigidimeter.analysis.estimation.terms import Comparison, ModelRow
+from rigidimeter.analysis.study.torque_models import ModelledEpoch
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
 from rigidimeter.core.words import plural, with_error
-
-if TYPE_CHECKING:
-    from rigidimeter.analysis.estimation.terms import Comparison, ModelRow
-    from rigidimeter.analysis.study.torque_models import ModelledEpoch
 
 _COMPARED = ("parameters", "VAF %", "held out, 95 %", "AIC", "BIC", "white p", "input p")
 MOST_FINDINGS = 3

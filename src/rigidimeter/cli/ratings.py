@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigidimeter.cli.help_pages import OPTIONS, argument
-from rigidimeter.cli.inputs import keep_inputs, say
 from rigidimeter.cli.options import FULL, JSON
+from rigidimeter.cli.output import keep_inputs, say
 from rigidimeter.cli.terminal_tables import Block, Heading, Table, show
 from rigidimeter.core.errors import UserError
 

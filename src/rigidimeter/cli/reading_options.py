@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast, get_type_hints
 
 from rigidimeter.cli.help_pages import ESTIMATE, HOW_TO_READ, argument
 from rigidimeter.cli.options import SETTINGS
+from rigidimeter.cli.progress import Meter
 from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
@@ -120,7 +121,6 @@ class Recordings:
             If an option is wrong, or not one input can be read.
         """
         from rigidimeter.analysis.reading import read, with_codes
-        from rigidimeter.cli.progress import Meter
 
         with Meter("read", 1.0) as meter:
             recording = read(

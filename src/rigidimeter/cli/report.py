@@ -11,15 +11,9 @@ from typing import TYPE_CHECKING
 import typer
 
 from rigidimeter.cli.help_pages import WRITE
-from rigidimeter.cli.inputs import (
-    analyse_recordings,
-    analyse_study_folder,
-    command_line,
-    say_analysed,
-    study_of,
-)
 from rigidimeter.cli.options import KEY
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import Heading, show
 from rigidimeter.core.errors import UserError
@@ -49,6 +43,13 @@ def report(
       rigidimeter report ankle.csv --reaction --epoch-length-s 20 --out report
     """
     from rigidimeter.analysis.study import lead, recording_result
+    from rigidimeter.cli.inputs import (
+        analyse_recordings,
+        analyse_study_folder,
+        command_line,
+        say_analysed,
+        study_of,
+    )
     from rigidimeter.core.session import is_session
 
     if any(is_session(folder) for folder in (out, *out.resolve().parents)):
@@ -90,7 +91,6 @@ def write_page(result: StudyResult, out: Path, title: str | None = None) -> Path
     """Write the report of a result with progress; return the path of its page."""
     from rigidimeter.analysis import report as reporting
     from rigidimeter.analysis.reading import write_estimates_json
-    from rigidimeter.cli.progress import Meter
 
     with Meter("report", 1.0) as meter:
         page = reporting.report(result, out, title, progress=meter.reach)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rigidimeter.cli.help_pages import OPTIONS
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.terminal_tables import Heading, Table, show
 from rigidimeter.core.errors import UserError
 
@@ -27,7 +28,6 @@ def reproduce(
       rigidimeter reproduce --out paper
       rigidimeter reproduce --out paper --only fig-6b --only eq-8-largest
     """
-    from rigidimeter.cli.progress import Meter
     from rigidimeter.paper import Context, chosen, make_rows, tally, write_ledger
 
     names = [name for text in only or [] for name in text.split(",") if name]

@@ -12,6 +12,7 @@ from rigidimeter.cli.options import (
     SETTINGS,
 )
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.progress import Meter
 from rigidimeter.core.errors import UserError
 
 
@@ -46,7 +47,6 @@ def simulate(
       rigidimeter simulate --out session --settings study.toml --seed 7
       rigidimeter simulate --out session --task prbs --condition DBS --epochs 12
     """
-    from rigidimeter.cli.progress import Meter
     from rigidimeter.core.session import count_epochs, require_all
     from rigidimeter.core.settings import changed_settings, load_settings
     from rigidimeter.planning import too_few_cycles

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 import typer
 
 from rigidimeter.cli.help_pages import OPTIONS, WRITE, HelpCommand, HelpGroup, argument
-from rigidimeter.cli.inputs import analyse_study_folder
 from rigidimeter.cli.options import NEW_STUDY, STUDY_SEED
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.reading_options import plain_recordings
+from rigidimeter.cli.report import write_page
+from rigidimeter.cli.terminal_tables import show
 from rigidimeter.core.errors import UserError, refused
 
 if TYPE_CHECKING:
@@ -148,8 +150,7 @@ def demo(
       rigidimeter demo --out small --days 3 --prbs-epochs 3
     """
     from rigidimeter.cli.comparison_text import comparison_blocks
-    from rigidimeter.cli.report import write_page
-    from rigidimeter.cli.terminal_tables import show
+    from rigidimeter.cli.inputs import analyse_study_folder
     from rigidimeter.virtual import SHORT_EPOCH_S, short_design
 
     start_s = time.monotonic()
@@ -174,7 +175,6 @@ def demo(
 
 def _simulated(out: Path, design: StudyDesign, seed: int, processes: int = 2) -> list[DayPlan]:
     """Write a virtual study with progress; return its sessions."""
-    from rigidimeter.cli.progress import Meter
     from rigidimeter.virtual import plan_study, study_length_s, write_virtual_study
 
     lost: list[str] = []
