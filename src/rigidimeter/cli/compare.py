@@ -9,12 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from rigidimeter.cli.help_pages import COMPARE, ESTIMATE
-from rigidimeter.cli.options import (
-    CSV,
-    FULL,
-    JSON,
-    KEY,
-)
+from rigidimeter.cli.options import CSV, FULL, JSON, KEY
 from rigidimeter.cli.output import echo, keep_inputs, say
 from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.reading_options import Recordings, reads_recordings

@@ -9,13 +9,7 @@ from typing import Any
 import typer
 from typer.core import TyperArgument, TyperOption
 
-from rigidimeter.cli.help_pages import (
-    HOW_TO_READ,
-    READ,
-    RUN,
-    WRITE,
-    HelpCommand,
-)
+from rigidimeter.cli.help_pages import HOW_TO_READ, READ, RUN, WRITE, HelpCommand
 
 
 class RegistryCommand(HelpCommand):

@@ -13,8 +13,18 @@ from typing import Any
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.realtime_rig import run_loop
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.session import Protocol, again, codes_of, drawn_codes, read_manifest, rest_of
-from rigidimeter.core.settings import Settings
+from rigidimeter.core.session import (
+    Protocol,
+    again,
+    codes_of,
+    count_epochs,
+    drawn_codes,
+    is_session,
+    read_manifest,
+    require_all,
+    rest_of,
+)
+from rigidimeter.core.settings import Settings, changed_settings, load_settings
 from rigidimeter.planning import plan
 from rigidimeter.rig.acquisition.processes import (
     Ended,
@@ -24,7 +34,7 @@ from rigidimeter.rig.acquisition.processes import (
     supervise,
 )
 from rigidimeter.rig.commissioning import as_measured, check_record, require_daily_check
-from rigidimeter.rig.console import SessionPlan
+from rigidimeter.rig.console import SessionPlan, new_folder, next_steps, resume_command
 from rigidimeter.rig.devices import load_rig
 
 Console = Callable[[SessionMemory], object]
@@ -154,6 +164,62 @@ def run_planned(
         console=console,
         operator_seen_ns=operator_seen_ns,
     )
+
+
+def planned_session(
+    path: Path | None, resume: Path | None, seed: int | None, *, virtual: bool
+) -> PlannedSession:
+    """Return what is to be run: a new session, or the rest of one."""
+    if resume is None:
+        settings = load_settings(path)
+        if seed is not None:
+            settings = changed_settings(settings, {"seed": seed}, "the options")
+        return new_session(settings, {}, path)
+    if path is not None or seed is not None:
+        raise UserError(
+            "--resume uses the settings and the seed of that session; leave out "
+            + (f"{path}" if path is not None else "--seed")
+        )
+    return rest_of_session(resume, virtual=virtual)
+
+
+def offer_to_continue(out: Path) -> None:
+    """Say how to continue if the folder holds a session that was interrupted."""
+    if not is_session(out):
+        return
+    rest = rest_of(out)
+    if rest.epochs:
+        again = resume_command(out, None if rest.virtual else "RIG.toml", new_folder(out))
+        raise UserError(
+            f"{out}: holds a session of which {len(rest.epochs)} epochs are left; continue it with "
+            f"`{again}`, or name a new folder"
+        )
+
+
+def conclude(ended: Ended, out: Path, rig: Path | None, *, nwb: bool) -> None:
+    """Say how the session ended; a session that is not whole ends the program with status 1."""
+    folder = ended.folder if ended.folder != out.absolute() else out
+    good, of = count_epochs(folder)
+    echo(f"{good} of {of} epochs ended with success; session in {folder}")
+    if nwb:
+        echo(write_nwb_beside(folder))
+    closed = bool(ended.outcome)
+    left = len(rest_of(folder).epochs)
+    steps = next_steps(
+        folder,
+        closed=closed,
+        good=good,
+        left=left,
+        rig=rig,
+        out=new_folder(folder),
+        blinded=bool(codes_of(read_manifest(folder).get("about", {}))),
+    )
+    echo("\n".join(["What to do next:", *(f"  {step}" for step in steps)]))
+    if ended.outcome != "success":
+        raise UserError(
+            f"{folder}: the session ended with {ended.outcome or 'no outcome'}: {ended.reason}"
+        )
+    require_all(folder, good, of)
 
 
 def require_packages(settings: Settings) -> None:

@@ -6,11 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from rigidimeter.cli.help_pages import OPTIONS
-from rigidimeter.cli.options import (
-    NEW_SESSION,
-    SEED,
-    SETTINGS,
-)
+from rigidimeter.cli.options import NEW_SESSION, SEED, SETTINGS
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.progress import Meter
 from rigidimeter.core.errors import UserError

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from rigidimeter.cli.console import lead_session
+from rigidimeter.cli.page_session import lead_session
 from rigidimeter.cli.realtime_rig import HOME_TOLERANCE_RAD
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import SessionWriter
