@@ -28,9 +28,9 @@ from rigidimeter.cli.emulate import emulate
 from rigidimeter.cli.estimate import estimate
 from rigidimeter.cli.explain import explain
 from rigidimeter.cli.export import export
+from rigidimeter.cli.help_pages import HelpCommand
 from rigidimeter.cli.inspect import inspect
 from rigidimeter.cli.model import model
-from rigidimeter.cli.options import RegistryCommand
 from rigidimeter.cli.output import VisibleErrors, echo
 from rigidimeter.cli.ratings import ratings
 from rigidimeter.cli.report import report
@@ -101,7 +101,7 @@ for panel, commands in {
     "Start": (demo,),
 }.items():
     for command in commands:
-        app.command(cls=RegistryCommand, rich_help_panel=panel)(command)
+        app.command(cls=HelpCommand, rich_help_panel=panel)(command)
 app.add_typer(study, rich_help_panel="Start")
 
 

@@ -1,59 +1,8 @@
-"""Options that several commands share, and commands whose help lists what there is."""
+"""Options that several commands share."""
 
 from __future__ import annotations
 
-import shlex
-from itertools import pairwise
-from typing import Any
-
-import typer
-from typer.core import TyperArgument, TyperOption
-
-from rigidimeter.cli.help_pages import HOW_TO_READ, READ, RUN, WRITE, HelpCommand
-
-
-class RegistryCommand(HelpCommand):
-    """A command whose help lists formats, estimators and terms, those of `--load` too."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Refuse a TOML file without `--settings` where nothing but options is taken."""
-        options = [each for each in self.params if isinstance(each, TyperOption)]
-        with_value = {name for each in options if not each.is_flag for name in each.opts}
-        if len(options) == len(self.params) and "--settings" in with_value:
-            for before, word in pairwise(["", *args]):
-                if word.endswith(".toml") and word[0] != "-" and before not in with_value:
-                    raise typer.BadParameter(
-                        f"{word}: if it holds settings, say --settings {shlex.quote(word)}", ctx
-                    )
-        return super().parse_args(ctx, args)
-
-    def full_text(self, parameter: Any) -> str:
-        """Return what there is to choose from; this imports all of it."""
-        if isinstance(parameter, TyperArgument) and parameter.name == "paths":
-            from rigidimeter.analysis.reading.formats import formats_text
-
-            return f"What to read: {formats_text()}."
-        if "--method" in parameter.opts:
-            from rigidimeter.analysis.estimation import METHODS
-
-            known = ", ".join(f"{method.name} ({method.title})" for method in METHODS)
-            return (
-                f"auto (iv where the perturbation was recorded, else bandlimited), or one of: "
-                f"{known}."
-            )
-        if "--to" in parameter.opts:
-            from rigidimeter.analysis.export import FORMATS
-
-            return f"Format: {', '.join(f'{each.name} ({each.title})' for each in FORMATS)}."
-        if "--terms" in parameter.opts:
-            from rigidimeter.analysis.estimation.terms import term_names
-
-            return (
-                f"Terms of the torque: {', '.join(term_names())} (+ or - after a reflex: the "
-                "direction that stretches the muscle). Repeat to compare your own models."
-            )
-        return super().full_text(parameter)
-
+from rigidimeter.cli.help_pages import HOW_TO_READ, READ, RUN, WRITE
 
 SETTINGS = READ.option(
     "--settings FILE",
