@@ -20,9 +20,7 @@ from rigidimeter.rig.commissioning import (
     Operator,
     Setup,
     Timebase,
-    ZeroFound,
     daily_check,
-    zero_check,
 )
 from rigidimeter.rig.devices import RigFile, SimulatedRig
 from rigidimeter.rig.devices.base import Reading, Rig
@@ -65,14 +63,9 @@ def virtual_setup(settings: Settings, operator: Operator) -> Setup:
     return Setup(cast("Rig", rig), settings, time, operator)
 
 
-def virtual_zero(settings: Settings, operator: Operator) -> ZeroFound:
-    """Return zero and noise of the virtual torque sensor."""
-    return zero_check(virtual_setup(settings, operator))
-
-
-def virtual_check(settings: Settings, operator: Operator) -> DailyRecord:
+def virtual_check(setup: Setup) -> DailyRecord:
     """Return the daily check of the virtual rig; it is commissioned by what its settings say."""
-    torque, motion = settings.rig.torque, settings.rig.motion
+    torque, motion = setup.settings.rig.torque, setup.settings.rig.motion
     behind_s = (torque.latency_s - torque.stamp_latency_s) - (
         motion.latency_s - motion.stamp_latency_s
     )
@@ -80,7 +73,7 @@ def virtual_check(settings: Settings, operator: Operator) -> DailyRecord:
     numbers = {"torque_after_motion_s": behind_s}
     commissioned = CommissioningRecord(NAME, "", {}, {}, (), numbers, __version__, now)
     return daily_check(
-        virtual_setup(settings, operator),
+        setup,
         cast("RigFile", SimpleNamespace(name=NAME, digest="")),
         lambda _: commissioned,
         compared=Compared(),

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from rigidimeter.cli.commission import commission as command
-from rigidimeter.cli.commission import table
+from rigidimeter.cli.rig_checks import table
 from rigidimeter.cli.terminal_tables import text_lines
 from rigidimeter.core.errors import UserError
 from rigidimeter.rig.commissioning import above, below, check_record, untried
