@@ -10,7 +10,7 @@ from markupsafe import Markup
 from rigidimeter.analysis.report import shown_tables, source_names
 from rigidimeter.analysis.study import StudyResult, conclude, difference_rows, lead, statements
 from rigidimeter.cli.terminal_tables import Block, Heading, Table, paragraph, shown_table
-from rigidimeter.core.records import Analysis, Fit, Score
+from rigidimeter.core.records import Analysis
 from rigidimeter.core.words import condition_name, plural
 
 MOST_FINDINGS = 3
@@ -55,9 +55,7 @@ def _about(found: StudyResult) -> str:
     if found.sessions:
         parts.append(plural(len({each.subject for each in found.sessions}), "subject"))
         parts.append(plural(len({(s.subject, s.day) for s in found.sessions}), "day"))
-    analysis = found.analysis
-    results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
-    if results:
+    if results := found.analysis.results:
         used = sum(one.outcome.included for one in results)
         parts.append(f"{plural(len(results), 'epoch')}, {used} used")
     return " · ".join(parts)

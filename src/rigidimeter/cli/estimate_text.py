@@ -51,9 +51,7 @@ def estimate_blocks(result: StudyResult, *, full: bool = False) -> Iterator[Bloc
 def _about(result: StudyResult) -> str:
     """Return what was read, and how it was estimated."""
     analysis = result.analysis
-    results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
-    sources = {one.source for one in results}
-    names = list(short_names(sources).values())
+    names = list(short_names({one.source for one in analysis.results}).values())
     parts = [names[0] if len(names) == 1 else plural(len(names), "recording")]
     if any(epoch.virtual for epoch in result.epochs):
         parts.append("virtual data")
@@ -155,10 +153,9 @@ def _method(analysis: Analysis) -> Iterator[tuple[str, str]]:
 
 def _excluded(analysis: Analysis) -> Iterator[tuple[str, str]]:
     """Yield which epochs do not count, and why, in two lines for each outcome."""
-    results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
-    names = short_names(one.source for one in results)
+    names = short_names(one.source for one in analysis.results)
     out: dict[str, list[Fit | Score]] = {}
-    for one in results:
+    for one in analysis.results:
         if not one.outcome.included:
             out.setdefault(one.outcome.kind, []).append(one)
     for kind, those in out.items():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -86,7 +85,7 @@ def export(
 
 
 def _of_recordings(
-    recordings: Recordings, said: Mapping[str, str], *, estimates: bool
+    recordings: Recordings, said: dict[str, str], *, estimates: bool
 ) -> tuple[list[ExportedSession], int]:
     from rigidimeter.analysis.export import sessions_of_recording
     from rigidimeter.cli.inputs import analyse_recordings, say_analysed
@@ -102,11 +101,9 @@ def _of_recordings(
     sessions = sessions_of_recording(
         read,
         analysis,
-        subject=said["subject"],
-        day=said["day"],
-        joint=said["joint"],
-        started_utc=said["started"],
+        started_utc=said.pop("started"),
         blinded=recordings.blinded,
+        **said,
     )
     return sessions, status
 

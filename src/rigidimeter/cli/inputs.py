@@ -28,7 +28,7 @@ from rigidimeter.cli.output import echo, say
 from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.reading_options import Recordings
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.records import Analysis, Fit, Notice, Score
+from rigidimeter.core.records import Analysis, Notice
 from rigidimeter.core.settings import load_settings
 from rigidimeter.core.study_files import STUDY_FILE, is_study, read_study_folder
 
@@ -72,8 +72,7 @@ def command_line() -> str:
 
 def _say_failed(analysis: Analysis) -> bool:
     """Say which epochs failed, and why; return whether any did."""
-    results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
-    failed = [result for result in results if result.outcome.kind == "failed"]
+    failed = [result for result in analysis.results if result.outcome.kind == "failed"]
     for result in failed:
         echo(f"error: {result.source}, epoch {result.epoch}: {result.outcome.reason}", err=True)
     return bool(failed)

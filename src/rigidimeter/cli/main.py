@@ -12,6 +12,7 @@ import os
 import signal
 import sys
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
 from typing import Annotated
@@ -137,25 +138,21 @@ def main() -> None:
             stream.reconfigure(errors="replace")  # a terminal without "−" is no reason to fail
     try:
         app()
+        return
     except UserError as error:
-        for index, line in enumerate(error.lines):
-            echo(line if index else f"rigidimeter: {line}", err=True)
-        sys.exit(1)
+        lines: Sequence[str] = error.lines
     except MemoryError:
-        echo(
-            "rigidimeter: this needs more memory than the computer has; split the input, or "
-            "analyse less of it at once",
-            err=True,
+        lines = (
+            "this needs more memory than the computer has; split the input, or analyse less of it "
+            "at once",
         )
-        sys.exit(1)
     except BrokenPipeError:
         # The reader of our output has gone, as in `rigidimeter ... | head`: not our error.
         sys.stderr.close()
         sys.exit(0)
     except OSError as error:
         what = f"{error.filename}: " if error.filename else ""
-        echo(f"rigidimeter: {what}{error.strerror or error}", err=True)
-        sys.exit(1)
+        lines = (f"{what}{error.strerror or error}",)
     except KeyboardInterrupt:  # before typer has read the command line
         _say_interrupted()
         sys.exit(_INTERRUPTED)
@@ -163,3 +160,6 @@ def main() -> None:
         if end.code == _INTERRUPTED:  # typer turns the interruption of a command into this
             _say_interrupted()
         raise
+    for index, line in enumerate(lines):
+        echo(line if index else f"rigidimeter: {line}", err=True)
+    sys.exit(1)

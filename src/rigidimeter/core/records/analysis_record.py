@@ -160,6 +160,11 @@ class Analysis:
     sensitivity: tuple[BandEstimate, ...] = ()
 
     @property
+    def results(self) -> tuple[Fit | Score, ...]:
+        """The fits, then the scores."""
+        return *self.fits, *self.scores
+
+    @property
     def findings(self) -> tuple[FindingGroup, ...]:
         """What the checks found: for each check and level the epochs, the most serious first."""
         return grouped(self.fits, self.pooled)
@@ -310,7 +315,7 @@ class Analysis:
     def _repr_html_(self) -> str:
         """Return J, B and K with their 95 % intervals, what the checks found, and the scores."""
         reason = f": {self.method_reason}" if self.method_reason else ""
-        results: tuple[Fit | Score, ...] = (*self.fits, *self.scores)
+        results = self.results
         names = short_names(one.source for one in results)
         parts = [f"<p>{escape(f'Method {self.method}{reason}.')}</p>"]
         if self.fits:
