@@ -76,7 +76,6 @@ def compare(
     from rigidimeter.cli.inputs import (
         analyse_recordings,
         analyse_study_folder,
-        say_analysed,
         study_files,
         study_of,
     )
@@ -101,12 +100,12 @@ def compare(
     keep_inputs(outputs, paths)
     if is_json and not value and len(paths) > 1:
         raise UserError("compare takes one JSON file of estimates, or recordings, not both")
-    analysed = None if value or is_json else analyse_recordings(recordings)
+    analysed = None if value or is_json else analyse_recordings(recordings)[1]
     status = 0
     try:
         with Meter("compare", 1.0) as meter:
             found = studies.compare(
-                paths[0] if analysed is None else analysed[1],
+                paths[0] if analysed is None else analysed.result.analysis,
                 other,
                 reference=reference,
                 value=value,
@@ -117,13 +116,14 @@ def compare(
                 progress=meter.advance,
             )
         if analysed is not None:
-            found = replace(found, epochs=analysed[0].epochs, settings=analysed[0].settings)
+            read = analysed.result
+            found = replace(found, epochs=read.epochs, settings=read.settings)
         _write(found, *outputs)
         show(comparison_blocks(found, full=full))
         say(found.notices)
     finally:
         if analysed is not None:
-            status = say_analysed(*analysed)
+            status = analysed.say()
     raise typer.Exit(status)
 
 

@@ -41,24 +41,23 @@ def estimate(
           --epoch-length-s 20
     """
     from rigidimeter.analysis.reading import write_estimates_csv, write_estimates_json
-    from rigidimeter.analysis.study import recording_result
     from rigidimeter.analysis.study.subject_torque_table import check_name, write_subject_torque
     from rigidimeter.cli.estimate_text import estimate_blocks
-    from rigidimeter.cli.inputs import analyse_recordings, say_analysed
+    from rigidimeter.cli.inputs import analyse_recordings
 
     keep_inputs((json_out, csv_out, subject_torque_out), recordings.paths)
     if subject_torque_out is not None:
         check_name(subject_torque_out)
-    read, analysis = analyse_recordings(recordings)
+    read, analysed = analyse_recordings(recordings)
+    result = analysed.result
     try:
         if json_out is not None:
-            write_estimates_json(json_out, analysis)
+            write_estimates_json(json_out, result.analysis)
         if csv_out is not None:
-            write_estimates_csv(csv_out, analysis)
-        result = recording_result(read, analysis)
+            write_estimates_csv(csv_out, result.analysis)
         show(estimate_blocks(result, full=full))
         if subject_torque_out is not None:
-            write_subject_torque(subject_torque_out, read, analysis)
+            write_subject_torque(subject_torque_out, read, result.analysis)
     finally:
-        status = say_analysed(read, analysis)
+        status = analysed.say()
     raise typer.Exit(status)

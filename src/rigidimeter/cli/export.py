@@ -88,12 +88,12 @@ def _of_recordings(
     recordings: Recordings, said: dict[str, str], *, estimates: bool
 ) -> tuple[list[ExportedSession], int]:
     from rigidimeter.analysis.export import sessions_of_recording
-    from rigidimeter.cli.inputs import analyse_recordings, say_analysed
+    from rigidimeter.cli.inputs import analyse_recordings
 
     analysis = None
     if estimates:
-        read, analysis = analyse_recordings(recordings)
-        status = say_analysed(read, analysis)
+        read, analysed = analyse_recordings(recordings)
+        analysis, status = analysed.result.analysis, analysed.say()
     else:
         read = recordings.read()
         say(read.notices)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -22,6 +23,7 @@ from rigidimeter.analysis.study import (
     keep,
     provenance,
     read_study,
+    recording_result,
 )
 from rigidimeter.analysis.study.study_analysis import StudyRead
 from rigidimeter.cli.output import echo, say
@@ -36,7 +38,37 @@ _OF_STUDIES_TOO = ("paths", "method", "band_hz", "controller", "settings")
 """Fields of `Recordings` that do not say how to read a single recording."""
 
 
-def analyse_recordings(recordings: Recordings) -> tuple[Recording, Analysis]:
+class Analysed(NamedTuple):
+    """What was analysed, and what is wrong with it.
+
+    Attributes
+    ----------
+    result : StudyResult
+    notices : sequence of Notice
+        What is still to be said.
+    bad : bool
+        Whether an input was.
+    not_kept : str
+        Why the analysis was not kept in the folder of its study, if it was not.
+    """
+
+    result: StudyResult
+    notices: Sequence[Notice]
+    bad: bool
+    not_kept: str = ""
+
+    def say(self) -> int:
+        """Say what is wrong, after the result was shown; return the exit status."""
+        say(self.notices)
+        failed = [one for one in self.result.analysis.results if one.outcome.kind == "failed"]
+        for one in failed:
+            echo(f"error: {one.source}, epoch {one.epoch}: {one.outcome.reason}", err=True)
+        if self.not_kept:
+            echo(f"error: the analysis is not stored: {self.not_kept}", err=True)
+        return int(self.bad or bool(failed) or bool(self.not_kept))
+
+
+def analyse_recordings(recordings: Recordings) -> tuple[Recording, Analysed]:
     """Read, fit and score recordings with progress, and say what is wrong with the inputs.
 
     Raises
@@ -49,49 +81,14 @@ def analyse_recordings(recordings: Recordings) -> tuple[Recording, Analysis]:
     if recordings.method not in method_names():
         raise UserError(f"--method {recordings.method}: {no_such_method(recordings.method)}")
     with Meter("estimate", 1.0) as meter:
-        return read, estimate(read, recordings.method, progress=meter.advance)
-
-
-def say_analysed(read: Recording, analysis: Analysis) -> int:
-    """Say what is wrong with the results, after they were shown.
-
-    Returns
-    -------
-    int
-        The exit status: 1 if an input was bad or an epoch failed, else 0.
-    """
-    say(analysis_warnings(analysis))
-    failed = _say_failed(analysis)
-    return int(read.failed or failed)
+        analysis = estimate(read, recordings.method, progress=meter.advance)
+    result = recording_result(read, analysis, command_line())
+    return read, Analysed(result, analysis_warnings(analysis), read.failed)
 
 
 def command_line() -> str:
     """Return the command as it could be given again."""
     return shlex.join(["rigidimeter", *sys.argv[1:]])
-
-
-def _say_failed(analysis: Analysis) -> bool:
-    """Say which epochs failed, and why; return whether any did."""
-    failed = [result for result in analysis.results if result.outcome.kind == "failed"]
-    for result in failed:
-        echo(f"error: {result.source}, epoch {result.epoch}: {result.outcome.reason}", err=True)
-    return bool(failed)
-
-
-class AnalysedStudy(NamedTuple):
-    """An analysed study, and why the analysis was not kept in its folder, if it was not."""
-
-    result: StudyResult
-    not_kept: str
-
-    def say(self) -> int:
-        """Say what is wrong with it, after it was shown; return the exit status."""
-        say(self.result.notices)
-        bad = any(notice.level == "error" for notice in self.result.notices)
-        bad |= _say_failed(self.result.analysis)
-        if self.not_kept:
-            echo(f"error: the analysis is not stored: {self.not_kept}", err=True)
-        return int(bad or bool(self.not_kept))
 
 
 def study_of(recordings: Recordings, key: Path | None) -> Path | None:
@@ -165,7 +162,7 @@ def analyse_study_folder(
     pair: tuple[str | None, str | None] = (None, None),
     seed: int = 1,
     resamples: int = 9999,
-) -> AnalysedStudy:
+) -> Analysed:
     """Read and analyse a study folder, and keep the analysis in it.
 
     Raises
@@ -188,4 +185,6 @@ def analyse_study_folder(
     known = {path: digests[name] for name, path in files.items()}
     known |= {folder / name: digest for name, digest in read.gathered.digests.items()}
     facts = provenance((*tables, *sessions), known, result.settings, command_line())
-    return AnalysedStudy(replace(result, changes=tuple(changes), provenance=facts), not_kept)
+    result = replace(result, changes=tuple(changes), provenance=facts)
+    bad = any(notice.level == "error" for notice in result.notices)
+    return Analysed(result, result.notices, bad, not_kept)

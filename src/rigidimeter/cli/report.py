@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,14 +40,8 @@ def report(
       rigidimeter report study --out study/report
       rigidimeter report ankle.csv --reaction --epoch-length-s 20 --out report
     """
-    from rigidimeter.analysis.study import lead, recording_result
-    from rigidimeter.cli.inputs import (
-        analyse_recordings,
-        analyse_study_folder,
-        command_line,
-        say_analysed,
-        study_of,
-    )
+    from rigidimeter.analysis.study import lead
+    from rigidimeter.cli.inputs import analyse_recordings, analyse_study_folder, study_of
     from rigidimeter.core.session import is_session
 
     if any(is_session(folder) for folder in (out, *out.resolve().parents)):
@@ -63,19 +55,15 @@ def report(
                 f"--out {out}: is the study or its stored analysis; name another folder, such as "
                 f"{folder / 'report'}"
             )
-        study = analyse_study_folder(folder, recordings, key)
-        last: Callable[[], int] = study.say
-        result = study.result
+        analysed = analyse_study_folder(folder, recordings, key)
     else:
-        read, analysis = analyse_recordings(recordings)
-        last = partial(say_analysed, read, analysis)
-        result = recording_result(read, analysis, command_line())
+        _, analysed = analyse_recordings(recordings)
     try:
-        page = write_page(result, out, title)
-        show([Heading(lead(result)), ""])
+        page = write_page(analysed.result, out, title)
+        show([Heading(lead(analysed.result)), ""])
         echo(str(page))
     finally:
-        status = last()
+        status = analysed.say()
     raise typer.Exit(status)
 
 
