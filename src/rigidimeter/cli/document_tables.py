@@ -71,7 +71,8 @@ def _entries(value: Any) -> Mapping[str, Any]:
 
 
 def _title(keys: Sequence[str]) -> str:
-    return ": ".join(keys).replace("_", " ").capitalize()
+    title = ": ".join(keys).replace("_", " ")
+    return title[:1].upper() + title[1:]
 
 
 def _table(columns: Mapping[str, Mapping[str, Any]], above: Sequence[str]) -> Table:
