@@ -185,8 +185,7 @@ def test_a_dead_sensor_is_caught_and_the_record_says_so(
 
     # What it asks of the system would last for the tests after it.
     monkeypatch.setattr(
-        "rigidimeter.rig.acquisition.processes.prepare_loop_process",
-        lambda: SimpleNamespace(),
+        "rigidimeter.cli.rig_checks.prepare_loop_process", lambda: SimpleNamespace()
     )
     can_bench.misbehave("torque", "silent")
     out = can_bench.rig.with_name("dead.json")
