@@ -18,26 +18,21 @@ from numpy.typing import NDArray
 from rigidimeter.analysis.estimation import aligned, epoch_signals
 from rigidimeter.analysis.estimation.stretches import longest_part
 from rigidimeter.analysis.reading import Recording
-from rigidimeter.analysis.report.estimate_points import draw_epochs, draw_pairs, quantities
-from rigidimeter.analysis.report.representative import origin_s
-from rigidimeter.analysis.report.sections.day_points import draw_days
-from rigidimeter.analysis.report.sections.distribution import draw_comparison
-from rigidimeter.analysis.report.sections.forest import draw_forest, forest_label, forest_size
-from rigidimeter.analysis.report.sections.perturbation_figure import (
-    draw_perturbation,
-    draw_spectrum,
-)
-from rigidimeter.analysis.report.sections.recorded_signals import (
-    draw_recorded,
-    recorded_size,
-    shown_channels,
-)
-from rigidimeter.analysis.report.sections.torque_fit import (
+from rigidimeter.analysis.report.curves import (
     TORQUE_HEIGHTS,
     TORQUE_SIZE,
-    draw_torque_parts,
+    draw_perturbation,
+    draw_recorded,
+    draw_spectrum,
+    draw_torque,
+    origin_s,
+    recorded_size,
+    shown_channels,
     torque_limit_nm,
 )
+from rigidimeter.analysis.report.estimate_points import draw_epochs, draw_pairs, quantities
+from rigidimeter.analysis.report.interval_rows import draw_effects, effects_label, effects_size
+from rigidimeter.analysis.report.points import draw_comparison, draw_days
 from rigidimeter.analysis.report.style import condition_colours, drawable, styled
 from rigidimeter.analysis.study import Comparison, StudyResult
 from rigidimeter.core.records import Analysis, Channel, Epoch, Fit
@@ -132,15 +127,9 @@ def plot_torque(
     window_s = float(signals.time_s[-1] - signals.time_s[0]) if span_s is None else span_s
     name = condition_name(fit.condition)
     with _panels(axes, 5, TORQUE_SIZE, sharex=True, height_ratios=TORQUE_HEIGHTS) as panels:
-        draw_torque_parts(
-            panels,
-            signals,
-            fit,
-            condition_colours([name])[name],
-            origin_s=origin_s(own),
-            window_s=window_s,
-            limit_nm=torque_limit_nm(signals, fit, window_s),
-        )
+        limit_nm = torque_limit_nm(signals, fit, window_s)
+        colour = condition_colours([name])[name]
+        draw_torque(panels, signals, fit, colour, origin_s(own), limit_nm, window_s)
         sources = short_names(each.source for each in recording.epochs)
         which = _title(fit.epoch, sources[fit.source], fit.condition)
         panels[0].set_title(f"Torque of {which}", loc="left")
@@ -158,7 +147,7 @@ def plot_result(result: StudyResult, measures: Sequence[str] | None, axes: Any) 
     rows = -(-len(compared) // 3)
     with _panels(axes, len(compared), (7.4, 0.2 + 2.6 * rows), columns=3) as panels:
         for one, c in zip(panels, compared, strict=True):
-            draw_comparison(one, c, colours)
+            draw_comparison([one], c, colours)
     return np.array(panels)
 
 
@@ -168,9 +157,9 @@ def plot_days(result: StudyResult, measure: str, ax: Any) -> Axes:
     if not c.day_medians:
         raise ValueError(f"{measure} has no days: they are known of a study folder alone")
     order = [condition_name(name) for name in result.condition_names]
-    with _panels(ax, 1, (7.4, 2.9)) as (axes,):
-        draw_days(axes, c, order)
-    return axes
+    with _panels(ax, 1, (7.4, 2.9)) as panels:
+        draw_days(panels, c, order)
+    return panels[0]
 
 
 def plot_effects(result: StudyResult, ax: Any) -> Axes:
@@ -179,9 +168,9 @@ def plot_effects(result: StudyResult, ax: Any) -> Axes:
     if not found:
         why = next((c.remark for c in result.comparisons if c.remark), "nothing was compared")
         raise ValueError(f"no measure has an effect size: {why}")
-    with _panels(ax, 1, forest_size(len(found))) as (axes,):
-        draw_forest(axes, found, forest_label(result))
-    return axes
+    with _panels(ax, 1, effects_size(len(found))) as panels:
+        draw_effects(panels, found, effects_label(result))
+    return panels[0]
 
 
 def plot_design(design: Design, axes: Any) -> Panels:
@@ -191,7 +180,7 @@ def plot_design(design: Design, axes: Any) -> Panels:
     channel = Channel("perturbation_nm", tick_times_s(values.size, rate_hz), values)
     with _panels(axes, 3, (7.4, 5.8), height_ratios=(1.0, 1.0, 1.8)) as panels:
         draw_perturbation(panels[:2], channel, 0.0)
-        draw_spectrum(panels[2], channel, (prbs.wanted_low_hz, prbs.wanted_high_hz))
+        draw_spectrum(panels[2:], channel, (prbs.wanted_low_hz, prbs.wanted_high_hz))
     return np.array(panels)
 
 

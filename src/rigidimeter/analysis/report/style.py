@@ -11,7 +11,7 @@ from __future__ import annotations
 import io
 import re
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -22,9 +22,10 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rigidimeter.core.files import visible
 
@@ -72,6 +73,34 @@ def styled() -> Iterator[None]:
         mpl.rcdefaults()  # a matplotlibrc of the user must not change the report
         mpl.rcParams.update(_STYLE)
         yield
+
+
+def drawn(
+    size: tuple[float, float],
+    draw: Callable[..., None],
+    *arguments: Any,
+    rows: int = 1,
+    columns: int = 1,
+    **options: Any,
+) -> Figure:
+    """Return a figure of its own of what a function draws on panels.
+
+    Parameters
+    ----------
+    size : (float, float)
+        In inches.
+    draw : callable
+        Takes the list of panels, then `arguments`.
+    rows, columns : int
+    **options
+        Of the panels, as `matplotlib.figure.Figure.subplots` takes them.
+    """
+    with styled():
+        figure = Figure(figsize=size)
+        panels = figure.subplots(rows, columns, squeeze=False, **options)
+        draw(list(panels.ravel()), *arguments)
+        figure.align_ylabels()
+    return figure
 
 
 def svg_text(figure: Figure, mark: str = "") -> str:
@@ -139,6 +168,42 @@ def spread(count: int, reach: float) -> NDArray[np.float64]:
     return np.asarray(reach * (2 * share - 1), dtype=np.float64)
 
 
+def with_intervals(
+    axes: Axes,
+    x: ArrayLike,
+    y: ArrayLike,
+    low: ArrayLike,
+    high: ArrayLike,
+    colour: str,
+    marker: str,
+    *,
+    across: bool = False,
+    width: float = 1.2,
+    faint: float = 1.0,
+    **style: Any,
+) -> Line2D:
+    """Draw points with their intervals and return the points.
+
+    Parameters
+    ----------
+    x, y, low, high : float or array, shape (n,)
+        An interval is drawn where both of its ends are finite.
+    across : bool
+        The intervals are those of `x`, not of `y`.
+    width, faint : float
+        Width and opacity of the intervals.
+    **style
+        Of the points.
+    """
+    x, y, low, high = np.broadcast_arrays(*np.atleast_1d(x, y, low, high))
+    known = np.isfinite(low) & np.isfinite(high)
+    if np.any(known):
+        place, lines = (y, axes.hlines) if across else (x, axes.vlines)
+        lines(place[known], low[known], high[known], color=colour, linewidth=width, alpha=faint)
+    (points,) = axes.plot(x, y, marker, color=colour, **style)
+    return points
+
+
 def plain_ticks(*axes: Axis) -> None:
     """Label the ticks of logarithmic axes with plain numbers."""
 
@@ -155,6 +220,22 @@ def legend_above(axes: Axes) -> None:
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, handletextpad=0.4, borderpad=0.1,
         fontsize=8, frameon=False,
     )  # fmt: skip
+
+
+def legend_outside(axes: Axes) -> None:
+    """Write the legend of axes above all panels of their figure."""
+    axes.figure.legend(
+        *axes.get_legend_handles_labels(), loc="outside upper left", ncols=4, handletextpad=0.4
+    )
+
+
+def named_places(axes: Axes, names: Iterable[str]) -> None:
+    """Name the places 0, 1, … of the horizontal axis, without lines at them."""
+    labels = list(names)
+    axes.set_xticks(range(len(labels)), labels)
+    axes.set_xlim(-0.55, len(labels) - 0.45)
+    axes.tick_params(axis="x", length=0)
+    axes.grid(visible=False, axis="x")
 
 
 def note(axes: Axes, text: str) -> None:

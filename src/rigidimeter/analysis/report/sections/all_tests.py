@@ -1,17 +1,38 @@
-"""The comparison of two conditions: each epoch counted, and days counted."""
+"""All tests: differences with each epoch and with days counted, effect sizes, every value."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from functools import partial
 
 from markupsafe import Markup
 
-from rigidimeter.analysis.report.contents import Block, Section, from_study_folder, paragraph
-from rigidimeter.analysis.report.method_words import interval_basis, pooled_basis
-from rigidimeter.analysis.report.prose_statistics import day_tests_in_words
-from rigidimeter.analysis.report.sections.estimate_tables import pooled_table
-from rigidimeter.analysis.study import StudyResult, comparison_rows, result_table
-from rigidimeter.core.words import Column, Table, condition_name, series
+from rigidimeter.analysis.report.contents import (
+    Block,
+    Figure,
+    Section,
+    from_result,
+    from_study_folder,
+    paragraph,
+    part,
+)
+from rigidimeter.analysis.report.interval_rows import (
+    draw_effects,
+    effect_words,
+    effects_label,
+    effects_size,
+)
+from rigidimeter.analysis.report.methods_prose import (
+    day_tests_in_words,
+    interval_basis,
+    pooled_basis,
+)
+from rigidimeter.analysis.report.points import distribution_size, draw_comparison
+from rigidimeter.analysis.report.sections.every_epoch import pooled_table
+from rigidimeter.analysis.report.sections.examiners import RATINGS, RELATION
+from rigidimeter.analysis.report.style import condition_colours, drawn
+from rigidimeter.analysis.study import Comparison, StudyResult, comparison_rows
+from rigidimeter.core.words import INTERVAL, Column, Table, condition_name, interval, number, series
 
 _EPOCHS_NOTE = Markup(
     "All differences are {pair}. Two-sided Wilcoxon rank-sum test, asymptotic (normal "
@@ -34,15 +55,15 @@ def _comparison(result: StudyResult) -> Iterator[Block]:
         yield paragraph("No two conditions were compared.")
         return
     pairs = (result, *result.further_pairs)
-    for number, pair in enumerate(pairs, start=1):
-        yield from _epochs(pair, _table_name(number))
-    for number, pair in enumerate(pairs, start=1):
+    for place, pair in enumerate(pairs, start=1):
+        yield from _epochs(pair, _table_name(place))
+    for place, pair in enumerate(pairs, start=1):
         if any(c.days for c in pair.comparisons):
-            yield from _by_days(pair, _table_name(number))
+            yield from _by_days(pair, _table_name(place))
 
 
-def _table_name(number: int) -> str:
-    return "comparisons" if number == 1 else f"comparisons_{number}"
+def _table_name(place: int) -> str:
+    return "comparisons" if place == 1 else f"comparisons_{place}"
 
 
 def _by_days(result: StudyResult, name: str) -> Iterator[Block]:
@@ -151,8 +172,7 @@ def _all_epochs(result: StudyResult) -> Iterator[Block]:
             Column("q3", "Upper quartile"),
             Column("sd_percent", "SD (% of the mean)", digits=2),
         )
-    rows = result_table(result, "summaries")
-    yield Table("summaries", "Medians and quartiles by condition", columns, rows)
+    yield from_result(result, "summaries", "Medians and quartiles by condition", *columns)
     yield pooled_table(
         result,
         note=(
@@ -164,6 +184,102 @@ def _all_epochs(result: StudyResult) -> Iterator[Block]:
     )
 
 
-COMPARISON = Section("comparison", "Comparison", _comparison, from_study_folder)
-ALL_EPOCHS = Section("results", "All epochs together", _all_epochs, from_study_folder)
-RESULTS = Section("results", "Results", _results, lambda result: not from_study_folder(result))
+def _effects(result: StudyResult) -> Iterator[Block]:
+    found = [(c, c.effects) for c in result.comparisons if c.effects is not None]
+    if not found:
+        return
+    percent = f"{100 * found[0][1].confidence:g} %"
+    yield Figure(
+        "effects",
+        f"Effect sizes r with {percent} intervals from resampling {result.resampled}. Dotted "
+        "lines: small (0.1), medium (0.3) and large (0.5) effects. Grey ticks: the largest r that "
+        "these group sizes allow, which differs between measures.",
+        f"Effect sizes r with {percent} intervals. "
+        f"{'; '.join(f'{c.measure.title} {effect_words(effects)}' for c, effects in found)}.",
+        partial(drawn, effects_size(len(found)), draw_effects, found, effects_label(result)),
+    )
+    without_overlap = [c.measure.title for c, effects in found if effects.method == "Newcombe"]
+    if without_overlap:
+        yield paragraph(
+            f"{', '.join(without_overlap)}: the two conditions do not overlap, so resampling would "
+            "give an interval of no width. The interval is Newcombe’s, which treats all values as "
+            "independent.",
+            "remark",
+        )
+    if result.differences:
+        yield paragraph(
+            "Does one measure separate the conditions better than another? r cannot answer that, "
+            "because the group sizes limit it. The rank-biserial correlation can: it is the share "
+            "of pairs of values that differ in one direction less the share that differ in the "
+            "other. Its size is compared here."
+        )
+    yield from_result(
+        result,
+        "effect_differences",
+        "Differences between effect sizes (sizes of the rank-biserial correlations)",
+        Column("first_title", "Effect size of", "text"),
+        Column("second_title", "less that of", "text"),
+        Column("estimate", f"Difference {INTERVAL}", ends=("low", "high")),
+        Column("p", "p", "p"),
+        Column("p_holm", "p, Holm", "p"),
+        Column("paired", "Same days", "label"),
+        folding=True,
+    )
+
+
+def _distributions(result: StudyResult) -> Iterator[Block]:
+    shown = [c for c in result.comparisons if c.measure.origin != "ratings" and c.observations]
+    if not shown:
+        return
+    yield paragraph(
+        "Each point is an included epoch; the thin line through it is its 95 % interval. The bar "
+        "goes from the lower to the upper quartile, and the diamond is the median. An open square "
+        "is the estimate from all epochs of the condition together, with its 95 % interval. "
+        "Damping and stiffness of the points were estimated with the inertia fixed; the squares "
+        "are from fits of J, B and K together."
+    )
+    colours = condition_colours(result.condition_names)
+    for c in shown:
+        yield Figure(
+            f"distribution_{c.measure.name}",
+            f"{c.measure.title}.",
+            f"{c.measure.title}, every included epoch a point. {_values(c)}",
+            partial(
+                drawn,
+                distribution_size(len(c.summaries), pooled=bool(c.pooled)),
+                draw_comparison,
+                c,
+                colours,
+            ),
+            "small",
+            marks={
+                f"epochs-{place}": [(o.source, o.epoch) for o in c.of(key)]
+                for place, key in enumerate(c.summaries)
+            },
+        )
+
+
+def _values(c: Comparison) -> str:
+    parts = []
+    for condition, s in c.summaries.items():
+        text = f"{condition_name(condition)}: n = {s.n}"
+        if s.n:
+            text += f", median {number(s.median)}, quartiles {number(s.q1)} to {number(s.q3)}"
+        if condition in c.pooled:
+            pooled = c.pooled[condition]
+            text += f", all epochs {number(pooled.value)} {interval(pooled.low, pooled.high)}"
+        parts.append(text)
+    return f"{'; '.join(parts)} ({c.measure.unit})."
+
+
+SECTIONS = part(
+    "All tests",
+    Section("comparison", "Comparison", _comparison, from_study_folder),
+    Section("results", "Results", _results, lambda result: not from_study_folder(result)),
+    Section("effects", "Effect sizes", _effects, from_study_folder),
+    Section("distributions", "Every epoch", _distributions),
+    Section("results", "All epochs together", _all_epochs, from_study_folder),
+    RATINGS,
+    RELATION,
+    printed=4,
+)
