@@ -24,8 +24,7 @@ from rigidimeter.analysis.report.interval_rows import (
 )
 from rigidimeter.analysis.report.methods_prose import (
     day_tests_in_words,
-    interval_basis,
-    pooled_basis,
+    method_of,
 )
 from rigidimeter.analysis.report.points import distribution_size, draw_comparison
 from rigidimeter.analysis.report.sections.every_epoch import pooled_table
@@ -173,13 +172,13 @@ def _all_epochs(result: StudyResult) -> Iterator[Block]:
             Column("sd_percent", "SD (% of the mean)", digits=2),
         )
     yield from_result(result, "summaries", "Medians and quartiles by condition", *columns)
+    method = method_of(result.analysis.method)
     yield pooled_table(
         result,
         note=(
             "One J, B and K fitted to all epochs of a condition at once. "
-            f"{interval_basis(result.analysis.method)}. "
-            f"{pooled_basis(result.analysis.method)}. The file also has standard errors and the "
-            "smallest standard errors possible."
+            f"{method.intervals_text}. {method.pooled_text}. The file also has standard errors "
+            "and the smallest standard errors possible."
         ),
     )
 

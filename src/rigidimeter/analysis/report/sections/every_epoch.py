@@ -9,7 +9,7 @@ from typing import Any
 from markupsafe import Markup
 
 from rigidimeter.analysis.report.contents import Block, Section, from_result, paragraph, part
-from rigidimeter.analysis.report.methods_prose import interval_basis
+from rigidimeter.analysis.report.methods_prose import method_of
 from rigidimeter.analysis.report.sections.what_was_done import longest_s
 from rigidimeter.analysis.study import StudyResult, split_pooled
 from rigidimeter.analysis.study.drawing import channel_facts
@@ -94,7 +94,7 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
             "not include the error of the median J. The files also have standard errors and, in "
             "columns that end with <code>_bound</code>, the smallest standard error that an "
             "unbiased estimate from the same excitation and noise could have (Cramér–Rao)."
-        ).format(interval_basis(analysis.method))
+        ).format(method_of(analysis.method).intervals_text)
     )
     band, in_which = _band(analysis.fits)
     found = any(fit.findings for fit in analysis.fits)

@@ -22,7 +22,7 @@ from rigidimeter.analysis.report.curves import (
     origin_s,
     torque_limit_nm,
 )
-from rigidimeter.analysis.report.methods_prose import is_least_squares
+from rigidimeter.analysis.report.methods_prose import method_of
 from rigidimeter.analysis.report.style import condition_colours, drawn
 from rigidimeter.analysis.study import StudyResult, split_pooled
 from rigidimeter.analysis.study.examples import (
@@ -50,7 +50,7 @@ def _torque(result: StudyResult) -> Iterator[Block]:
         "show, in grey, what is left for that term to explain: the measured torque less the other "
         "two terms. These panels have the same axis in all conditions."
     )
-    if not is_least_squares(result.analysis.method):
+    if method_of(result.analysis.method).uses_perturbation:
         text += (
             " The estimate ignores torque that does not follow the perturbation. What the model "
             "leaves here is noise and torque that something but the robot adds, so a low VAF does "
@@ -151,7 +151,7 @@ def _unexplained(result: StudyResult) -> Iterator[Block]:
         "sensor noise, and whatever the model lacks. Voluntary movement is below 4 Hz; a tremor is "
         "a peak."
     )
-    if is_least_squares(result.analysis.method):
+    if not method_of(result.analysis.method).uses_perturbation:
         text += " Least squares makes this torque as small as it can, and so hides part of it."
     yield paragraph(text)
     sizes_nm = {

@@ -26,7 +26,7 @@ from rigidimeter.analysis.report.curves import (
     recorded_size,
     shown_channels,
 )
-from rigidimeter.analysis.report.methods_prose import method_title
+from rigidimeter.analysis.report.methods_prose import method_of
 from rigidimeter.analysis.report.sections.every_epoch import HOW, WHO
 from rigidimeter.analysis.report.style import drawn
 from rigidimeter.analysis.study import StudyResult, result_table
@@ -56,7 +56,7 @@ def _estimation(result: StudyResult) -> Iterator[Block]:
     )
     yield paragraph(
         Markup("Method: <strong>{}</strong> ({}). {}").format(
-            analysis.method, method_title(analysis.method), chosen
+            analysis.method, method_of(analysis.method).title, chosen
         )
     )
     yield Table(
