@@ -246,7 +246,8 @@ def draw_loops(
         legend_outside(axes)
 
 
-def _frequency_axis(axes: Axes, low: float, high: float) -> None:
+def frequency_axis(axes: Axes, low: float, high: float) -> None:
+    """Make the horizontal axis one of frequency in Hz, logarithmic with plain numbers."""
     axes.set_xscale("log")
     axes.set_xlim(low, high)
     axes.set_xlabel("Frequency (Hz)")
@@ -256,7 +257,7 @@ def _frequency_axis(axes: Axes, low: float, high: float) -> None:
 
 
 def _density_axis(axes: Axes, low: float, high: float) -> None:
-    _frequency_axis(axes, low, high)
+    frequency_axis(axes, low, high)
     axes.set_yscale("log")
     axes.set_ylabel("Power spectral density\n((N·m)²/Hz)")
     plain_ticks(axes.yaxis)
@@ -409,6 +410,6 @@ def draw_impedance(
     coherence.set_ylim(-0.04, 1.04)
     coherence.axhline(COHERENT, color=GREY, linewidth=0.6, dashes=(2, 2))
     for axes in panels:
-        _frequency_axis(axes, lowest / 1.1, highest * 1.1)
+        frequency_axis(axes, lowest / 1.1, highest * 1.1)
         axes.set_xlabel("Frequency (Hz)" if axes is coherence else "")
     legend_outside(magnitude)
