@@ -10,7 +10,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure as Drawing
 
 from rigidimeter.analysis.study import StudyResult, result_table
-from rigidimeter.core.records import Fit, Score
+from rigidimeter.core.records import Epoch, Fit, Score
 from rigidimeter.core.words import Column, Table, short_names
 
 
@@ -96,10 +96,11 @@ def from_result(
     return Table(name, title, columns, result_table(result, name), **options)
 
 
-def whose(result: StudyResult, one: Fit | Score) -> str:
+def named(result: StudyResult, one: Epoch | Fit | Score) -> str:
     """Return epoch and source, since sessions use the same labels."""
     names = short_names(epoch.source for epoch in result.epochs)
-    return f"epoch {one.epoch} of {names.get(one.source, one.source)}"
+    label = one.label if isinstance(one, Epoch) else one.epoch
+    return f"epoch {label} of {names.get(one.source, one.source)}"
 
 
 def paragraph(text: str, kind: Literal["", "remark", "banner"] = "") -> Markup:

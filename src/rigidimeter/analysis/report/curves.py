@@ -41,6 +41,10 @@ TORQUE_SIZE = (7.4, 7.4)
 TORQUE_HEIGHTS = (1.4, 0.7, 1.0, 1.0, 1.0)
 """Of the figure of torques in inches, and of its panels beside each other."""
 
+EXCITATION_SIZE = (7.4, 5.8)
+EXCITATION_HEIGHTS = (1.0, 1.0, 1.8)
+"""Of the figure of the perturbation and its spectrum."""
+
 COHERENT = 0.5
 """Points of less coherence are hollow: most of their power is not the perturbation's."""
 
@@ -296,6 +300,14 @@ def draw_spectrum(panels: Sequence[Axes], channel: Channel, wanted_hz: tuple[flo
         float(np.sqrt(low * high)), 0.97, f"intended: {low:g} to {high:g} Hz", ha="center",
         va="top", fontsize=8, color=GREY, transform=axes.get_xaxis_transform(),
     )  # fmt: skip
+
+
+def draw_excitation(
+    panels: Sequence[Axes], channel: Channel, start_s: float, wanted_hz: tuple[float, float]
+) -> None:
+    """Draw the perturbation on two panels and its spectrum on a third."""
+    draw_perturbation(panels[:2], channel, start_s)
+    draw_spectrum(panels[2:], channel, wanted_hz)
 
 
 def draw_unexplained(

@@ -52,10 +52,7 @@ def methods_prose(result: StudyResult) -> Prose:
     cite = Cited()
     text = _template().render(_facts(result), result=result, cite=cite)
     paragraphs = (re.sub(r" *\n *", " ", each).strip() for each in re.split(r"\n{2,}", text))
-    return Prose(
-        tuple(each for each in paragraphs if each),
-        tuple(reference.full for reference in cite.found.values()),
-    )
+    return Prose(tuple(each for each in paragraphs if each), tuple(cite.found.values()))
 
 
 @functools.cache

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -135,6 +136,14 @@ def draw_comparison(panels: Sequence[Axes], c: Comparison, colours: Mapping[str,
     )
 
 
+def draw_comparisons(
+    panels: Sequence[Axes], compared: Sequence[Comparison], colours: Mapping[str, str]
+) -> None:
+    """Draw each measure on a panel of its own."""
+    for axes, c in zip(panels, compared, strict=True):
+        draw_comparison([axes], c, colours)
+
+
 def day_rows(c: Comparison) -> list[list[tuple[str, str]]]:
     """Return subjects and days as rows; a subject that does not fit begins a new one."""
     rows: list[list[tuple[str, str]]] = [[]]
@@ -253,7 +262,8 @@ def draw_ratings(panels: Sequence[Axes], found: RatingsFound, order: Sequence[st
     raw, corrected = panels
     scores = np.array([row.score for row in found.rows])
     for axes, values in ((raw, scores), (corrected, np.asarray(found.fit.corrected))):
-        for (place, condition), (lane, examiner) in _each(means, examiners):
+        each = product(enumerate(means), enumerate(examiners))
+        for (place, condition), (lane, examiner) in each:
             own = values[[who == (condition, examiner) for who in named]]
             at = (
                 place
@@ -277,12 +287,6 @@ def draw_ratings(panels: Sequence[Axes], found: RatingsFound, order: Sequence[st
     raw.set_ylabel("Score")
     note(raw, "as given")
     note(corrected, "less the examiner's offset; bar: mean, 95 % interval")
-
-
-def _each(
-    first: Mapping[str, object], second: Sequence[str]
-) -> Iterator[tuple[tuple[int, str], tuple[int, str]]]:
-    return ((one, two) for one in enumerate(first) for two in enumerate(second))
 
 
 def _side_by_side(values: Array, width: float) -> Array:

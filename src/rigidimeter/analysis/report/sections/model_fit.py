@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from rigidimeter.analysis.estimation import Signals, epoch_signals, scoring_cycles
-from rigidimeter.analysis.report.contents import Block, Figure, Section, paragraph, part, whose
+from rigidimeter.analysis.report.contents import Block, Figure, Section, named, paragraph, part
 from rigidimeter.analysis.report.curves import (
     TORQUE_HEIGHTS,
     TORQUE_SIZE,
@@ -65,7 +65,7 @@ def _torque(result: StudyResult) -> Iterator[Block]:
         shown = signals, fit, colours[fit.condition], origin_s(epoch), limit_nm
         yield Figure(
             f"torque_{position}_{_file_name(fit.condition)}",
-            f"{name}: {whose(result, fit)}, the included epoch with the median stiffness "
+            f"{name}: {named(result, fit)}, the included epoch with the median stiffness "
             f"({stiffness}); its first {WINDOW_S:g} s in the band {_hz(signals.band_hz)}"
             f"{_fitted_elsewhere(signals, fit)}.",
             f"{name}: measured and modelled torque of epoch {fit.epoch}, what the model leaves, "
@@ -198,7 +198,7 @@ def _loops(result: StudyResult) -> Iterator[Block]:
         for score, _ in found
     ]
     epochs = "; ".join(
-        f"{condition_name(score.condition)}: {whose(result, score)}, {cycles.n_cycles} cycles at "
+        f"{condition_name(score.condition)}: {named(result, score)}, {cycles.n_cycles} cycles at "
         f"{number(cycles.frequency_hz, 3)} Hz"
         for score, cycles in found
     )

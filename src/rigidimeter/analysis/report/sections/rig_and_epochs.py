@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -14,9 +14,9 @@ from rigidimeter.analysis.report.contents import (
     Section,
     from_result,
     from_study_folder,
+    named,
     paragraph,
     part,
-    whose,
 )
 from rigidimeter.analysis.report.curves import (
     CHANNELS,
@@ -31,7 +31,7 @@ from rigidimeter.analysis.report.sections.every_epoch import HOW, WHO
 from rigidimeter.analysis.report.style import drawn
 from rigidimeter.analysis.study import StudyResult, result_table
 from rigidimeter.analysis.study.examples import analysed_epoch, representative_fits
-from rigidimeter.core.records import Delay, Outcome
+from rigidimeter.core.records import Delay, Fit, Score
 from rigidimeter.core.words import SESSION, Column, Table, condition_name, plural, series
 
 BY = ("protocol", "check", "estimate", "operator")
@@ -88,47 +88,45 @@ def _done(delay: Delay) -> str:
     return f"{moved}; {delay.remark}" if delay.remark else moved
 
 
-def _stages(result: StudyResult, *, on_page: bool) -> Table:
-    """Return whatever is excluded or failed, once for each reason."""
-    return Table(
+def _exclusions(result: StudyResult) -> Iterator[Block]:
+    """Yield whatever is excluded or failed, once for each reason; of a study as a file only."""
+    columns = (*WHO, Column("stage", "Stage", "text"), *HOW)
+    yield Table(
         "exclusions",
         "Excluded epochs by stage of the analysis",
-        (*WHO, Column("stage", "Stage", "text"), *HOW) if on_page else (),
-        list(_by_stage(result)),
-        empty="No epoch was excluded." if on_page else "",
+        () if from_study_folder(result) else columns,
+        _by_stage(result),
+        empty="" if from_study_folder(result) else "No epoch was excluded.",
         folding=True,
     )
 
 
-def _by_stage(result: StudyResult) -> Iterator[dict[str, Any]]:
-    """Yield what each stage excluded, and the epochs from which nothing was estimated."""
+def _by_stage(result: StudyResult) -> list[dict[str, Any]]:
+    """Return what each stage excluded, and the epochs from which nothing was estimated."""
     analysis = result.analysis
-    stages = (
-        ("fit", analysis.fits),
-        ("fit at fixed inertia", analysis.fixed_inertia),
-        ("score", analysis.scores),
-    )
-    keys = ("source", "epoch", "condition", "stage", "outcome", "reason")
-    seen: set[tuple[str, str, Outcome]] = set()
-    analysed: set[tuple[str, str]] = set()
-    for stage, results in stages:
+    stages: dict[str, Sequence[Fit | Score]] = {
+        "fit": analysis.fits,
+        "fit at fixed inertia": analysis.fixed_inertia,
+        "score": analysis.scores,
+    }
+    analysed: set[tuple[str, ...]] = set()
+    first: dict[tuple[tuple[str, ...], str, str], str] = {}
+    for stage, results in stages.items():
         for one in results:
-            who = (one.source, one.epoch)
-            analysed.add(who)
-            if one.outcome.included or (*who, one.outcome) in seen:
-                continue
-            seen.add((*who, one.outcome))
-            row = (*who, one.condition, stage, one.outcome.kind, one.outcome.reason)
-            yield dict(zip(keys, row, strict=True))
+            who = (one.source, one.epoch, one.condition)
+            analysed.add(who[:2])
+            if not one.outcome.included:
+                first.setdefault((who, one.outcome.kind, one.outcome.reason), stage)
     for epoch in result.epochs:
-        if (epoch.source, epoch.label) not in analysed:
+        who = (epoch.source, epoch.label, epoch.condition)
+        if who[:2] not in analysed:
             reason = epoch.closed.reason or "nothing was estimated from it"
-            row = (epoch.source, epoch.label, epoch.condition, "none", "failed", reason)
-            yield dict(zip(keys, row, strict=True))
-
-
-def _exclusions(result: StudyResult) -> Iterator[Block]:
-    yield _stages(result, on_page=True)
+            first[who, "failed", reason] = "none"
+    keys = ("source", "epoch", "condition", "stage", "outcome", "reason")
+    return [
+        dict(zip(keys, (*who, stage, kind, reason), strict=True))
+        for (who, kind, reason), stage in first.items()
+    ]
 
 
 def _study_exclusions(result: StudyResult) -> Iterator[Block]:
@@ -175,7 +173,7 @@ def _study_exclusions(result: StudyResult) -> Iterator[Block]:
         *SESSION,
         Column("reason", "Reason", "reason"),
     )
-    yield _stages(result, on_page=False)
+    yield from _exclusions(result)
 
 
 def _recorded(result: StudyResult) -> Iterator[Block]:
@@ -186,7 +184,7 @@ def _recorded(result: StudyResult) -> Iterator[Block]:
         shown = shown_channels(epoch)
         names = series([CHANNELS[name][0] for name in shown])
         names = names[:1].upper() + names[1:]
-        which = f"{condition_name(fit.condition)}, {whose(result, fit)}"
+        which = f"{condition_name(fit.condition)}, {named(result, fit)}"
         yield Figure(
             "recorded",
             f"{names} as recorded, not filtered; the first {WINDOW_S:g} s of {which}.",

@@ -18,10 +18,16 @@ from rigidimeter.analysis.report.contents import (
     Section,
     from_result,
     from_study_folder,
+    named,
     paragraph,
     part,
 )
-from rigidimeter.analysis.report.curves import draw_perturbation, draw_spectrum, origin_s
+from rigidimeter.analysis.report.curves import (
+    EXCITATION_HEIGHTS,
+    EXCITATION_SIZE,
+    draw_excitation,
+    origin_s,
+)
 from rigidimeter.analysis.report.methods_prose import methods_prose
 from rigidimeter.analysis.report.style import drawn
 from rigidimeter.analysis.study import StudyResult
@@ -37,7 +43,6 @@ from rigidimeter.core.words import (
     condition_name,
     number,
     plural,
-    short_names,
 )
 
 _TASKS = {"prbs": "torque perturbation", "sinusoid": "imposed sinusoid", None: "not stated"}
@@ -249,23 +254,19 @@ def _perturbation(result: StudyResult) -> Iterator[Block]:
     channel = epoch.channels["perturbation_nm"]
     prbs = result.settings.prbs
     low, high = epoch.excitation_hz or (prbs.wanted_low_hz, prbs.wanted_high_hz)
-    where = short_names(one.source for one in result.epochs)[epoch.source]
-    whose = f"of epoch {epoch.label} of {where} ({condition_name(epoch.condition)})"
+    whose = f"of {named(result, epoch)} ({condition_name(epoch.condition)})"
     size_nm = float(np.max(np.abs(channel.values)))
+    shown = channel, origin_s(epoch), (low, high)
+    heights = EXCITATION_HEIGHTS
     yield Figure(
         "perturbation",
-        f"The commanded torque perturbation {whose}.",
+        f"The commanded torque perturbation {whose}, and its power spectral density "
+        "(Hann-windowed periodogram of the complete perturbation), with the intended band of "
+        f"{low:g} to {high:g} Hz.",
         f"Torque perturbation {whose}: it switches between levels up to {number(size_nm)} N·m "
-        f"for {number(channel.time_s[-1] - channel.time_s[0])} s.",
-        partial(drawn, (7.4, 3.1), draw_perturbation, channel, origin_s(epoch), rows=2),
-    )
-    yield Figure(
-        "perturbation_spectrum",
-        f"Its power spectral density (Hann-windowed periodogram of the complete perturbation), "
-        f"with the intended band of {low:g} to {high:g} Hz.",
-        f"Power spectral density of the perturbation, with the intended band, {low:g} to "
-        f"{high:g} Hz, marked.",
-        partial(drawn, (7.4, 2.7), draw_spectrum, channel, (low, high)),
+        f"for {number(channel.time_s[-1] - channel.time_s[0])} s. Below, its power spectral "
+        f"density, with the intended band, {low:g} to {high:g} Hz, marked.",
+        partial(drawn, EXCITATION_SIZE, draw_excitation, *shown, rows=3, height_ratios=heights),
     )
 
 
