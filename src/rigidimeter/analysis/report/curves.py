@@ -14,10 +14,12 @@ from rigidimeter.analysis.estimation import Cycles, Signals
 from rigidimeter.analysis.report.style import (
     GREY,
     INK,
+    Look,
     legend_outside,
     listed,
     note,
     plain_ticks,
+    write_at,
 )
 from rigidimeter.analysis.study.drawn_signals import Response, Spectrum
 from rigidimeter.core.records import Channel, Epoch, Fit
@@ -296,10 +298,9 @@ def draw_spectrum(panels: Sequence[Axes], channel: Channel, wanted_hz: tuple[flo
     axes.plot(frequency_hz, np.maximum(density, floor), color=INK, linewidth=0.8)
     _density_axis(axes, min(frequency_hz[0], low / 2), max(frequency_hz[-1], 2 * high))
     axes.set_ylim(floor, density.max() * 6)
-    axes.text(
-        float(np.sqrt(low * high)), 0.97, f"intended: {low:g} to {high:g} Hz", ha="center",
-        va="top", fontsize=8, color=GREY, transform=axes.get_xaxis_transform(),
-    )  # fmt: skip
+    look: Look = {"ha": "center", "va": "top", "color": GREY}
+    words = f"intended: {low:g} to {high:g} Hz"
+    write_at(axes, float(np.sqrt(low * high)), 0.97, words, share="y", **look)
 
 
 def draw_excitation(
@@ -388,18 +389,15 @@ def draw_impedance(
     for place, (name, response) in enumerate(measured.items()):
         colour, values = colours[name], response.impedance_nm_rad
         coherent = response.coherence >= COHERENT
-        for axes, points in zip(
-            panels, (np.abs(values), np.degrees(np.angle(values)), response.coherence), strict=True
-        ):
-            for chosen, face, label in (
-                (coherent, colour, f"{listed(name)}, measured"), (~coherent, "none", None)
-            ):  # fmt: skip
+        look: Look = {"color": colour, "ms": 3.0, "mew": 0.7, "alpha": 0.55}
+        marker = _MARKERS[place % len(_MARKERS)]
+        shown = np.abs(values), np.degrees(np.angle(values)), response.coherence
+        for axes, points in zip(panels, shown, strict=True):
+            for chosen, face in ((coherent, colour), (~coherent, "none")):
                 if np.any(chosen):
-                    axes.plot(
-                        response.frequency_hz[chosen], points[chosen],
-                        _MARKERS[place % len(_MARKERS)], color=colour, mfc=face, ms=3.0, mew=0.7,
-                        alpha=0.55, label=label,
-                    )  # fmt: skip
+                    label = f"{listed(name)}, measured" if face == colour else None
+                    at = response.frequency_hz[chosen], points[chosen]
+                    axes.plot(*at, marker, mfc=face, label=label, **look)
         if (joint := joints.get(name)) is not None:
             grid = np.geomspace(lowest, highest, 400)
             model = model_nm_rad(joint, grid)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rigidimeter.analysis.report.style import (
     GREY,
     OTHERS,
+    Look,
     condition_colours,
     condition_markers,
     legend_above,
@@ -106,11 +107,13 @@ def draw_epochs(
                 (own & ~included, "white", ", does not count"),
             ):
                 if np.any(drawn := of & known):
-                    value, low, high = rows[drawn].T
-                    with_intervals(
-                        axes, place[drawn], value, low, high, colour, markers[name], width=0.9,
-                        mfc=fill, ms=4.5, label=listed(f"{title}{word}"),
-                    )  # fmt: skip
+                    look: Look = {
+                        "width": 0.9,
+                        "mfc": fill,
+                        "ms": 4.5,
+                        "label": listed(f"{title}{word}"),
+                    }
+                    with_intervals(axes, place[drawn], rows[drawn], colour, markers[name], **look)
             value, low, high = factor * what.pooled.get(name, np.full(3, np.nan))
             if np.isfinite(value):
                 ends = [place[own].min() - 0.4, place[own].max() + 0.4]
@@ -175,9 +178,8 @@ def draw_pairs(panels: Sequence[Axes], fit: Fit) -> None:
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     for axes, (i, k) in zip(panels, _PAIRS, strict=True):
         axes.hlines(value[k], low[i], high[i], color=colour, linewidth=1.6)
-        with_intervals(
-            axes, value[i], value[k], low[k], high[k], colour, "o", width=1.6, ms=5, label=label
-        )
+        upward = value[k], low[k], high[k]
+        with_intervals(axes, value[i], upward, colour, "o", width=1.6, ms=5, label=label)
         covariance = (fit.covariance * np.outer(factors, factors))[np.ix_((i, k), (i, k))]
         if np.all(np.isfinite(covariance)) and np.linalg.det(covariance) > 0:
             circle = np.sqrt(_CHI2_95) * np.array([np.cos(turn), np.sin(turn)])

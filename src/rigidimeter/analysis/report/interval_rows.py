@@ -14,6 +14,7 @@ from scipy.stats import norm
 from rigidimeter.analysis.report.style import (
     GREY,
     INK,
+    Look,
     condition_colours,
     condition_markers,
     drawable,
@@ -21,6 +22,7 @@ from rigidimeter.analysis.report.style import (
     listed,
     with_intervals,
     wrapped,
+    write_at,
 )
 from rigidimeter.analysis.statistics import Effects, largest_r
 from rigidimeter.analysis.study import Comparison, Measure, SensitivityRow, StudyResult
@@ -85,15 +87,12 @@ def draw_effects(
     most = [largest_r(test.n_x, test.n_y) for test in tests]
     for place, (_, effects) in enumerate(found):
         ends = effects.r_low, effects.r_high
-        with_intervals(axes, effects.r, place, *ends, INK, "s", across=True, width=1.6, ms=6)
+        with_intervals(axes, place, (effects.r, *ends), INK, "s", across=True, width=1.6, ms=6)
         if np.all(np.isfinite(ends)):
             axes.plot(ends, [place] * 2, "|", color=INK, ms=7)
         bounds = (-most[place], most[place])
         axes.plot(bounds, [place] * 2, "|", color=GREY, ms=13, mew=0.7, alpha=0.7)
-        axes.text(
-            1.02, place, effect_words(effects), transform=axes.get_yaxis_transform(), va="center",
-            fontsize=8,
-        )  # fmt: skip
+        write_at(axes, 1.02, place, effect_words(effects), share="x", va="center")
     values = [(effects.r, effects.r_low, effects.r_high) for _, effects in found]
     least, largest = np.nanmin(values), np.nanmax(values)
     reach = 1.05 * max(0.5, *most, abs(least), abs(largest))
@@ -136,14 +135,12 @@ def draw_methods(panels: Sequence[Axes], found: Sequence[SensitivityRow], label:
         shifts = np.array([(row.shift, row.shift_low, row.shift_high) for row in own])
         factor, unit = axis_unit(shifts.ravel(), measure.unit)
         _rows(axes, [f"{drawable(method)}, J {inertia}" for method, inertia in methods])
-        for row, (shift, low, high) in zip(own, factor * shifts, strict=True):
+        for row, shift in zip(own, factor * shifts, strict=True):
             place, colour = methods.index((row.method, row.inertia)), INK if row.chosen else _OTHER
-            fixed = row.inertia == "fixed"
-            with_intervals(
-                axes, shift, place, low, high, colour, "s" if fixed else "o", across=True,
-                width=2.2 if row.chosen else 1.2, mfc=colour if fixed else "white",
-                ms=6.5 if row.chosen else 5.0, mew=1.2,
-            )  # fmt: skip
+            marker, face = ("s", colour) if row.inertia == "fixed" else ("o", "white")
+            width, size = (2.2, 6.5) if row.chosen else (1.2, 5.0)
+            look: Look = {"width": width, "ms": size, "mfc": face, "mew": 1.2}
+            with_intervals(axes, place, shift, colour, marker, across=True, **look)
         axes.set_title(wrapped(replace(measure, unit=unit).label, 30), fontsize=8.5)
         axes.set_xlabel(drawable(label))
         axes.xaxis.set_major_locator(MaxNLocator(3))
@@ -194,13 +191,11 @@ def draw_bands(
             if np.isfinite(wide):
                 axes.axvspan(-wide, wide, color=colours[name], alpha=0.12, linewidth=0)
             own = [one for one in others if one.condition == condition]
-            change, low, high = np.transpose([band_percent(one)[i] for one in own])
+            rows = [band_percent(one)[i] for one in own]
             beside = _BESIDE * ((k + 0.5) / len(conditions) - 0.5)
             places = [labels.index(band_label(one)) + beside for one in own]
-            with_intervals(
-                axes, change, places, low, high, colours[name], markers[name], across=True, ms=4,
-                label=listed(name),
-            )  # fmt: skip
+            look: Look = {"across": True, "ms": 4, "label": listed(name)}
+            with_intervals(axes, places, rows, colours[name], markers[name], **look)
         axes.set_title(parameter.symbol)
         axes.set_xlabel("Change (%)")
     if len(conditions) > 1:

@@ -97,9 +97,8 @@ def _facts(result: StudyResult) -> dict[str, Any]:
         held = "of the same subject in all conditions"
     elif math.isfinite(analysis.inertia_kg_m2):
         held = f"of all conditions ({number(analysis.inertia_kg_m2)} kg·m²)"
-    estimated = [] if found is None else [
-        name for name in found.fit.offsets if name not in found.fit.inseparable
-    ]  # fmt: skip
+    fit = None if found is None else found.fit
+    estimated = [name for name in fit.offsets if name not in fit.inseparable] if fit else []
     methods = dict.fromkeys(row.method for row in result.sensitivity)
     return {
         **{name: getattr(settings, name) for name in ("controller", "guard", "prbs", "scores")},

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from rigidimeter.analysis.report.style import (
     GREY,
     MARKERS,
+    Look,
     condition_colours,
     condition_markers,
-    drawable,
     legend_above,
     legend_outside,
     listed,
@@ -24,6 +24,7 @@ from rigidimeter.analysis.report.style import (
     spread,
     with_intervals,
     wrapped,
+    write_at,
 )
 from rigidimeter.analysis.statistics import summarise
 from rigidimeter.analysis.study import Comparison, RatingsFound, Relation
@@ -54,17 +55,14 @@ def _strip(
 
     `group` names the line of points, so that a page can say which epoch each of them is.
     """
-    values, low, high = rows.T
-    found = summarise(values)
-    with_intervals(
-        axes, place + width * (_ASIDE + spread(values.size, _SPREAD)), values, low, high, colour,
-        markers[0], width=0.7, faint=0.4, alpha=0.6, ms=3.6 if values.size <= 60 else 2.6, mew=0,
-        gid=group,
-    )  # fmt: skip
-    with_intervals(
-        axes, place + width * _BESIDE, found.median, found.q1, found.q3, colour, markers[1],
-        width=2.0, ms=6, mec="white", mew=0.7,
-    )  # fmt: skip
+    found = summarise(rows[:, 0])
+    at = place + width * (_ASIDE + spread(len(rows), _SPREAD))
+    size = 3.6 if len(rows) <= 60 else 2.6
+    points: Look = {"width": 0.7, "faint": 0.4, "alpha": 0.6, "mew": 0, "ms": size, "gid": group}
+    with_intervals(axes, at, rows, colour, markers[0], **points)
+    quartiles = found.median, found.q1, found.q3
+    median: Look = {"width": 2.0, "ms": 6, "mec": "white", "mew": 0.7}
+    with_intervals(axes, place + width * _BESIDE, quartiles, colour, markers[1], **median)
 
 
 def draw_distribution(
@@ -100,10 +98,10 @@ def draw_distribution(
             rows = np.column_stack([rows, np.full((rows.size, 2), np.nan)])
         if len(rows):
             _strip(axes, place, 1.0, rows, colours[condition], "oD", f"epochs-{place}")
-        value, low, high = np.asarray((pooled or {}).get(condition, (np.nan,) * 3))
-        if np.isfinite(value):
-            at = place + _POOLED
-            with_intervals(axes, at, value, low, high, colours[condition], "s", mfc="white", ms=4.5)
+        together = np.asarray((pooled or {}).get(condition, (np.nan,) * 3))
+        if np.isfinite(together[0]):
+            at, colour = place + _POOLED, colours[condition]
+            with_intervals(axes, at, together, colour, "s", mfc="white", ms=4.5)
     named_places(axes, [f"{wrapped(name, 13)}\nn = {len(v)}" for name, v in values.items()])
     axes.set_ylabel(label)
     axes.margins(y=0.08)
@@ -195,10 +193,8 @@ def draw_days(panels: Sequence[Axes], c: Comparison, order: Sequence[str]) -> No
             if places and subject != before:
                 axes.axvline(place - 0.85, color=GREY, linewidth=0.6)
             if several and (not places or subject != before):
-                axes.annotate(
-                    drawable(subject[:24]), (place - 0.45, 1.0), va="top", fontsize=8, color=GREY,
-                    xycoords=axes.get_xaxis_transform(), fontweight="bold",
-                )  # fmt: skip
+                look: Look = {"va": "top", "color": GREY, "fontweight": "bold"}
+                write_at(axes, place - 0.45, 1.0, subject[:24], share="y", **look)
             _day(axes, place, c, (subject, day), factor, colours, markers)
             places.append(place)
         axes.set_xlim(-0.6, max(places[-1] + 0.6, 4.0))
@@ -276,10 +272,9 @@ def draw_ratings(panels: Sequence[Axes], found: RatingsFound, order: Sequence[st
         counts = {name: sum(who == name for who, _ in named) for name in means}
         named_places(axes, [f"{wrapped(name, 16)}\nn = {n}" for name, n in counts.items()])
     for place, (condition, m) in enumerate(means.items()):
-        with_intervals(
-            corrected, place + _MEAN, m.mean, m.low, m.high, colours[condition], "_", width=2.0,
-            ms=11, mew=2.2,
-        )  # fmt: skip
+        colour = colours[condition]
+        bar: Look = {"width": 2.0, "ms": 11, "mew": 2.2}
+        with_intervals(corrected, place + _MEAN, (m.mean, m.low, m.high), colour, "_", **bar)
     for lane, examiner in enumerate(examiners):
         marker, label = MARKERS[lane % len(MARKERS)], listed(f"examiner {examiner}")
         raw.plot([], [], marker, color=GREY, ms=5, label=label)
@@ -312,10 +307,8 @@ def draw_relations(panels: Sequence[Axes], found: Sequence[Relation], order: Seq
         conditions = np.array([condition_name(condition) for _, _, condition in one.visits])
         for name in dict.fromkeys(conditions.tolist()):
             own = conditions == name
-            axes.plot(
-                values[own], ratings[own], markers[name], color=colours[name], ms=5, mew=0,
-                alpha=0.85, label=listed(name),
-            )  # fmt: skip
+            look: Look = {"color": colours[name], "ms": 5, "mew": 0, "alpha": 0.85}
+            axes.plot(values[own], ratings[own], markers[name], label=listed(name), **look)
         axes.set_xlabel(replace(one.measure, unit=unit).label)
         note(axes, relation_words(one))
     panels[0].set_ylabel("Rating less offsets")

@@ -13,7 +13,7 @@ import re
 import textwrap
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -22,12 +22,14 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import ArrayLike, NDArray
 
 from rigidimeter.core.files import visible
+
+Look = dict[str, Any]
+"""Arguments of a line or of points, by name."""
 
 GREY = "#555555"
 INK = "#1C1C1C"
@@ -170,10 +172,8 @@ def spread(count: int, reach: float) -> NDArray[np.float64]:
 
 def with_intervals(
     axes: Axes,
-    x: ArrayLike,
-    y: ArrayLike,
-    low: ArrayLike,
-    high: ArrayLike,
+    places: ArrayLike,
+    rows: ArrayLike,
     colour: str,
     marker: str,
     *,
@@ -181,27 +181,38 @@ def with_intervals(
     width: float = 1.2,
     faint: float = 1.0,
     **style: Any,
-) -> Line2D:
-    """Draw points with their intervals and return the points.
+) -> None:
+    """Draw values as points with their intervals.
 
     Parameters
     ----------
-    x, y, low, high : float or array, shape (n,)
-        An interval is drawn where both of its ends are finite.
+    places : float or array, shape (n,)
+        Where they stand along the other axis.
+    rows : array, shape (3,) or (n, 3)
+        Each value and the ends of its interval, which is drawn where both are finite.
     across : bool
-        The intervals are those of `x`, not of `y`.
+        The values are those of the horizontal axis.
     width, faint : float
         Width and opacity of the intervals.
     **style
         Of the points.
     """
-    x, y, low, high = np.broadcast_arrays(*np.atleast_1d(x, y, low, high))
+    values, low, high = np.reshape(np.asarray(rows, dtype=np.float64), (-1, 3)).T
+    at = np.broadcast_to(places, values.shape)
     known = np.isfinite(low) & np.isfinite(high)
     if np.any(known):
-        place, lines = (y, axes.hlines) if across else (x, axes.vlines)
-        lines(place[known], low[known], high[known], color=colour, linewidth=width, alpha=faint)
-    (points,) = axes.plot(x, y, marker, color=colour, **style)
-    return points
+        lines = axes.hlines if across else axes.vlines
+        lines(at[known], low[known], high[known], color=colour, linewidth=width, alpha=faint)
+    x, y = (values, at) if across else (at, values)
+    axes.plot(x, y, marker, color=colour, **style)
+
+
+def write_at(
+    axes: Axes, x: float, y: float, text: str, *, share: Literal["x", "y"], **style: Any
+) -> None:
+    """Write a few words where one of the coordinates is a share of the axes, from 0 to 1."""
+    place = axes.get_yaxis_transform() if share == "x" else axes.get_xaxis_transform()
+    axes.text(x, y, drawable(text), transform=place, fontsize=8, **style)
 
 
 def plain_ticks(*axes: Axis) -> None:

@@ -23,7 +23,7 @@ from rigidimeter.analysis.report.curves import (
     torque_limit_nm,
 )
 from rigidimeter.analysis.report.methods_prose import method_of
-from rigidimeter.analysis.report.style import condition_colours, drawn
+from rigidimeter.analysis.report.style import Look, condition_colours, drawn
 from rigidimeter.analysis.study import StudyResult, split_pooled
 from rigidimeter.analysis.study.examples import (
     analysed_epoch,
@@ -57,6 +57,7 @@ def _torque(result: StudyResult) -> Iterator[Block]:
             "not mean a poor fit."
         )
     yield paragraph(text)
+    below: Look = {"sharex": True, "height_ratios": TORQUE_HEIGHTS}
     limit_nm = max(torque_limit_nm(signals, fit) for fit, _, signals in found)
     for position, (fit, epoch, signals) in enumerate(found, start=1):
         name = condition_name(fit.condition)
@@ -70,12 +71,9 @@ def _torque(result: StudyResult) -> Iterator[Block]:
             f"{_fitted_elsewhere(signals, fit)}.",
             f"{name}: measured and modelled torque of epoch {fit.epoch}, what the model leaves, "
             f"and the terms of inertia, damping and stiffness. K {stiffness}, VAF {vaf}.",
-            partial(
-                drawn, TORQUE_SIZE, draw_torque, *shown, rows=5, sharex=True,
-                height_ratios=TORQUE_HEIGHTS,
-            ),
+            partial(drawn, TORQUE_SIZE, draw_torque, *shown, rows=5, **below),
             "tall",
-        )  # fmt: skip
+        )
 
 
 def _file_name(condition: str) -> str:
@@ -125,6 +123,8 @@ def _impedance(result: StudyResult) -> Iterator[Block]:
         f"{name} {number(float(np.median(response.coherence)), 3)}"
         for name, response in shown.items()
     )
+    drawing = shown, colours, joints
+    below: Look = {"sharex": True, "height_ratios": (1.5, 1.1, 0.8)}
     lines_hz = next(iter(shown.values())).frequency_hz
     yield Figure(
         "impedance",
@@ -133,12 +133,9 @@ def _impedance(result: StudyResult) -> Iterator[Block]:
         f"perturbation from {number(lines_hz[0], 3)} to {number(lines_hz[-1], 3)} Hz: magnitude, "
         "phase and coherence, with the "
         f"model of each condition. Median coherence: {medians}. {counts}.",
-        partial(
-            drawn, (7.4, 6.4), draw_impedance, shown, colours, joints, rows=3, sharex=True,
-            height_ratios=(1.5, 1.1, 0.8),
-        ),
+        partial(drawn, (7.4, 6.4), draw_impedance, *drawing, rows=3, **below),
         "tall",
-    )  # fmt: skip
+    )
 
 
 def _unexplained(result: StudyResult) -> Iterator[Block]:
