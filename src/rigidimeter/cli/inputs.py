@@ -52,9 +52,6 @@ def say_analysed(read: Recording, analysis: Analysis) -> int:
     int
         The exit status: 1 if an input was bad or an epoch failed, else 0.
     """
-    from rigidimeter.analysis.study import analysis_warnings
-
-    say(analysis_warnings(analysis))
     failed = _say_failed(analysis)
     return int(read.failed or failed)
 
@@ -128,6 +125,8 @@ class AnalysedStudy(NamedTuple):
         """Say what is wrong with it, after it was shown; return the exit status."""
         say(self.result.notices)
         bad = any(notice.level == "error" for notice in self.result.notices)
+        # The screen says what could not be tested.
+        bad |= any(c.paired and c.test is None and c.remark for c in self.result.comparisons)
         bad |= _say_failed(self.result.analysis)
         if self.not_kept:
             echo(f"error: the analysis is not stored: {self.not_kept}", err=True)

@@ -52,4 +52,3 @@ from rigidimeter.analysis.study.tables import (
     table_csv,
 )
 from rigidimeter.analysis.study.traffic_light import TrafficLight, traffic_light
-from rigidimeter.analysis.study.warnings import analysis_warnings

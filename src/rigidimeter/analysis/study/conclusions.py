@@ -14,10 +14,19 @@ from rigidimeter.analysis.statistics import holm
 from rigidimeter.analysis.study.compared import Comparison, measure_names
 from rigidimeter.analysis.study.days_to_decide import days_to_decide
 from rigidimeter.analysis.study.differences import Difference, simulated_difference
-from rigidimeter.analysis.study.objections import hidden, negligible, objections, untested
+from rigidimeter.analysis.study.objections import (
+    hidden,
+    negligible,
+    objections,
+    too_few,
+    without_test,
+)
 from rigidimeter.analysis.study.results import StudyResult
 from rigidimeter.analysis.study.sensitivity import method_caveats
-from rigidimeter.analysis.study.tested import LEVEL, Basis, basis_of, tested, too_few
+from rigidimeter.analysis.study.tested import LEVEL, Basis, basis_of, tested
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import FindingGroup
+from rigidimeter.core.words import series, within
 
 Verdict = Literal["lower", "higher", "no difference shown", "not supported", "cannot be decided"]
 
@@ -34,8 +43,8 @@ class Conclusion:
         something else may have made it) or ``cannot be decided``.
     p : float
         Of the test, adjusted for the measures; NaN without one.
-    reason : str
-        A clause; empty where the test is the whole reason.
+    finding : Finding or None
+        The reason; None where the test is the whole reason.
     difference : Difference
         With both values, and the intervals of the measurement and of the test.
     test : str
@@ -50,10 +59,15 @@ class Conclusion:
     verdict: Verdict
     difference: Difference
     p: float = math.nan
-    reason: str = ""
+    finding: Finding | None = None
     simulated: Difference | None = None
     test: str = ""
     days_to_decide: int | None = None
+
+    @property
+    def reason(self) -> str:
+        """The headline of the finding as a clause; empty without one."""
+        return "" if self.finding is None else within(self.finding.headline)
 
 
 @dataclass(frozen=True)
@@ -106,25 +120,37 @@ def conclude(result: StudyResult) -> Conclusions | None:
     for test, p in zip(tests, adjusted, strict=True):
         c = test.comparison
         verdict: Verdict
+        why: Finding | None
         if math.isnan(p):
-            verdict, reason = "cannot be decided", untested(c, result) or test.remark
-        elif p < LEVEL and (reason := negligible(c, result)):
+            verdict, why = "cannot be decided", without_test(c, result, test.remark)
+        elif p < LEVEL and (why := negligible(c, result)):
             verdict = "no difference shown"
         elif p < LEVEL:
-            reason = next(objections(test, basis, result, moved), "")
-            verdict = "not supported" if reason else "lower" if test.sign < 0 else "higher"
-        elif reason := too_few(test, basis, with_p):
+            why = next(objections(test, basis, result, moved), None)
+            verdict = "not supported" if why else "lower" if test.sign < 0 else "higher"
+        elif basis == "values" and (why := too_few(c, with_p)):
             verdict = "cannot be decided"
         else:
-            few = c.days.few if c.days is not None and basis == "days" else ""
-            verdict, reason = "no difference shown", hidden(c, result) or few
+            verdict, why = "no difference shown", hidden(c, result, with_p)
         simulated = simulated_difference(c, result.conditions)
         wanted = days_to_decide(c) if math.isnan(p) else None
-        found.append(
-            Conclusion(c, verdict, test.difference, p, reason, simulated, test.words, wanted)
-        )
+        found.append(Conclusion(c, verdict, test.difference, p, why, simulated, test.words, wanted))
     ordered = tuple(sorted(found, key=lambda one: one.comparison.measure.place))
     return Conclusions(basis, ordered, with_p)
+
+
+def reasons(result: StudyResult) -> tuple[FindingGroup, ...]:
+    """Return the findings that verdicts follow from, each with its measures."""
+    found: dict[Finding, list[str]] = {}
+    for pair in (result, *result.further_pairs):
+        concluded = conclude(pair)
+        for one in () if concluded is None else concluded.each:
+            if one.finding is not None:
+                found.setdefault(one.finding, []).append(one.comparison.measure.short)
+    return tuple(
+        FindingGroup(finding, (), series(list(dict.fromkeys(measures))))
+        for finding, measures in found.items()
+    )
 
 
 def conclusion_rows(result: StudyResult) -> list[dict[str, Any]]:
@@ -141,6 +167,7 @@ def conclusion_rows(result: StudyResult) -> list[dict[str, Any]]:
             "tested_by": concluded.basis,
             "test": one.test,
             "reason": one.reason,
+            "finding": "" if one.finding is None else one.finding.name,
             "days_to_decide": one.days_to_decide,
             "caveat": caveats.get(one.comparison.measure.name, ""),
             **({} if one.simulated is None else _simulated_row(one.simulated)),

@@ -15,7 +15,7 @@ from rigidimeter.analysis.statistics import (
 from rigidimeter.analysis.study.compared import Comparison, comparison_rows
 from rigidimeter.analysis.study.measures import Measure
 from rigidimeter.analysis.study.ratings_found import RatingsFound
-from rigidimeter.core.records import Analysis, Epoch, Fit, Notice, Score
+from rigidimeter.core.records import Analysis, Epoch, FindingGroup, Fit, Notice, Score
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.words import html_table, interval_text, one_cell, one_line, with_error
 
@@ -249,6 +249,13 @@ class StudyResult:
         from rigidimeter.analysis.study.statements import statements
 
         return statements(self)
+
+    @property
+    def findings(self) -> tuple[FindingGroup, ...]:
+        """What the checks found in the epochs, and the reasons of the verdicts, by measures."""
+        from rigidimeter.analysis.study.conclusions import reasons
+
+        return (*self.analysis.findings, *reasons(self))
 
     def table(self, *, full: bool = False) -> pd.DataFrame:
         """Return the comparisons as a pandas table, a row for each measure.

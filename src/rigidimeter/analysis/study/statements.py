@@ -58,7 +58,9 @@ def lead(result: StudyResult) -> str:
     if concluded is None:
         return prefix + _only_condition(result)
     shown = concluded.of("lower", "higher")
-    said = _quoted(shown) if shown else f"{_measured(concluded)} {_concluded(concluded)[0]}"
+    said = f"{_measured(concluded)} {_concluded(concluded)[0]}"
+    if shown:
+        said = f"{_quoted(shown)}{_adjusted(concluded)}."
     paths = {out.path for out in result.left_out}
     if paths:
         total = len(paths | {session.source for session in result.sessions})
@@ -80,7 +82,7 @@ def _quoted(shown: Sequence[Conclusion]) -> str:
         was = " was" if not parts else ""
         inside.append(_p_text(one.p))
         parts.append(f"{title}{was} {size.value} {one.verdict}{against} ({', '.join(inside)})")
-    return f"{series(parts)}."
+    return series(parts)
 
 
 class _Size(NamedTuple):
@@ -133,11 +135,14 @@ def _tested(concluded: Conclusions) -> str:
         return "Nothing could be tested."
     of = len(tests) > 1
     text = "; ".join(f"{test} ({', '.join(own)})" if of else test for test, own in tests.items())
+    return f"{text[:1].upper()}{text[1:]}{_adjusted(concluded)}."
+
+
+def _adjusted(concluded: Conclusions) -> str:
+    """Return for how many tests p is adjusted, as the end of a sentence that gives p."""
     count = concluded.adjusted_for
     what = "measures" if count == concluded.tested else "tests"
-    holm = f"; p adjusted by Holm’s method for {count} {what}, intervals not"
-    adjusted = holm if count > 1 else ""
-    return f"{text[:1].upper()}{text[1:]}{adjusted}."
+    return f"; p adjusted by Holm’s method for {count} {what}, intervals not" if count > 1 else ""
 
 
 def _concluded(concluded: Conclusions) -> list[str]:

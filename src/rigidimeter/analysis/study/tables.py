@@ -12,7 +12,7 @@ from typing import Any
 
 from rigidimeter.analysis.reading import estimates_document
 from rigidimeter.analysis.study.compared import comparison_rows, comparison_values, measure_names
-from rigidimeter.analysis.study.conclusions import conclusion_rows
+from rigidimeter.analysis.study.conclusions import conclusion_rows, reasons
 from rigidimeter.analysis.study.rating_relation import relations
 from rigidimeter.analysis.study.ratings_found import (
     RatingsFound,
@@ -58,6 +58,9 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
             if (said := statements(pair)) is not None
         ],
         "conclusion": result_table(result, "conclusion"),
+        "reasons": [
+            reason.row() | {"measures": measures} for reason, _, measures in reasons(result)
+        ],
         "quality": None if light is None else light.row(),
         "comparisons": [
             comparison_values(comparison) for comparison in (*result.comparisons, *result.further)

@@ -82,7 +82,9 @@ class FindingGroup(NamedTuple):
         return f"{one.level}  {one.name}  {one.headline}; {self.where}"
 
 
-def grouped(fits: Sequence[Fit], pooled: Sequence[Fit]) -> tuple[FindingGroup, ...]:
+def grouped(
+    fits: Sequence[Fit], pooled: Sequence[Fit], across: Sequence[Finding] = ()
+) -> tuple[FindingGroup, ...]:
     """Return what fits carry, once for each check and level, the most serious first.
 
     Parameters
@@ -91,6 +93,8 @@ def grouped(fits: Sequence[Fit], pooled: Sequence[Fit]) -> tuple[FindingGroup, .
         Of epochs.
     pooled : sequence of Fit
         To all epochs of a condition, and of all of them.
+    across : sequence of Finding
+        Of recordings, or of a subject, that no single fit carries.
     """
     carried: dict[tuple[str, str], list[tuple[Fit, Finding]]] = {}
     for fit in (*fits, *pooled):
@@ -101,6 +105,10 @@ def grouped(fits: Sequence[Fit], pooled: Sequence[Fit]) -> tuple[FindingGroup, .
         _, worst = max(members, key=lambda each: _beyond(each[1]))
         where = _where(members, worst, fits)
         groups.append(FindingGroup(worst, tuple(fit for fit, _ in members), where))
+    for finding in across:
+        of_one = f" in {finding.condition}" if finding.condition else ""
+        whose = f", subject {finding.facts['subject']}" if "subject" in finding.facts else ""
+        groups.append(FindingGroup(finding, (), f"all epochs together{of_one}{whose}"))
     return tuple(sorted(groups, key=lambda group: SERIOUS_FIRST.index(group.finding.level)))
 
 
@@ -146,7 +154,8 @@ class Analysis:
     epoch was included). `pooled` are the fits to all epochs of each condition together, and with
     several conditions to all epochs, whose condition is empty. `method_reason` says why a method
     was chosen where it was left open. `sensitivity` is what other bands give, where the
-    perturbation was recorded.
+    perturbation was recorded. `across` is what no fit of it carries: of recordings beside each
+    other, and of all epochs of a subject where there are several.
     """
 
     method: str
@@ -158,11 +167,12 @@ class Analysis:
     delays: tuple[Delay, ...] = ()
     method_reason: str = ""
     sensitivity: tuple[BandEstimate, ...] = ()
+    across: tuple[Finding, ...] = ()
 
     @property
     def findings(self) -> tuple[FindingGroup, ...]:
         """What the checks found: for each check and level the epochs, the most serious first."""
-        return grouped(self.fits, self.pooled)
+        return grouped(self.fits, self.pooled, self.across)
 
     @property
     def weight_in_stiffness(self) -> str:

@@ -118,10 +118,10 @@ def within(title: str) -> str:
 
     Examples
     --------
-    >>> within("Stiffness K")
-    'stiffness K'
+    >>> within("Stiffness K"), within("K differs")
+    ('stiffness K', 'K differs')
     """
-    return title[:1].lower() + title[1:]
+    return title[:1].lower() + title[1:] if title[1:2].islower() else title
 
 
 def condition_name(condition: str) -> str:

@@ -291,7 +291,9 @@ class TestTrafficLight:
 
     def test_scatter_between_epochs_is_no_caution_where_conditions_are_compared(self, study):
         finding = Finding("varying_between_epochs", "caution", 2.0, 1.0)
-        pooled = replace(study.analysis.fits[-1], condition="OFF", findings=(finding,))
+        pooled = replace(
+            study.analysis.fits[-1], epoch="pooled", condition="OFF", findings=(finding,)
+        )
         made = replace(study, analysis=replace(study.analysis, pooled=(pooled,)))
         light = traffic_light(made)
         assert (light.level, light.doubt, light.text) == ("good", "", "")

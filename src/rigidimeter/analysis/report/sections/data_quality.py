@@ -37,7 +37,7 @@ def _findings(result: StudyResult) -> Iterator[Block]:
         )
     else:
         yield paragraph("The checks found nothing." if n_fitted else "No epoch was fitted.")
-    for one, _, where in groups:
+    for one, _, where in result.findings:
         yield UNFOLDING.format(level=one.level, name=one.name, where=where, **one.words._asdict())
     yield Table(
         "finding_kinds",
