@@ -64,8 +64,8 @@ def ratings(
         typer.Option(
             "--contrast",
             metavar="A B",
-            help="Test A minus B. Default: the first two conditions in the file's order, OFF "
-            "first where it occurs.",
+            help="Test A minus B. Default: the second minus the first condition of the file, OFF "
+            "being first where it occurs.",
         ),
     ] = None,
     full: FullOption = False,
@@ -162,7 +162,7 @@ def _blocks(found: RatingsFound, full: bool) -> Iterator[Block]:
 
 
 def _contrast(found: RatingsFound) -> Iterator[Block]:
-    first, second = found.reference, found.other
+    first, second = found.other, found.reference
     c, (low, high) = found.contrast, found.interval
     way = "higher" if c.estimate > 0 else "lower" if c.estimate < 0 else "neither higher nor lower"
     yield (

@@ -187,7 +187,7 @@ def figure_5a(context: Context) -> Claim:
     p_paper = p_value(contrast.p_residual)
     return Claim(
         ours=f"virtual ratings: medians {medians}; offsets of the examiners "
-        f"{offsets.replace('-', '−')}; contrast OFF − DBS {number(contrast.estimate, 3)}, "
+        f"{offsets.replace('-', '−')}; contrast DBS − OFF {number(contrast.estimate, 3)}, "
         f"p = {p_paper}; with an offset for every day p = {p_days}",
         unpublished="The ratings were not published; virtual ones of the same number stand in.",
         figures=(

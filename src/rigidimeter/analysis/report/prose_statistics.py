@@ -29,7 +29,7 @@ def rating_sentences(result: StudyResult, cite: Cited) -> list[str]:
     sentences = [
         f"{plural(examiners, 'examiner')} gave {plural(len(found.rows), 'rating')}. They were "
         f"fitted by restricted maximum likelihood with a mean for each condition{offsets}; the "
-        f"contrast {condition_name(found.reference)} − {condition_name(found.other)} was tested as "
+        f"contrast {condition_name(found.other)} − {condition_name(found.reference)} was tested as "
         f"in {cite.by_name('kenward')}. A corrected score is a score less the predicted offsets."
     ]
     if found.contrast_days is not None:

@@ -64,7 +64,7 @@ def test_ratings_and_effects(fitted_study: Path, whole: StudyResult) -> None:
         [row["condition"] for row in rows],
         {"examiner": [row["examiner"] for row in rows]},
     )
-    assert whole.ratings.contrast == difference(fit, "OFF", "DBS")
+    assert whole.ratings.contrast == difference(fit, "DBS", "OFF")
     corrected = {name: [] for name in DAYS}
     for row, score in zip(rows, fit.corrected.tolist(), strict=True):
         corrected[row["condition"]].append(score)

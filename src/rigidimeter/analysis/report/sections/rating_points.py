@@ -63,7 +63,7 @@ def _blocks(result: StudyResult) -> Iterator[Block]:
     yield paragraph(f"Means of the model with 95 % Kenward–Roger intervals: {words}.")
     yield Table(
         "rating_contrast",
-        f"Contrast of the ratings, {found.reference} − {found.other}",
+        f"Contrast of the ratings, {found.other} − {found.reference}",
         (
             Column("freedom", "Degrees of freedom by", "text"),
             Column("estimate", f"Difference {INTERVAL}", ends=("low", "high")),
