@@ -21,7 +21,7 @@ from rigidimeter.core.words import (
     decimals,
     fixed,
     number,
-    p_value,
+    p_text,
     plural,
     series,
     within,
@@ -80,7 +80,7 @@ def _quoted(shown: Sequence[Conclusion]) -> str:
         inside += [one.test] if one.test and one.test != (shown[0].test if parts else "") else []
         title = within(c.measure.title) if parts else c.measure.title
         was = " was" if not parts else ""
-        inside.append(_p_text(one.p))
+        inside.append(p_text(one.p, LEAST_P))
         parts.append(f"{title}{was} {size.value} {one.verdict}{against} ({', '.join(inside)})")
     return series(parts)
 
@@ -203,9 +203,3 @@ def _only_condition(result: StudyResult) -> str:
     name = f"{condition_name(result.reference)}: " if result.reference else ""
     text = f"{name}{', '.join(parts)} (95 % intervals)."
     return text[:1].upper() + text[1:]
-
-
-def _p_text(p: float) -> str:
-    """Return a p-value as a sentence quotes it."""
-    text = p_value(p, 2) if p >= LEAST_P else f"< {LEAST_P:.4f}"
-    return f"p {text if text.startswith('<') else f'= {text}'}"

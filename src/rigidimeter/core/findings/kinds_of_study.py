@@ -24,7 +24,7 @@ STUDY_KINDS = (
         measured="The median J of {high} is {high_j:.4g} kg·m², that of {low} {low_j:.4g}, "
         "{value:.0f} % less (at most {limit:g} %).",
         meaning="B and K with J held at one median are wrong for both.",
-        remedy="Analyse different joints or subjects separately.",
+        remedy="Analyse different joints separately.",
         example={
             "value": 31.0,
             "limit": 15.0,
@@ -41,7 +41,7 @@ STUDY_KINDS = (
         "difference of the median J of two conditions, in % of the larger, where the test finds it",
         headline="Inertia differs by {value:.2g} %, and no treatment changes it",
         measured="The median J is {first:.4g} kg·m² in {reference} and {second:.4g} in {other}.",
-        meaning="The posture, the contact with the robot, a unit, or the subject's own torque was "
+        meaning="The posture, the contact with the robot, a unit, or torque from elsewhere was "
         "different, which changes B and K as well.",
         remedy="Compare how the arm was fixed, the units, and the torque beyond J, B and K.",
         variants={

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from rigidimeter.core.findings.kind import Kind
 from rigidimeter.core.findings.kinds import KINDS
-from rigidimeter.core.findings.sentence_parts import Shown, p_text
+from rigidimeter.core.words import Shown, p_text
 
 NO_CHANGE = 0.05
 """In %: less is shown as 0."""

@@ -9,7 +9,7 @@ from html import escape
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rigidimeter.core.findings import SERIOUS_FIRST, Finding, epochs_text
+from rigidimeter.core.findings import SERIOUS_FIRST, Finding
 from rigidimeter.core.records.estimates import (
     FIT_NUMBERS,
     PARAMETERS,
@@ -19,6 +19,7 @@ from rigidimeter.core.records.estimates import (
     Score,
 )
 from rigidimeter.core.words import (
+    epochs_text,
     html_table,
     interval_text,
     one_cell,
