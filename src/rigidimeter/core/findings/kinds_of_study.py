@@ -78,7 +78,7 @@ STUDY_KINDS = (
         remedy="Repeat these epochs, or use a method that the finding does not bias.",
         variants={
             "hides": {
-                "headline": "{cause} ({counts}) can hide one",
+                "headline": "{cause} can hide one: {counts}",
                 "measured": "There is {cause}{others} in {counts}.",
                 "meaning": "What it does to J, B and K can hide a difference.",
             },

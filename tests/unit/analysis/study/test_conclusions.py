@@ -83,7 +83,7 @@ def test_a_difference_that_stands_without_them_is_shown(study):
 def test_a_doubt_that_can_hide_a_difference_is_said(study):
     found = of(doubted(study, "lack_of_fit", in_dbs), "inertia_kg_m2")
     assert found.verdict == "no difference shown"
-    assert found.reason == "lack_of_fit (0 of 23 epochs in OFF, 19 of 19 in DBS) can hide one"
+    assert found.reason == "lack_of_fit can hide one: 0 of 23 epochs in OFF, 19 of 19 in DBS"
 
 
 def test_a_note_is_no_doubt_of_an_estimate_but_of_a_score_of_the_same_epoch(study):
