@@ -67,27 +67,10 @@ def _about(found: StudyResult) -> str:
 
 def difference_blocks(found: StudyResult) -> Iterator[Block]:
     """Yield what was found of each measure; of a virtual study beside what was simulated."""
-    from rigidimeter.analysis.study import conclude, difference_rows
+    from rigidimeter.analysis.study import difference_cells
 
-    concluded = conclude(found)
-    if concluded is None:
-        return
-    rows = difference_rows(concluded)
-    virtual = any(row.simulated for row in rows)
-    holm = "p, Holm" if concluded.adjusted_for > 1 else "p"
-    headings = ("", found.reference, found.other, f"{found.other} − {found.reference}",
-                "simulated" if virtual else "", "95 % interval", "" if virtual else holm,
-                "difference")  # fmt: skip
-    cells = [
-        (
-            ", ".join(filter(None, (row.measure, row.unit))),
-            *(row.reference, row.other, row.difference, row.simulated, row.interval),
-            "" if virtual else row.p,
-            row.verdict,
-        )
-        for row in rows
-    ]
-    yield Table(headings, cells, "=>>>>>>=", 1)
+    if found.other:
+        yield Table(*difference_cells(found), "=>>>>>>=", 1)
 
 
 def statement_blocks(found: StudyResult) -> Iterator[Block]:
