@@ -170,18 +170,18 @@ def conclusion_rows(result: StudyResult) -> list[dict[str, Any]]:
             "finding": "" if one.finding is None else one.finding.name,
             "days_to_decide": one.days_to_decide,
             "caveat": caveats.get(one.comparison.measure.name, ""),
-            **({} if one.simulated is None else _simulated_row(one.simulated)),
+            **(
+                {}
+                if (made := one.simulated) is None
+                else {
+                    "simulated_reference": made.reference,
+                    "simulated_other": made.other,
+                    "simulated_difference": made.estimate,
+                    "simulated_difference_percent": made.percent[0],
+                }
+            ),
         }
         for concluded in map(conclude, (result, *result.further_pairs))
         if concluded is not None
         for one in concluded.each
     ]
-
-
-def _simulated_row(found: Difference) -> dict[str, float]:
-    return {
-        "simulated_reference": found.reference,
-        "simulated_other": found.other,
-        "simulated_difference": found.estimate,
-        "simulated_difference_percent": found.percent[0],
-    }

@@ -128,7 +128,9 @@ def too_few(c: Comparison, tests: int) -> Finding | None:
     if least < LEVEL:
         return None
     of = f" for {tests} measures" if tests > 1 else ""
-    return found_between("too_few_values", {"first": n_x, "second": n_y, "of": of}, least, LEVEL)
+    facts: dict[str, Fact] = {"first": n_x, "second": n_y, "of": of}
+    facts["exact"] = 2.0 / math.comb(n_x + n_y, n_x)
+    return found_between("too_few_values", facts, least, LEVEL)
 
 
 def negligible(c: Comparison, result: StudyResult) -> Finding | None:

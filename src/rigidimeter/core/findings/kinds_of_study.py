@@ -136,11 +136,11 @@ STUDY_KINDS = (
         "the least p that so many values can have, after Holm's method",
         headline="{first} values against {second} cannot reach p < {limit:g}{of}",
         measured="Even where no value of one group is within the other, p of {first} against "
-        "{second} is {value:.2g}{of}.",
+        "{second} is {value:.2g}{of}, and {exact:.2g} by the exact test of one.",
         meaning="Whether the groups differ cannot be seen, whatever the values.",
         remedy="Measure more, or compare fewer columns at once.",
         unit="1",
-        example={"value": 0.081, "limit": 0.05, "first": 3, "second": 3},
+        example={"value": 0.16, "limit": 0.05, "first": 3, "second": 3, "exact": 0.1},
     ),
     Kind(
         "unused_recordings",
