@@ -7,12 +7,11 @@ below the level, and nothing that is known of the recordings can have made it (`
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from rigidimeter.analysis.statistics import holm
 from rigidimeter.analysis.study.compared import Comparison, measure_names
-from rigidimeter.analysis.study.days_to_decide import days_to_decide
 from rigidimeter.analysis.study.differences import Difference, simulated_difference
 from rigidimeter.analysis.study.objections import (
     hidden,
@@ -25,10 +24,17 @@ from rigidimeter.analysis.study.results import StudyResult
 from rigidimeter.analysis.study.sensitivity import method_caveats
 from rigidimeter.analysis.study.tested import LEVEL, Basis, basis_of, tested
 from rigidimeter.core.findings import Finding
-from rigidimeter.core.records import FindingGroup
+from rigidimeter.core.records import PARAMETERS, FindingGroup
 from rigidimeter.core.words import series, within
+from rigidimeter.planning import ASSUMED, day_difference_sd, pairs_needed
 
 Verdict = Literal["lower", "higher", "no difference shown", "not supported", "cannot be decided"]
+
+WANTED = 0.2
+"""The difference, as a share of the reference."""
+
+_MIN_EPOCHS = 3
+"""With fewer epochs of a condition their scatter is the assumed one."""
 
 
 @dataclass(frozen=True)
@@ -137,6 +143,32 @@ def conclude(result: StudyResult) -> Conclusions | None:
         found.append(Conclusion(c, verdict, test.difference, p, why, simulated, test.words, wanted))
     ordered = tuple(sorted(found, key=lambda one: one.comparison.measure.place))
     return Conclusions(basis, ordered, with_p)
+
+
+def days_to_decide(c: Comparison) -> int | None:
+    """Return how many days with both conditions would show a difference of `WANTED`.
+
+    The SD of the difference of one day is that of `rigidimeter.planning.days_needed`, with the
+    scatter between epochs of these recordings and the scatter of days that is assumed there, since
+    a single day does not show it. With as many epochs a day as there are, at a power of 0.8 and a
+    level of 0.05 for this measure alone. None for other measures than J, B and K, and where a
+    condition has no epoch.
+    """
+    title = {parameter.name: parameter.title for parameter in PARAMETERS}.get(c.measure.name)
+    each = [c.of(name) for name in c.pair]
+    if title is None or c.measure.origin != "fits" or not all(each):
+        return None
+    values = [math.fsum(o.value for o in own) / len(own) for own in each]
+    days = [len({(o.subject, o.day, o.source) for o in own}) for own in each]
+    epochs = [max(round(len(own) / n), 1) for own, n in zip(each, days, strict=True)]
+    scatter = ASSUMED[title]
+    if min(map(len, each)) >= _MIN_EPOCHS:
+        within = max(c.summaries[name].sd_percent for name in c.pair)
+        scatter = replace(scatter, between_epochs_percent=within)
+    if min(values) <= 0:
+        return None
+    sd = day_difference_sd(scatter, (values[0], values[1]), (0.0, 0.0), (epochs[0], epochs[1]))
+    return pairs_needed(WANTED * values[0], sd)
 
 
 def reasons(result: StudyResult) -> tuple[FindingGroup, ...]:

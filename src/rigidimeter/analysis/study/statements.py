@@ -10,8 +10,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 
-from rigidimeter.analysis.study.conclusions import Conclusion, Conclusions, conclude
-from rigidimeter.analysis.study.days_to_decide import WANTED
+from rigidimeter.analysis.study.conclusions import WANTED, Conclusion, Conclusions, conclude
 from rigidimeter.analysis.study.differences import Three
 from rigidimeter.analysis.study.reached_precision import precisions
 from rigidimeter.analysis.study.results import StudyResult

@@ -29,7 +29,7 @@ from rigidimeter.analysis.study import (
     traffic_light,
 )
 from rigidimeter.analysis.study.comparison import day_test, no_days
-from rigidimeter.analysis.study.days_to_decide import days_to_decide
+from rigidimeter.analysis.study.conclusions import days_to_decide
 from rigidimeter.analysis.study.differences import by_units
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Epoch, Outcome
