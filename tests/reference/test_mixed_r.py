@@ -1,6 +1,7 @@
 """The mixed model against R (lme4, lmerTest, pbkrtest); scripts lie beside the numbers."""
 
 import csv
+import itertools
 import math
 import os
 import shutil
@@ -16,7 +17,6 @@ from rigidimeter.analysis.statistics import (
     fit_mixed,
     joint_test,
     nested,
-    pairwise,
     ranksum,
 )
 
@@ -53,7 +53,8 @@ def ours(fit: Mixed) -> dict[str, float]:
     found |= {f"variance_{name}": variance for name, variance in fit.variances.items()}
     for name, offsets in fit.offsets.items():
         found |= {f"offset_{name}_{label}": offset for label, offset in offsets.items()}
-    for (first, second), test in pairwise(fit).items():
+    for first, second in itertools.combinations(fit.conditions, 2):
+        test = difference(fit, first, second)
         found |= {f"{key}_{first}-{second}": getattr(test, key) for key in TESTS}
     return found | {
         "variance_Residual": fit.variance_residual,

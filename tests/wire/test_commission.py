@@ -185,13 +185,12 @@ def test_a_dead_sensor_is_caught_and_the_record_says_so(
 
     # What it asks of the system would last for the tests after it.
     monkeypatch.setattr(
-        "rigidimeter.rig.acquisition.processes.prepare_loop_process",
-        lambda: SimpleNamespace(),
+        "rigidimeter.cli.rig_checks.prepare_loop_process", lambda: SimpleNamespace()
     )
     can_bench.misbehave("torque", "silent")
     out = can_bench.rig.with_name("dead.json")
     with pytest.raises(UserError, match="not fit for a person: a check failed: devices read back"):
-        command(can_bench.rig, None, "A. Weber", True, None, None, out)
+        command(can_bench.rig, None, "A. Weber", True, None, None, out, None)
     assert "FAIL" in capsys.readouterr().out
     record = read_record(out)
     assert record.signed_by == "A. Weber"

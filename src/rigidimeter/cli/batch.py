@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from rigidimeter.cli.help_pages import RUN, WRITE
-from rigidimeter.cli.inputs import keep_inputs
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.output import echo, keep_inputs
+from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.core.errors import UserError
 
@@ -20,36 +19,13 @@ _SHOWN = 20
 @reads_recordings
 def batch(
     recordings: Recordings,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out",
-            metavar="FILE",
-            help="The table, .parquet or .csv.",
-            rich_help_panel=WRITE,
-        ),
-    ],
-    jobs: Annotated[
-        int,
-        typer.Option(
-            "--jobs",
-            metavar="N",
-            min=1,
-            max=1024,
-            help="Processes on this machine.",
-            rich_help_panel=RUN,
-        ),
-    ] = 1,
-    scheduler: Annotated[
-        str,
-        typer.Option(
-            "--scheduler",
-            metavar="ADDRESS",
-            help="Dask scheduler, such as tcp://host:8786. Its workers do the work instead of "
-            "--jobs.",
-            rich_help_panel=RUN,
-        ),
-    ] = "",
+    out: Path = WRITE.option("--out FILE", "The table, .parquet or .csv.", ...),
+    jobs: int = RUN.option("--jobs N", "Processes on this machine.", 1, min=1, max=1024),
+    scheduler: str = RUN.option(
+        "--scheduler ADDRESS",
+        "Dask scheduler, such as tcp://host:8786. Its workers do the work instead of --jobs.",
+        "",
+    ),
 ) -> None:
     """Estimate many recordings into one table, a row for each epoch.
 
@@ -67,7 +43,6 @@ def batch(
       rigidimeter batch study --out results.parquet --scheduler tcp://host:8786
     """
     from rigidimeter.analysis.batch import batch as run_batch
-    from rigidimeter.cli.progress import Meter
 
     _refuse(recordings)
     keep_inputs((out,), recordings.paths)

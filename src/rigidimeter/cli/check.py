@@ -3,72 +3,47 @@
 from __future__ import annotations
 
 import math
-import sys
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from rigidimeter.cli.commission import claimed, table
-from rigidimeter.cli.inputs import keep_inputs
-from rigidimeter.cli.operator_answers import operator
-from rigidimeter.cli.options import SettingsOption
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.help_pages import OPTIONS, argument
+from rigidimeter.cli.options import SETTINGS
+from rigidimeter.cli.output import echo, keep_inputs
 from rigidimeter.cli.terminal_tables import show
 from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
     from rigidimeter.core.settings import Settings
-    from rigidimeter.rig.commissioning import DailyRecord, Operator, ZeroFound
-    from rigidimeter.rig.devices import RigFile
+    from rigidimeter.rig.commissioning import DailyRecord, ZeroFound
 
 
 def check(
-    rig: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="[RIG.toml]",
-            help="The rig file. Without one: the virtual rig on a simulated clock, to see how it "
-            "is done; nothing is recorded.",
-            show_default=False,
-        ),
-    ] = None,
-    settings: SettingsOption = None,
-    known_inertia: Annotated[
-        float | None,
-        typer.Option(
-            "--known-inertia-kg-m2",
-            metavar="J",
-            help="True inertia beyond the torque sensor. Such as a weight on the cuff; compared "
-            "in place of the reference.",
-        ),
-    ] = None,
-    new_reference: Annotated[
-        bool,
-        typer.Option(
-            "--new-reference",
-            help="Keep today's inertia as the reference. After the cuff or the handle was changed.",
-        ),
-    ] = False,
-    zero: Annotated[
-        bool,
-        typer.Option(
-            "--zero",
-            help="Only zero and noise of the torque sensor. Without power, by the limits of "
-            "[zeroing], as `run` does when it begins; nothing is recorded.",
-        ),
-    ] = False,
-    yes: Annotated[
-        bool,
-        typer.Option(
-            "--yes",
-            help="Consent in advance, for an emulated rig only.",
-        ),
-    ] = False,
-    piped: Annotated[
-        bool,
-        typer.Option("--piped", hidden=True, help="A program asks somebody and pipes the answer."),
-    ] = False,
+    rig: Path | None = argument(
+        "[RIG.toml]",
+        "The rig file. Without one: the virtual rig on a simulated clock, to see how it is done; "
+        "nothing is recorded.",
+        None,
+    ),
+    settings: Path | None = SETTINGS,
+    known_inertia: float | None = OPTIONS.option(
+        "--known-inertia-kg-m2 J",
+        "True inertia beyond the torque sensor. Such as a weight on the cuff; compared in place "
+        "of the reference.",
+    ),
+    new_reference: bool = OPTIONS.flag(
+        "--new-reference",
+        "Keep today's inertia as the reference. After the cuff or the handle was changed.",
+    ),
+    zero: bool = OPTIONS.flag(
+        "--zero",
+        "Only zero and noise of the torque sensor. Without power, by the limits of [zeroing], as "
+        "`run` does when it begins; nothing is recorded.",
+    ),
+    yes: bool = OPTIONS.flag("--yes", "Consent in advance, for an emulated rig only."),
+    piped: bool = OPTIONS.flag(
+        "--piped", "A program asks somebody and pipes the answer.", hidden=True
+    ),
 ) -> None:
     """Check a commissioned rig, every day before the first run.
 
@@ -84,8 +59,19 @@ def check(
       rigidimeter check RIG.toml --known-inertia-kg-m2 0.012
       rigidimeter check RIG.toml --zero
     """
-    from rigidimeter.cli.virtual_check import virtual_check, virtual_zero
+    from rigidimeter.cli.rig_checks import claimed, operator, require_answers
+    from rigidimeter.cli.virtual_check import virtual_check, virtual_setup
     from rigidimeter.core.settings import load_settings
+    from rigidimeter.core.version import __version__
+    from rigidimeter.rig.commissioning import (
+        Compared,
+        check_record,
+        daily_check,
+        daily_path,
+        read_daily,
+        write_daily,
+        zero_check,
+    )
     from rigidimeter.rig.devices import load_rig
 
     rigfile, chosen = None if rig is None else load_rig(rig), load_settings(settings)
@@ -96,18 +82,43 @@ def check(
     if rigfile is None:
         if known_inertia is not None or new_reference:
             raise UserError("--known-inertia-kg-m2 and --new-reference need a RIG.toml")
-        asked = operator(yes=not piped, piped=piped)
+        setup = virtual_setup(chosen, operator(yes=not piped, piped=piped))
         if zero:
-            _say_zero(virtual_zero(chosen, asked), chosen)
+            _say_zero(zero_check(setup), chosen)
         else:
-            _say_checked(virtual_check(chosen, asked), chosen, "the virtual rig")
+            _say_checked(virtual_check(setup), chosen, "the virtual rig")
         return
+    path = daily_path(rigfile.path)
     if zero:
-        _zero(rigfile, chosen, operator(yes=True))
+        with claimed(rigfile, chosen, path, "do it again", operator(yes=True)) as setup:
+            at_rest = zero_check(setup)
+        _say_zero(at_rest, chosen)
         return
-    _require_answers(rigfile, yes=yes, piped=piped)
+    if yes and not rigfile.emulated:
+        raise UserError(
+            f"{rig}: is real hardware; somebody must check that nobody's arm is in it and "
+            "answer, so leave out --yes"
+        )
+    require_answers(yes=yes, piped=piped)
+    keep_inputs((path,), filter(None, (rig, settings)))
+    check_record(rigfile, None, chosen)
+    try:
+        before = read_daily(path).reference if path.exists() else None
+    except UserError as error:
+        if not new_reference:
+            raise UserError(f"{error}; its reference is lost, so add --new-reference") from None
+        before = None
     asked = operator(yes=yes, piped=piped)
-    path, found = _check(rigfile, chosen, settings, asked, known_inertia, new=new_reference)
+    with claimed(rigfile, chosen, path, "check the rig again", asked) as setup:
+        found = daily_check(
+            setup,
+            rigfile,
+            lambda facts: check_record(rigfile, facts, chosen),
+            compared=Compared(known_inertia, before, new_reference),
+            made_utc=datetime.now(UTC).isoformat(timespec="seconds"),
+            software=__version__,
+        )
+    write_daily(path, found)
     echo(f"Record: {path}")
     _say_checked(found, chosen, f"{rig}")
     kept = found.reference
@@ -117,80 +128,15 @@ def check(
     echo(f"Valid until {found.valid_until:%Y-%m-%d %H:%M} UTC.")
 
 
-def _require_answers(rigfile: RigFile, *, yes: bool, piped: bool) -> None:
-    if yes and not rigfile.emulated:
-        raise UserError(
-            f"{rigfile.path}: is real hardware; somebody must check that nobody's arm is in it and "
-            "answer, so leave out --yes"
-        )
-    if not yes and not piped and not sys.stdin.isatty():
-        raise UserError(
-            "nobody can answer the question; use a terminal, or --yes on an emulated rig"
-        )
-
-
-def _check(
-    rigfile: RigFile,
-    chosen: Settings,
-    settings: Path | None,
-    asked: Operator,
-    known_inertia: float | None,
-    *,
-    new: bool,
-) -> tuple[Path, DailyRecord]:
-    """Check a rig and write the record; return both."""
-    from datetime import UTC, datetime
-
-    from rigidimeter.core.version import __version__
-    from rigidimeter.rig.commissioning import (
-        Compared,
-        check_record,
-        daily_check,
-        daily_path,
-        read_daily,
-        write_daily,
-    )
-
-    rig = rigfile.path
-    path = daily_path(rig)
-    keep_inputs((path,), (rig, settings) if settings is not None else (rig,))
-    check_record(rigfile, None, chosen)
-    try:
-        before = read_daily(path).reference if path.exists() else None
-    except UserError as error:
-        if not new:
-            raise UserError(f"{error}; its reference is lost, so add --new-reference") from None
-        before = None
-    with claimed(rigfile, chosen, path, "check the rig again", asked) as setup:
-        found = daily_check(
-            setup,
-            rigfile,
-            lambda facts: check_record(rigfile, facts, chosen),
-            compared=Compared(known_inertia, before, new),
-            made_utc=datetime.now(UTC).isoformat(timespec="seconds"),
-            software=__version__,
-        )
-    write_daily(path, found)
-    return path, found
-
-
 def _say_checked(found: DailyRecord, settings: Settings, what: str) -> None:
     """Show the checks; a rig that is not fit ends the program with status 1."""
+    from rigidimeter.cli.rig_checks import table
     from rigidimeter.rig.commissioning import sign_words
 
     show([table(found.checks)])
     if found.objection:
         raise UserError(f"{what}: not fit for a person today: {found.objection}")
     show([sign_words(settings, found.checks)])
-
-
-def _zero(rigfile: RigFile, settings: Settings, asked: Operator) -> None:
-    from rigidimeter.rig.commissioning import daily_path, zero_check
-
-    path = daily_path(rigfile.path)
-    with claimed(rigfile, settings, path, "do it again", asked) as setup:
-        found = zero_check(setup)
-    _say_zero(found, settings)
 
 
 def _say_zero(found: ZeroFound, settings: Settings) -> None:

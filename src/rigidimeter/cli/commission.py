@@ -2,81 +2,48 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
-import signal
-import sys
-import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from types import FrameType
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from rigidimeter.cli.inputs import keep_inputs
-from rigidimeter.cli.operator_answers import operator
-from rigidimeter.cli.options import SettingsOption
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.help_pages import OPTIONS
+from rigidimeter.cli.options import SETTINGS
+from rigidimeter.cli.output import echo, keep_inputs
 from rigidimeter.cli.terminal_tables import Table, show
 from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.core.settings import Settings
-    from rigidimeter.rig.commissioning import Operator, RigCheck, Setup
-    from rigidimeter.rig.devices import RigFile
+    pass
 
 
 def commission(
-    rig: Annotated[
-        Path | None, typer.Option("--rig", metavar="RIG.toml", help="The rig file.")
-    ] = None,
-    settings: SettingsOption = None,
-    signed_by: Annotated[
-        str,
-        typer.Option(
-            "--signed-by", metavar="NAME", help="Who is responsible for the rig; recorded."
-        ),
-    ] = "",
-    yes: Annotated[
-        bool,
-        typer.Option(
-            "--yes",
-            help="Consent to every motion in advance. Checks that need a person are skipped, so "
-            "the record is valid for an emulated rig only.",
-        ),
-    ] = False,
-    known_torque: Annotated[
-        float | None,
-        typer.Option(
-            "--known-torque-nm",
-            metavar="NM",
-            help="Known torque, applied by hand or by a weight. It acts toward positive angles.",
-        ),
-    ] = None,
-    known_angle: Annotated[
-        float | None,
-        typer.Option(
-            "--known-angle-deg",
-            metavar="DEG",
-            help="Known angle by which you turn the joint. By hand, with the drive off.",
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", metavar="FILE", help="The record. Default: a file next to the rig file."
-        ),
-    ] = None,
-    eds: Annotated[
-        Path | None,
-        typer.Option(
-            "--eds",
-            metavar="FILE",
-            help="Only compare a CANopen drive's EDS. With what the rig file writes, or with the "
-            "driver's defaults without one; nothing is connected.",
-        ),
-    ] = None,
+    rig: Path | None = OPTIONS.option("--rig RIG.toml", "The rig file."),
+    settings: Path | None = SETTINGS,
+    signed_by: str = OPTIONS.option(
+        "--signed-by NAME", "Who is responsible for the rig; recorded.", ""
+    ),
+    yes: bool = OPTIONS.flag(
+        "--yes",
+        "Consent to every motion in advance. Checks that need a person are skipped, so the "
+        "record is valid for an emulated rig only.",
+    ),
+    known_torque: float | None = OPTIONS.option(
+        "--known-torque-nm NM",
+        "Known torque, applied by hand or by a weight. It acts toward positive angles.",
+    ),
+    known_angle: float | None = OPTIONS.option(
+        "--known-angle-deg DEG",
+        "Known angle by which you turn the joint. By hand, with the drive off.",
+    ),
+    out: Path | None = OPTIONS.option(
+        "--out FILE", "The record. Default: a file next to the rig file."
+    ),
+    eds: Path | None = OPTIONS.option(
+        "--eds FILE",
+        "Only compare a CANopen drive's EDS. With what the rig file writes, or with the driver's "
+        "defaults without one; nothing is connected.",
+    ),
 ) -> None:
     """Check a new rig with nobody in it, before its first run.
 
@@ -94,6 +61,7 @@ def commission(
     """
     from datetime import UTC, datetime
 
+    from rigidimeter.cli.rig_checks import claimed, operator, require_answers, table
     from rigidimeter.core.settings import load_settings
     from rigidimeter.core.version import __version__
     from rigidimeter.rig.commissioning import commission_rig, record_path, sign_words, write_record
@@ -108,10 +76,7 @@ def commission(
     path = out or record_path(rig)
     keep_inputs((path,), (rig, settings) if settings is not None else (rig,))
     _check_known({"--known-torque-nm": known_torque, "--known-angle-deg": known_angle})
-    if not yes and not sys.stdin.isatty():
-        raise UserError(
-            "nobody can answer the questions; use a terminal, or --yes on an emulated rig"
-        )
+    require_answers(yes=yes)
     if not rigfile.emulated and not signed_by.strip():
         raise UserError(
             f"{rig}: is real hardware; name the person responsible for it with --signed-by NAME"
@@ -155,71 +120,8 @@ def _compare_eds(eds: Path, rig: Path | None) -> None:
     echo("Every object fits. What the drive does with them only commissioning shows.")
 
 
-@contextlib.contextmanager
-def claimed(
-    rigfile: RigFile,
-    settings: Settings,
-    record: Path,
-    again: str,
-    asked: Operator,
-) -> Iterator[Setup]:
-    """Prepare this process for the loop and claim the rig; give it, not connected yet.
-
-    An interrupt says that `record` was not written, and to do it `again`.
-    """
-    from rigidimeter.rig.acquisition import DeadlineClock
-    from rigidimeter.rig.acquisition.processes import prepare_loop_process
-    from rigidimeter.rig.commissioning import Setup, Timebase
-
-    for line in str(prepare_loop_process()).splitlines():
-        echo(line, err=True)
-    clock = DeadlineClock()
-    with rigfile.claim() as lock, interrupted_once(record, again):
-        rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, lock=lock)
-        yield Setup(rig, settings, Timebase(clock.now_s, clock.wait_until), asked)
-
-
-@contextlib.contextmanager
-def interrupted_once(record: Path, again: str) -> Iterator[None]:
-    """Let Ctrl-C, Ctrl-\\, SIGTERM and the end of the terminal end it, once; say what that left.
-
-    A second one would break off the steps that bring the drive to rest and take its power away.
-    """
-    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
-    before = {}
-
-    def ended(_: int, __: FrameType | None) -> None:
-        for number in signals:
-            signal.signal(number, signal.SIG_IGN)
-        raise KeyboardInterrupt
-
-    if threading.current_thread() is threading.main_thread():
-        before = {number: signal.signal(number, ended) for number in signals}
-    try:
-        yield
-    except (KeyboardInterrupt, typer.Abort):
-        raise UserError(
-            f"interrupted: the rig was stopped, and {record} was not written; {again}"
-        ) from None
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
 def _check_known(known: Mapping[str, float | None]) -> None:
     """Refuse a known value with which nothing can be compared."""
     for option, value in known.items():
         if value is not None and not (math.isfinite(value) and value != 0):
             raise UserError(f"{option} {value:g}: must be a number other than 0")
-
-
-def table(checks: Sequence[RigCheck]) -> Table:
-    """Return the checks, each with its remedy below where it has one."""
-    marks = {"passed": "ok", "failed": "FAIL"}
-    rows: list[Sequence[str] | str] = []
-    for check in checks:
-        found = "" if check.value is None else check.words
-        rows.append((marks.get(check.outcome, "–"), check.name, found, check.limit))
-        if check.remedy:
-            rows.append(f"      {check.remedy}")
-    return Table(("", "check", "found", "must be"), rows, "=<<<", indent=0)

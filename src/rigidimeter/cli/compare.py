@@ -4,23 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from rigidimeter.cli.comparison_text import comparison_blocks
 from rigidimeter.cli.help_pages import COMPARE, ESTIMATE
-from rigidimeter.cli.inputs import (
-    analyse_recordings,
-    analyse_study_folder,
-    keep_inputs,
-    say,
-    say_analysed,
-    study_files,
-    study_of,
-)
-from rigidimeter.cli.options import CsvOption, FullOption, JsonOption, KeyOption
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.options import CSV, FULL, JSON, KEY
+from rigidimeter.cli.output import echo, keep_inputs, say
+from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import show
 from rigidimeter.core.errors import UserError
@@ -32,80 +23,32 @@ if TYPE_CHECKING:
 @reads_recordings
 def compare(
     recordings: Recordings,
-    reference: Annotated[
-        str | None,
-        typer.Option(
-            "--reference",
-            metavar="NAME",
-            help="Reference condition. Default: OFF if there is one, else the first. Differences "
-            "are other minus reference; the rank-sum shift in --full is reference minus other.",
-            rich_help_panel=COMPARE,
-        ),
-    ] = None,
-    other: Annotated[
-        str | None,
-        typer.Option(
-            "--other",
-            metavar="NAME",
-            help="The other condition. Default: the next one, and each further one is compared "
-            "with the first, too.",
-            rich_help_panel=COMPARE,
-        ),
-    ] = None,
-    json_out: JsonOption = None,
-    csv_out: CsvOption = None,
-    value: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--value",
-            metavar="COLUMN",
-            help="Compare this column of one CSV table. Repeat for several.",
-            rich_help_panel=COMPARE,
-        ),
-    ] = None,
-    by: Annotated[
-        str,
-        typer.Option(
-            "--by",
-            metavar="COLUMN",
-            help="With --value: column of conditions.",
-            rich_help_panel=COMPARE,
-        ),
-    ] = "condition",
-    session: Annotated[
-        str | None,
-        typer.Option(
-            "--session",
-            metavar="COLUMN",
-            help="With --value: the bootstrap resamples the labels of this column. Default: rows.",
-            rich_help_panel=COMPARE,
-            hidden=True,
-        ),
-    ] = None,
-    seed: Annotated[
-        int,
-        typer.Option(
-            "--seed",
-            min=0,
-            metavar="N",
-            help="Seed of the bootstrap.",
-            rich_help_panel=ESTIMATE,
-            hidden=True,
-        ),
-    ] = 1,
-    resamples: Annotated[
-        int,
-        typer.Option(
-            "--resamples",
-            min=100,
-            metavar="N",
-            help="Resamples of the bootstrap.",
-            rich_help_panel=ESTIMATE,
-            hidden=True,
-        ),
-    ] = 9999,
-    key: KeyOption = None,
-    full: FullOption = False,
+    reference: str | None = COMPARE.option(
+        "--reference NAME",
+        "Reference condition. Default: OFF if there is one, else the first. Differences are "
+        "other minus reference; the rank-sum shift in --full is reference minus other.",
+    ),
+    other: str | None = COMPARE.option(
+        "--other NAME",
+        "The other condition. Default: the next one, and each further one is compared with the "
+        "first, too.",
+    ),
+    json_out: Path | None = JSON,
+    csv_out: Path | None = CSV,
+    value: list[str] | None = COMPARE.option(
+        "--value COLUMN", "Compare this column of one CSV table. Repeat for several."
+    ),
+    by: str = COMPARE.option("--by COLUMN", "With --value: column of conditions.", "condition"),
+    session: str | None = COMPARE.further(
+        "--session COLUMN",
+        "With --value: the bootstrap resamples the labels of this column. Default: rows.",
+    ),
+    seed: int = ESTIMATE.further("--seed N", "Seed of the bootstrap.", 1, min=0),
+    resamples: int = ESTIMATE.further(
+        "--resamples N", "Resamples of the bootstrap.", 9999, min=100
+    ),
+    key: Path | None = KEY,
+    full: bool = FULL,
 ) -> None:
     """Compare conditions in J, B, K, angular impulse and work.
 
@@ -129,7 +72,13 @@ def compare(
       rigidimeter compare ratings.csv --value score --by condition
     """
     from rigidimeter.analysis import study as studies
-    from rigidimeter.cli.progress import Meter
+    from rigidimeter.cli.comparison_text import comparison_blocks
+    from rigidimeter.cli.inputs import (
+        analyse_recordings,
+        analyse_study_folder,
+        study_files,
+        study_of,
+    )
 
     outputs = (json_out, csv_out)
     paths = recordings.paths
@@ -151,12 +100,12 @@ def compare(
     keep_inputs(outputs, paths)
     if is_json and not value and len(paths) > 1:
         raise UserError("compare takes one JSON file of estimates, or recordings, not both")
-    analysed = None if value or is_json else analyse_recordings(recordings)
+    analysed = None if value or is_json else analyse_recordings(recordings)[1]
     status = 0
     try:
         with Meter("compare", 1.0) as meter:
             found = studies.compare(
-                paths[0] if analysed is None else analysed[1],
+                paths[0] if analysed is None else analysed.result.analysis,
                 other,
                 reference=reference,
                 value=value,
@@ -167,13 +116,14 @@ def compare(
                 progress=meter.advance,
             )
         if analysed is not None:
-            found = replace(found, epochs=analysed[0].epochs, settings=analysed[0].settings)
+            read = analysed.result
+            found = replace(found, epochs=read.epochs, settings=read.settings)
         _write(found, *outputs)
         show(comparison_blocks(found, full=full))
         say(found.notices)
     finally:
         if analysed is not None:
-            status = say_analysed(*analysed)
+            status = analysed.say()
     raise typer.Exit(status)
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
+from markupsafe import Markup
+
+from rigidimeter.analysis.report import shown_tables, source_names
+from rigidimeter.analysis.study import StudyResult, difference_cells, lead, statements
 from rigidimeter.cli.terminal_tables import Block, Heading, Table, paragraph, shown_table
-from rigidimeter.core.words import plural
-
-if TYPE_CHECKING:
-    from rigidimeter.analysis.study import StudyResult
-    from rigidimeter.core.records import Analysis, Fit, Score
+from rigidimeter.core.records import Analysis
+from rigidimeter.core.words import condition_name, plural
 
 MOST_FINDINGS = 3
 
@@ -46,8 +46,6 @@ def comparison_blocks(found: StudyResult, *, full: bool = False) -> Iterator[Blo
 
 def _about(found: StudyResult) -> str:
     """Return what was compared, and how much of it."""
-    from rigidimeter.core.words import condition_name
-
     names = [found.reference, *(each.other for each in (found, *found.further_pairs))]
     parts = [" and ".join(condition_name(name) for name in dict.fromkeys(names) if name)]
     if found.virtual or any(epoch.virtual for epoch in found.epochs):
@@ -57,9 +55,7 @@ def _about(found: StudyResult) -> str:
     if found.sessions:
         parts.append(plural(len({each.subject for each in found.sessions}), "subject"))
         parts.append(plural(len({(s.subject, s.day) for s in found.sessions}), "day"))
-    analysis = found.analysis
-    results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
-    if results:
+    if results := found.analysis.results:
         used = sum(one.outcome.included for one in results)
         parts.append(f"{plural(len(results), 'epoch')}, {used} used")
     return " · ".join(parts)
@@ -67,33 +63,12 @@ def _about(found: StudyResult) -> str:
 
 def difference_blocks(found: StudyResult) -> Iterator[Block]:
     """Yield what was found of each measure; of a virtual study beside what was simulated."""
-    from rigidimeter.analysis.study import conclude, difference_rows
-
-    concluded = conclude(found)
-    if concluded is None:
-        return
-    rows = difference_rows(concluded)
-    virtual = any(row.simulated for row in rows)
-    holm = "p, Holm" if concluded.adjusted_for > 1 else "p"
-    headings = ("", found.reference, found.other, f"{found.other} − {found.reference}",
-                "simulated" if virtual else "", "95 % interval", "" if virtual else holm,
-                "difference")  # fmt: skip
-    cells = [
-        (
-            ", ".join(filter(None, (row.measure, row.unit))),
-            *(row.reference, row.other, row.difference, row.simulated, row.interval),
-            "" if virtual else row.p,
-            row.verdict,
-        )
-        for row in rows
-    ]
-    yield Table(headings, cells, "=>>>>>>=", 1)
+    if found.other:
+        yield Table(*difference_cells(found), "=>>>>>>=", 1)
 
 
 def statement_blocks(found: StudyResult) -> Iterator[Block]:
     """Yield what was measured, tested and concluded."""
-    from rigidimeter.analysis.study import lead, statements
-
     said = statements(found)
     if said is None:
         yield lead(found)
@@ -147,10 +122,6 @@ def two_lines(*texts: str) -> str:
 
 def full_blocks(found: StudyResult, *, by_epoch: bool = False) -> Iterator[Block]:
     """Yield the tables of the report; with `by_epoch` also those with a row for each epoch."""
-    from markupsafe import Markup
-
-    from rigidimeter.analysis.report import shown_tables, source_names
-
     names = source_names(found)
     for table in shown_tables(found):
         if by_epoch or not (table.folding and any(c.name == "epoch" for c in table.columns)):

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from rigidimeter.cli.help_pages import DETECT, PERTURB, WRITE
-from rigidimeter.cli.inputs import keep_inputs
-from rigidimeter.cli.options import JsonOption, SettingsOption
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.options import JSON, SETTINGS
+from rigidimeter.cli.output import echo, keep_inputs, say
+from rigidimeter.cli.progress import Meter
+from rigidimeter.cli.reading_options import plain_recordings
 from rigidimeter.cli.terminal_tables import show
 from rigidimeter.core.errors import UserError
 
@@ -20,96 +19,47 @@ if TYPE_CHECKING:
 
 
 def design(
-    settings: SettingsOption = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Folder of the plan. It holds prbs.csv, sinusoid.csv, protocol.csv, bode.svg and "
-            "design.json.",
-            rich_help_panel=WRITE,
-        ),
-    ] = None,
-    json_out: JsonOption = None,
-    detect: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=AMOUNT",
-            help="Difference to detect, such as damping=20%. In inertia, damping or stiffness, as "
-            "a share or in N·m·s/rad and the like, as stiffness=0.3; repeat as needed.",
-            rich_help_panel=DETECT,
-        ),
-    ] = None,
-    from_study: Annotated[
-        Path | None,
-        typer.Option(
-            "--from",
-            metavar="STUDY",
-            help="Study whose SDs between days and epochs are used. A folder with a study.toml and "
-            "two conditions; without it the SDs are assumed.",
-            rich_help_panel=DETECT,
-        ),
-    ] = None,
-    power: Annotated[
-        float,
-        typer.Option("--power", metavar="P", help="Power of the test.", rich_help_panel=DETECT),
-    ] = 0.8,
-    alpha: Annotated[
-        float,
-        typer.Option(
-            "--alpha", metavar="P", help="Significance level of the test.", rich_help_panel=DETECT
-        ),
-    ] = 0.05,
-    optimise: Annotated[
-        bool,
-        typer.Option(
-            "--optimise",
-            help="Search for the most precise PRBS. Its clock, bits and amplitude, within the "
-            "guard's limits.",
-            rich_help_panel=PERTURB,
-        ),
-    ] = False,
-    criterion: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME",
-            help="What --optimise minimises: minimax, A or D. Minimax is the largest relative "
-            "error, A their root mean square, D the volume of the confidence region.",
-            rich_help_panel=PERTURB,
-            hidden=True,
-        ),
-    ] = "minimax",
-    multisine: Annotated[
-        bool,
-        typer.Option(
-            "--multisine",
-            help="Compare the PRBS with a multisine. With --out also write multisine.csv.",
-            rich_help_panel=PERTURB,
-        ),
-    ] = False,
-    body_mass_kg: Annotated[
-        float | None,
-        typer.Option(
-            "--body-mass",
-            metavar="KG",
-            help="Body mass for the bandwidth of the paper's arm. There it is 7.7 kg (App. A).",
-            rich_help_panel=PERTURB,
-            hidden=True,
-        ),
-    ] = None,
-    forearm_m: Annotated[
-        float | None,
-        typer.Option(
-            "--forearm",
-            metavar="M",
-            help="Length of the forearm for that bandwidth. There it is 0.15 m (App. A).",
-            rich_help_panel=PERTURB,
-            hidden=True,
-        ),
-    ] = None,
-    full: Annotated[
-        bool, typer.Option("--full", help="Show all of it.", rich_help_panel=WRITE)
-    ] = False,
+    settings: Path | None = SETTINGS,
+    out: Path | None = WRITE.option(
+        "--out DIR",
+        "Folder of the plan. It holds prbs.csv, sinusoid.csv, protocol.csv, bode.svg and "
+        "design.json.",
+    ),
+    json_out: Path | None = JSON,
+    detect: list[str] | None = DETECT.option(
+        "--detect NAME=AMOUNT",
+        "Difference to detect, such as damping=20%. In inertia, damping or stiffness, as a share "
+        "or in N·m·s/rad and the like, as stiffness=0.3; repeat as needed.",
+    ),
+    from_study: Path | None = DETECT.option(
+        "--from STUDY",
+        "Study whose SDs between days and epochs are used. A folder with a study.toml and two "
+        "conditions; without it the SDs are assumed.",
+    ),
+    power: float = DETECT.option("--power P", "Power of the test.", 0.8),
+    alpha: float = DETECT.option("--alpha P", "Significance level of the test.", 0.05),
+    optimise: bool = PERTURB.flag(
+        "--optimise",
+        "Search for the most precise PRBS. Its clock, bits and amplitude, within the guard's "
+        "limits.",
+    ),
+    criterion: str = PERTURB.further(
+        "--criterion NAME",
+        "What --optimise minimises: minimax, A or D. Minimax is the largest relative error, A "
+        "their root mean square, D the volume of the confidence region.",
+        "minimax",
+    ),
+    multisine: bool = PERTURB.flag(
+        "--multisine", "Compare the PRBS with a multisine. With --out also write multisine.csv."
+    ),
+    body_mass_kg: float | None = PERTURB.further(
+        "--body-mass KG",
+        "Body mass for the bandwidth of the paper's arm. There it is 7.7 kg (App. A).",
+    ),
+    forearm_m: float | None = PERTURB.further(
+        "--forearm M", "Length of the forearm for that bandwidth. There it is 0.15 m (App. A)."
+    ),
+    full: bool = WRITE.flag("--full", "Show all of it."),
 ) -> None:
     """Plan an experiment: stability, precision, days needed.
 
@@ -123,9 +73,7 @@ def design(
       rigidimeter design --settings rig.toml --out planned --json numbers.json
       rigidimeter design --detect damping=20% --detect stiffness=20% --from study
     """
-    from rigidimeter.cli.design_screen import first_screen
     from rigidimeter.cli.design_text import design_blocks
-    from rigidimeter.cli.progress import Meter
     from rigidimeter.core.files import write_json
     from rigidimeter.model import refuse_unstable
     from rigidimeter.planning import Forearm, check_criterion, design_document
@@ -148,7 +96,7 @@ def design(
             forearm=Forearm(**given) if given else None,
             progress=meter.advance,
         )
-    show(design_blocks(designed) if full else first_screen(designed))
+    show(design_blocks(designed, full=full))
     if out is not None:
         from rigidimeter.analysis.report.design_folder import write_design_folder
 
@@ -160,19 +108,16 @@ def design(
 
 def _scatter_of(folder: Path) -> dict[str, Scatter]:
     """Estimate every epoch of a study, and return how much inertia, damping and stiffness vary."""
-    from rigidimeter.analysis.study import day_scatter, estimate_study, read_study
-    from rigidimeter.cli.inputs import say
-    from rigidimeter.cli.progress import Meter
+    from rigidimeter.analysis.study import day_scatter
+    from rigidimeter.cli.inputs import estimate_study_inputs, read_study_inputs
     from rigidimeter.core.study_files import STUDY_FILE, is_study
     from rigidimeter.planning import CORRELATION, Scatter
 
     if not is_study(folder):
         raise UserError(f"--from {folder}: is no study folder: it has no {STUDY_FILE}")
-    with Meter("read", 1.0) as meter:
-        read = read_study(folder, progress=meter.advance)
-    with Meter("estimate", 1.0) as meter:
-        analysis, notices = estimate_study(read, meter.advance)
-    say((*read.notices, *notices))
+    read = read_study_inputs(folder, plain_recordings(folder))
+    analysis, notices = estimate_study_inputs(read)
+    say(notices)
     found = {}
     for one in day_scatter(read, analysis):
         source, of_one = f"{folder}, {one.epochs} epochs", one.condition_in_day_percent

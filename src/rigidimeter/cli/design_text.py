@@ -1,191 +1,182 @@
-"""A design as lines for a terminal."""
+"""A design on a terminal: what is commanded, what to expect, and the days that it takes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 
-from rigidimeter.cli.design_screen import days_needed
+from rigidimeter.cli.document_tables import document_tables
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
-from rigidimeter.core.units import deg_from_rad, rad_from_deg
+from rigidimeter.core.records import PARAMETERS
+from rigidimeter.core.units import deg_from_rad
+from rigidimeter.core.words import number, scaled
 from rigidimeter.model import Margins
-from rigidimeter.planning import (
-    Candidate,
-    Design,
-    MultisineComparison,
-    chip_count,
-    prbs_period_s,
-    prbs_toml,
-    time_constant_s,
-)
+from rigidimeter.planning import Design, Detection, chip_count, design_document, prbs_toml
 
-_SHOWN = 8
 _HEADS = ("J\n10⁻³ kg·m²", "B\nN·m·s/rad", "K\nN·m/rad")
 _SCALES = (1e3, 1.0, 1.0)
 """To the units of `_HEADS`, as J is written everywhere."""
 
-_EQUAL = {
-    "prbs": "PRBS",
-    "same_peak_torque": "same peak torque",
-    "same_angle_sd": "same angle SD",
-    "same_peak_angle": "same peak angle",
-}
 
+def design_blocks(design: Design, *, full: bool = False) -> Iterator[Block]:
+    """Yield the first screen: the perturbation, the loop, the errors of an epoch, the days needed.
 
-def design_blocks(design: Design) -> Iterator[Block]:
-    """Yield the text, section by section."""
-    sections = [
-        part(design)
-        for part in (_prbs, _sinusoid, _controller, _bandwidth, _protocol, _stability, _precision)
-    ]
-    if design.detections:
-        sections.append(days_needed(design.detections))
-    if design.ranked is not None:
-        sections.append(_ranking(design, design.ranked))
-    if design.multisine is not None:
-        sections.append(_multisine(design.multisine))
-    for section in sections:
-        yield from section
+    With `full` every margin and error, and the tables of what is written as JSON.
+    """
+    yield _perturbation(design)
+    yield _loop(design)
+    if design.precision:
         yield ""
-    if not design.warnings:
-        yield "Everything stays within the guard's limits."
-    for warning in (*design.warnings, *design.stability.warnings):
-        yield f"Warning: {warning}."
-
-
-def _prbs(design: Design) -> Iterator[Block]:
-    prbs, band = design.settings.prbs, design.band
-    low_nm, high_nm = design.perturbation_nm.min(), design.perturbation_nm.max()
-    yield Heading("Torque perturbation (PRBS)")
-    yield (
-        f"  {prbs.register_bits} bits ({chip_count(prbs)} chips) at {prbs.clock_hz:g} Hz, period "
-        f"{prbs_period_s(prbs):.4g} s; {prbs.duration_s:g} s at "
-        f"{design.settings.rig.tick_rate_hz:g} ticks/s"
-    )
-    yield f"  ±{prbs.amplitude_nm:g} N·m; without its mean {low_nm:+.4g} and {high_nm:+.4g} N·m"
-    yield (
-        f"  lines every {band.line_spacing_hz:.4g} Hz; plateau {band.plateau_n2m2_hz:.4g} N²m²/Hz; "
-        f"−3 dB at {band.half_power_hz:.2f} Hz"
-    )
-    yield (
-        f"  in the wanted band: {band.lines_in_band} lines, {band.in_band_percent:.0f} % of the "
-        "power"
-    )
-    yield f"  {band.verdict}"
-    rows = []
-    for name, needs in design.prbs_demand.items():
-        angles = (needs.angle_sd_rad, needs.peak_angle_rad)
-        rows.append(
-            (
-                name,
-                *(f"{deg_from_rad(angle):.2f}" for angle in angles),
-                f"{deg_from_rad(needs.peak_speed_rad_s):.1f}",
-            )
-        )
-    headings = ("in the ideal loop", "angle SD\ndeg", "peak angle\ndeg", "peak speed\ndeg/s")
-    yield Table(headings, rows, "<>>>")
-
-
-def _sinusoid(design: Design) -> Iterator[Block]:
-    sinusoid, guard = design.settings.sinusoid, design.settings.guard
-    needs = design.sinusoid_demand
-    yield Heading("Position perturbation (sinusoid)")
-    yield (
-        f"  ±{sinusoid.amplitude_deg:g} deg at {sinusoid.frequency_hz:g} Hz for "
-        f"{sinusoid.motion_s:g} s of {sinusoid.duration_s:g} s, tapers of {sinusoid.taper_s:g} s"
-    )
-    for name, value, limit, unit in (
-        ("peak speed", needs.peak_speed_rad_s, guard.speed_limit_deg_s, "deg/s"),
-        (
-            "peak acceleration",
-            needs.peak_acceleration_rad_s2,
-            guard.acceleration_limit_deg_s2,
-            "deg/s²",
-        ),
-        ("angle with the room to stop", needs.reach_rad, guard.position_limit_deg, "deg"),
-    ):
-        yield f"  {name} {deg_from_rad(value):.4g} {unit} (guard: {limit:g} {unit})"
-
-
-def _controller(design: Design) -> Iterator[Block]:
-    controller = design.settings.controller
-    J, B = controller.inertia_kg_m2, controller.damping_nm_s_rad
-    tau_s = time_constant_s(controller)
-    yield Heading("Controller (admittance)")
-    yield f"  J_c {J:.4g} kg·m²/rad ({rad_from_deg(J):.4g} kg·m²/deg)"
-    yield f"  B_c {B:.4g} N·m·s/rad ({rad_from_deg(B):.4g} N·m·s/deg)"
-    if math.isfinite(tau_s):
-        yield f"  time constant of the free arm J_c/B_c {tau_s:.4g} s"
+        yield from _precision(design)
+    if design.detections:
+        yield ""
+        yield from _days_needed(design.detections)
+    yield from _found_by_search(design)
+    remarks = [f"{text}." for text in design.remarks]
+    warnings = [f"Warning: {text}." for text in (*design.warnings, *design.stability.warnings)]
+    yield from (*remarks, *warnings)
+    if full:
+        yield from _full_blocks(design)
+    elif design.detections:
+        yield "--full: everything · --out DIR: a folder of the plan · --json FILE: every number"
     else:
-        yield "  no damping: the free arm's velocity never settles"
+        yield ""
+        yield "--detect damping=20%: the days, epochs and subjects it takes · --full: all"
 
 
-def _bandwidth(design: Design) -> Iterator[Block]:
-    table, forearm = design.bandwidth, design.forearm
+def _days_needed(detections: Sequence[Detection]) -> Iterator[Block]:
+    """Yield the table of days by epochs a day, and the scatter that it assumes."""
+    first = detections[0]
     yield Heading(
-        f"Bandwidth (−3 dB) of the arm of App. A, J, B, K ±{table.uncertainty_percent:g} %"
+        f"Days with both conditions that show a difference from {first.condition}: power "
+        f"{first.power:g}, level {first.alpha:g}"
     )
-    if forearm is not None:
-        yield (
-            f"  body mass {forearm.body_mass_kg:g} kg, forearm {forearm.length_m:g} m: J is "
-            f"the forearm's {forearm.inertia_kg_m2:.3g} kg·m² with the robot's and the "
-            "controller's of App. A, B and K are as there"
-        )
-    eight = "Eq. 8" if forearm is None else "as Eq. 8"
-    notes = {table.equation_8.signs: eight, table.widest.signs: "widest"}
-    rows = [
-        (
-            "".join("−0+"[sign + 1] for sign in corner.signs) if any(corner.signs) else "nominal",
-            f"{1e3 * corner.joint.inertia_kg_m2:.1f}",
-            f"{corner.joint.damping_nm_s_rad:.3f}",
-            f"{corner.joint.stiffness_nm_rad:.2f}",
-            f"{corner.bandwidth_hz:.2f}",
-            notes.get(corner.signs, ""),
-        )
-        for corner in (table.nominal, *table.corners)
-    ]
-    yield Table(("corner", *_HEADS, "bandwidth\nHz", ""), rows, "<>>>><")
-
-
-def _protocol(design: Design) -> Iterator[Block]:
-    protocol = design.protocol
-    yield Heading(f"Protocol (seed {protocol.seed})")
-    for (task, condition), epochs in protocol.counts.items():
-        yield f"  {condition}, {task}: {epochs} {'epoch' if epochs == 1 else 'epochs'}"
-    yield f"  {protocol.total_s:g} s ({protocol.total_s / 60:.1f} min) with the rests"
-
-
-def _stability(design: Design) -> Iterator[Block]:
-    """Yield the margins of the loop."""
-    ours = design.settings.margins
-    yield Heading("Stability of the admittance on the arm")
+    heads = [f"{each.epochs[0]}" for each in first.needed]
+    if first.planned is not None:
+        heads.append("plan {}+{}".format(*first.planned.epochs))
     rows = []
-    for name, margins in design.stability.conditions.items():
-        rows.append((f"subject {name}", *_margins(margins)))
-        rows.append(("worst joint around it", *_margins(design.stability.worst[name])))
-    headings = ("", "gain\nmargin", "phase\nmargin", "delay\nmargin", "modulus", "verdict")
-    yield Table(headings, rows, "<>>>><")
-    yield (
-        f"  worst: each of J, B, K from {ours.joint_factor_low:g} to {ours.joint_factor_high:g} "
-        "times its value"
-    )
+    for found in detections:
+        each = [*found.needed, *([] if found.planned is None else [found.planned])]
+        rows += [
+            (f"{_difference(found)}: days", *(_count(one.days) for one in each)),
+            ("  days, Holm for J, B and K", *(_count(one.days_holm) for one in each)),
+            ("  subjects, one day each", *(_count(one.subjects) for one in each)),
+        ]
+    align = "<" + ">" * len(heads)
+    yield Table(("epochs a day and condition", *heads), rows, align, 1)
+    yield from _scatter(detections)
 
 
-def _margins(found: Margins) -> tuple[str, ...]:
-    margins = (
-        (found.gain_margin_db, f"{found.gain_margin_db:.1f} dB"),
-        (found.phase_margin_deg, f"{found.phase_margin_deg:.1f} deg"),
-        (found.delay_margin_s, f"{1000.0 * found.delay_margin_s:.4g} ms"),
+def _perturbation(design: Design) -> str:
+    prbs = design.settings.prbs
+    motion = ", ".join(
+        f"{name} {deg_from_rad(found.angle_sd_rad):.1f}°"
+        for name, found in design.precision.items()
     )
     return (
-        *("never" if math.isinf(value) else text for value, text in margins),
-        f"{found.modulus_margin:.2f}",
-        "stable" if found.stable else "UNSTABLE",
+        f"PRBS     ±{prbs.amplitude_nm:g} N·m, {chip_count(prbs)} chips at {prbs.clock_hz:g} Hz, "
+        f"{prbs.duration_s:g} s" + (f"; SD of the angle {motion}" if motion else "")
     )
+
+
+def _loop(design: Design) -> str:
+    unstable = [n for n, found in design.stability.conditions.items() if not found.stable]
+    if unstable:
+        return f"loop     UNSTABLE with {', '.join(unstable)}"
+    return (
+        f"loop     stable, margins {_smallest(design.stability.conditions)}; worst joint "
+        f"{_smallest(design.stability.worst)}"
+    )
+
+
+def _smallest(found: Mapping[str, Margins]) -> str:
+    gain_db = min(margins.gain_margin_db for margins in found.values())
+    phase_deg = min(margins.phase_margin_deg for margins in found.values())
+    gain = "any gain" if math.isinf(gain_db) else f"{gain_db:.3g} dB"
+    return f"{gain} and {'any phase' if math.isinf(phase_deg) else f'{phase_deg:.3g}°'}"
 
 
 def _precision(design: Design) -> Iterator[Block]:
+    low, high = next(iter(design.precision.values())).iv_band_hz
+    yield Heading(f"Predicted standard error of one epoch (iv, {low:.2g}–{high:.2g} Hz)")
+    sizes = [found.values for found in design.precision.values()]
+    scales = [
+        scaled(max(values), parameter.unit)
+        for values, parameter in zip(zip(*sizes, strict=True), PARAMETERS, strict=True)
+    ]
+    rows = []
+    for name, found in design.precision.items():
+        cells = []
+        for value, error, (factor, _) in zip(found.values, found.iv.free, scales, strict=True):
+            share = f" ± {100 * error / value:.2g} %" if value else ""
+            cells.append(f"{number(factor * value, 3)}{share}")
+        rows.append((name, *cells))
+    heads = [f"{each.symbol}, {unit}" for each, (_, unit) in zip(PARAMETERS, scales, strict=True)]
+    yield Table(("", *heads), rows, "<===", 1)
+
+
+def _difference(found: Detection) -> str:
+    percent = -100.0 * found.difference / found.value
+    return f"{found.wanted.parameter} {percent:+.3g} %".replace("-", "−")
+
+
+def _count(needed: int | None) -> str:
+    return "> 1000" if needed is None else f"{needed}"
+
+
+def _scatter(detections: Sequence[Detection]) -> Iterator[Block]:
+    by_source: dict[str, list[str]] = {}
+    for found in detections:
+        s = found.scatter
+        by_source.setdefault(s.source, []).append(
+            f"{found.wanted.parameter} {s.between_epochs_percent:.2g}, "
+            f"{s.between_days_percent:.2g}, {s.condition_in_day_percent:.2g} %"
+        )
+    share = 100.0 * detections[0].scatter.between_subjects
+    yield (
+        f"SD of epochs, of days, of one condition on a day; effect between subjects {share:.0f} %"
+    )
+    for source, texts in by_source.items():
+        yield f" {'; '.join(dict.fromkeys(texts))} ({source})"
+
+
+def _found_by_search(design: Design) -> Iterator[Block]:
+    """Yield the best sequence of the search and the multisine, a line each."""
+    if design.ranked and design.present:
+        best = design.ranked[0]
+        yield (
+            f"Best PRBS of {len(design.ranked)} ({design.criterion}): {best.prbs.register_bits} "
+            f"bits at {best.prbs.clock_hz:.4g} Hz, ±{best.prbs.amplitude_nm:.3g} N·m: error "
+            f"{best.cost_percent:.2g} %, now {design.present.cost_percent:.2g} %."
+        )
+    if design.multisine is not None:
+        name, errors = next(iter(design.multisine.errors.items()))
+        pairs = zip("JBK", errors["same_peak_torque"], errors["prbs"], strict=True)
+        ratios = ", ".join(f"{symbol} {other / own:.2f}" for symbol, other, own in pairs if own)
+        yield (
+            f"Multisine of the same peak torque: standard errors {ratios} times those of the PRBS "
+            f"({name})."
+        )
+
+
+def _full_blocks(design: Design) -> Iterator[Block]:
+    yield ""
+    yield from _all_errors(design)
+    yield ""
+    document = design_document(design)
+    for on_screen in ("schema", "precision", "detection", "warnings", "remarks"):
+        del document[on_screen]
+    del document["protocol"]["epochs"]  # which `--out` writes
+    yield from document_tables(document)
+    if design.ranked:
+        yield "The best PRBS, as settings:"
+        yield from (f"    {line}" for line in prbs_toml(design.ranked[0].prbs).splitlines())
+    if not design.warnings:
+        yield "Everything stays within the guard's limits."
+
+
+def _all_errors(design: Design) -> Iterator[Block]:
     """Yield the standard errors of one epoch, and of all planned ones."""
     counts = design.planned_epochs
     yield Heading("Predicted standard errors of one epoch")
@@ -211,8 +202,6 @@ def _precision(design: Design) -> Iterator[Block]:
                 if value
             )
             yield f"  the subject's own torque would bias least squares: {off}"
-    for remark in design.remarks:
-        yield f"  {remark}"
 
 
 def _band(band_hz: tuple[float, float]) -> str:
@@ -234,49 +223,3 @@ def _plain(value: float, digits: int = 2) -> str:
     ('0.000092', '0.0123')
     """
     return f"{Decimal(f'{value:.{digits}g}'):f}"
-
-
-def _ranking(design: Design, ranked: tuple[Candidate, ...]) -> Iterator[Block]:
-    """Yield the best sequences of the search, beside the present one."""
-    now = design.present
-    yield Heading(
-        f"Search for a PRBS ({len(ranked)} sequences, criterion {design.criterion}, iv, one epoch)"
-    )
-    rows = []
-    best = [(f"{k}", found) for k, found in enumerate(ranked[:_SHOWN], start=1)]
-    for label, found in [*best, *([("present", now)] if now else [])]:
-        largest = (max(values) for values in zip(*found.errors_percent.values(), strict=True))
-        rows.append(
-            (
-                label,
-                f"{found.prbs.register_bits}",
-                f"{found.prbs.clock_hz:.4g}",
-                f"{found.prbs.amplitude_nm:.3g}",
-                f"{found.cost_percent:.3g}",
-                *(f"{percent:.3g}" for percent in largest),
-                f"{deg_from_rad(found.angle_sd_rad):.1f}",
-                f"{deg_from_rad(found.peak_angle_rad):.1f}",
-                "" if found.covered else "misses the band",
-            )
-        )
-    headings = ("", "bits", "clock\nHz", "±N·m", "cost\n%", "J\n%", "B\n%", "K\n%",
-                "angle SD\ndeg", "peak\ndeg", "")  # fmt: skip
-    yield Table(headings, rows, "<>>>>>>>>><")
-    yield "  the best one, as settings:"
-    yield from (f"    {line}" for line in prbs_toml(ranked[0].prbs).splitlines())
-
-
-def _multisine(found: MultisineComparison) -> Iterator[Block]:
-    """Yield the standard errors of the multisine beside those of the PRBS."""
-    yield Heading(
-        f"Multisine (crest factor {found.crest_factor:.3g}), standard errors of iv, one epoch"
-    )
-    for name, errors in found.errors.items():
-        rows = [
-            (
-                _EQUAL[what],
-                *(_plain(scale * value, 3) for scale, value in zip(_SCALES, values, strict=True)),
-            )
-            for what, values in errors.items()
-        ]
-        yield Table((f"subject {name}", *_HEADS), rows, "<>>>")

@@ -3,44 +3,29 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
+from rigidimeter.cli.help_pages import OPTIONS
 from rigidimeter.cli.output import echo
 from rigidimeter.core.errors import UserError
 
 
 def emulate(
-    drive: Annotated[
-        str, typer.Option("--drive", metavar="cia402|ascii", help="Type of drive.")
-    ] = "cia402",
-    joint: Annotated[
-        tuple[float, float, float],
-        typer.Option(
-            "--joint",
-            metavar="J B K",
-            help="J, B, K in kg·m², N·m·s/rad, N·m/rad.",
-        ),
-    ] = (0.0045, 0.1368, 1.751),
-    rig_out: Annotated[
-        Path | None,
-        typer.Option("--rig-out", metavar="FILE", help="Write a rig file for it."),
-    ] = None,
-    voluntary: Annotated[
-        float,
-        typer.Option("--voluntary", metavar="NM", help="SD of the subject's voluntary torque."),
-    ] = 0.0,
-    torque_rate: Annotated[
-        float, typer.Option("--torque-rate-hz", metavar="HZ", help="Torque samples per second.")
-    ] = 1000.0,
-    noise: Annotated[
-        float, typer.Option("--noise-nm", metavar="NM", help="SD of the torque noise.")
-    ] = 0.005,
-    bandwidth: Annotated[
-        float, typer.Option("--bandwidth-hz", metavar="HZ", help="Bandwidth of the drive.")
-    ] = 50.0,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of all random numbers.")] = 1,
+    drive: str = OPTIONS.option("--drive cia402|ascii", "Type of drive.", "cia402"),
+    joint: tuple[float, float, float] = OPTIONS.option(
+        "--joint J B K", "J, B, K in kg·m², N·m·s/rad, N·m/rad.", (0.0045, 0.1368, 1.751)
+    ),
+    rig_out: Path | None = OPTIONS.option("--rig-out FILE", "Write a rig file for it."),
+    voluntary: float = OPTIONS.option(
+        "--voluntary NM", "SD of the subject's voluntary torque.", 0.0
+    ),
+    torque_rate: float = OPTIONS.option(
+        "--torque-rate-hz HZ", "Torque samples per second.", 1000.0
+    ),
+    noise: float = OPTIONS.option("--noise-nm NM", "SD of the torque noise.", 0.005),
+    bandwidth: float = OPTIONS.option("--bandwidth-hz HZ", "Bandwidth of the drive.", 50.0),
+    seed: int = OPTIONS.option("--seed", "Seed of all random numbers.", 1),
 ) -> None:
     """Emulate a rig: an arm, a torque sensor and a drive.
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from rigidimeter.cli.estimate_text import estimate_blocks
 from rigidimeter.cli.help_pages import WRITE
-from rigidimeter.cli.inputs import analyse_recordings, keep_inputs, say_analysed
-from rigidimeter.cli.options import CsvOption, FullOption, JsonOption
+from rigidimeter.cli.options import CSV, FULL, JSON
+from rigidimeter.cli.output import keep_inputs
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import show
 
@@ -18,19 +16,14 @@ from rigidimeter.cli.terminal_tables import show
 @reads_recordings
 def estimate(
     recordings: Recordings,
-    json_out: JsonOption = None,
-    csv_out: CsvOption = None,
-    subject_torque_out: Annotated[
-        Path | None,
-        typer.Option(
-            "--subject-torque",
-            metavar="FILE",
-            help="Torque of the subject, .csv or .parquet. Measured, joint and subject's torque "
-            "of each epoch.",
-            rich_help_panel=WRITE,
-        ),
-    ] = None,
-    full: FullOption = False,
+    json_out: Path | None = JSON,
+    csv_out: Path | None = CSV,
+    subject_torque_out: Path | None = WRITE.option(
+        "--subject-torque FILE",
+        "Torque of the subject, .csv or .parquet. Measured, joint and subject's torque of each "
+        "epoch.",
+    ),
+    full: bool = FULL,
 ) -> None:
     """Estimate inertia J, damping B and stiffness K of each epoch.
 
@@ -48,22 +41,23 @@ def estimate(
           --epoch-length-s 20
     """
     from rigidimeter.analysis.reading import write_estimates_csv, write_estimates_json
-    from rigidimeter.analysis.study import recording_result
     from rigidimeter.analysis.study.subject_torque_table import check_name, write_subject_torque
+    from rigidimeter.cli.estimate_text import estimate_blocks
+    from rigidimeter.cli.inputs import analyse_recordings
 
     keep_inputs((json_out, csv_out, subject_torque_out), recordings.paths)
     if subject_torque_out is not None:
         check_name(subject_torque_out)
-    read, analysis = analyse_recordings(recordings)
+    read, analysed = analyse_recordings(recordings)
+    result = analysed.result
     try:
         if json_out is not None:
-            write_estimates_json(json_out, analysis)
+            write_estimates_json(json_out, result.analysis)
         if csv_out is not None:
-            write_estimates_csv(csv_out, analysis)
-        result = recording_result(read, analysis)
+            write_estimates_csv(csv_out, result.analysis)
         show(estimate_blocks(result, full=full))
         if subject_torque_out is not None:
-            write_subject_torque(subject_torque_out, read, analysis)
+            write_subject_torque(subject_torque_out, read, result.analysis)
     finally:
-        status = say_analysed(read, analysis)
+        status = analysed.say()
     raise typer.Exit(status)

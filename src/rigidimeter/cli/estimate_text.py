@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
+from rigidimeter.analysis.estimation import METHODS
+from rigidimeter.analysis.study import Precision, StudyResult, condition_precisions
 from rigidimeter.cli.comparison_text import finding_notes, full_blocks, two_lines
 from rigidimeter.cli.terminal_tables import ROWS, Block, Heading, Table, text_lines
-
-if TYPE_CHECKING:
-    from rigidimeter.analysis.study import Precision, StudyResult
-    from rigidimeter.core.records import Analysis, Fit, Score
+from rigidimeter.core.records import PARAMETERS, Analysis, Fit, Score
+from rigidimeter.core.words import decimals, fixed, number, plural, scaled, short_names, with_error
 
 MOST_EPOCHS, FIRST_EPOCHS = 8, 4
 """Of more epochs than the first number the second and the last are shown, of several recordings
@@ -51,12 +50,8 @@ def estimate_blocks(result: StudyResult, *, full: bool = False) -> Iterator[Bloc
 
 def _about(result: StudyResult) -> str:
     """Return what was read, and how it was estimated."""
-    from rigidimeter.core.words import plural, short_names
-
     analysis = result.analysis
-    results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
-    sources = {one.source for one in results}
-    names = list(short_names(sources).values())
+    names = list(short_names({one.source for one in analysis.results}).values())
     parts = [names[0] if len(names) == 1 else plural(len(names), "recording")]
     if any(epoch.virtual for epoch in result.epochs):
         parts.append("virtual data")
@@ -78,9 +73,6 @@ def _fits(result: StudyResult, most: int) -> Table:
 
     Of more than `most` epochs of one recording the first and the last, of several none.
     """
-    from rigidimeter.core.records import PARAMETERS
-    from rigidimeter.core.words import scaled, short_names, with_error
-
     fits = result.analysis.fits
     names = short_names({fit.source for fit in fits})
     scales = [
@@ -114,10 +106,6 @@ def _fits(result: StudyResult, most: int) -> Table:
 
 def _together(result: StudyResult, factors: Sequence[float]) -> Iterator[Sequence[str] | str]:
     """Yield value, interval and scatter of each condition's epochs together."""
-    from rigidimeter.analysis.study import condition_precisions
-    from rigidimeter.core.records import PARAMETERS
-    from rigidimeter.core.words import decimals, fixed
-
     for condition, each in condition_precisions(result).items():
         by_name = {one.measure.name: one for one in each}
         found: list[Precision] = [by_name[p.name] for p in PARAMETERS if p.name in by_name]
@@ -140,9 +128,6 @@ def _together(result: StudyResult, factors: Sequence[float]) -> Iterator[Sequenc
 
 def _scores(result: StudyResult) -> Table:
     """Return the mean of the scores of each condition, per cycle."""
-    from rigidimeter.analysis.study import condition_precisions
-    from rigidimeter.core.words import number
-
     rows = []
     for condition, each in condition_precisions(result).items():
         found = {one.measure.short: one for one in each if one.measure.origin == "scores"}
@@ -159,8 +144,6 @@ def _scores(result: StudyResult) -> Table:
 
 def _method(analysis: Analysis) -> Iterator[tuple[str, str]]:
     """Yield why a method was chosen that the subject's own torque biases."""
-    from rigidimeter.analysis.estimation import METHODS
-
     chosen = [method for method in METHODS if method.name == analysis.method]
     if analysis.fits and chosen and not any(method.uses_perturbation for method in chosen):
         reason = analysis.method_reason or "as chosen"
@@ -170,12 +153,9 @@ def _method(analysis: Analysis) -> Iterator[tuple[str, str]]:
 
 def _excluded(analysis: Analysis) -> Iterator[tuple[str, str]]:
     """Yield which epochs do not count, and why, in two lines for each outcome."""
-    from rigidimeter.core.words import plural, short_names
-
-    results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
-    names = short_names(one.source for one in results)
+    names = short_names(one.source for one in analysis.results)
     out: dict[str, list[Fit | Score]] = {}
-    for one in results:
+    for one in analysis.results:
         if not one.outcome.included:
             out.setdefault(one.outcome.kind, []).append(one)
     for kind, those in out.items():
@@ -201,8 +181,6 @@ def _short_scores(result: StudyResult) -> Iterator[tuple[str, str]]:
 
 def _delays(analysis: Analysis, full: bool) -> Iterator[tuple[str, str]]:
     """Yield how late the torque is in each source, where that is known; of several the largest."""
-    from rigidimeter.core.words import plural, short_names, with_error
-
     names = short_names(delay.source for delay in analysis.delays)
     late = [
         delay

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
+from rigidimeter.cli.help_pages import argument
 from rigidimeter.cli.terminal_tables import Block, Heading, Table, show
 from rigidimeter.core.errors import UserError
 
@@ -20,10 +19,7 @@ LINK = r" \(\[\w+\]\([^)]*\)\)"
 
 
 def explain(
-    name: Annotated[
-        str | None,
-        typer.Argument(metavar="[NAME]", help="Of a finding; all without it."),
-    ] = None,
+    name: str | None = argument("[NAME]", "Of a finding; all without it.", None),
 ) -> None:
     """Explain a finding of the checks: what was looked at, what it means, and what to do.
 

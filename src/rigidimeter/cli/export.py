@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from rigidimeter.cli.help_pages import HOW_TO_READ, WRITE
-from rigidimeter.cli.inputs import analyse_recordings, say, say_analysed, study_of
-from rigidimeter.cli.options import KeyOption
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.options import KEY
+from rigidimeter.cli.output import echo, say
+from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.core.errors import UserError
 
@@ -24,84 +22,23 @@ if TYPE_CHECKING:
 @reads_recordings
 def export(
     recordings: Recordings,
-    to: Annotated[
-        str,
-        typer.Option(
-            "--to",
-            metavar="FORMAT",
-            help="Format: nwb, bids, parquet, csv, mat.",
-            rich_help_panel=WRITE,
-        ),
-    ],
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out",
-            metavar="PATH",
-            help="File, or folder of several files.",
-            rich_help_panel=WRITE,
-        ),
-    ],
-    overwrite: Annotated[
-        bool,
-        typer.Option(
-            "--overwrite",
-            help="Replace files of the same name.",
-            rich_help_panel=WRITE,
-            hidden=True,
-        ),
-    ] = False,
-    estimates: Annotated[
-        bool,
-        typer.Option(
-            "--estimates/--no-estimates",
-            help="Whether J, B, K and scores travel along.",
-            rich_help_panel=WRITE,
-            hidden=True,
-        ),
-    ] = True,
-    subject: Annotated[
-        str,
-        typer.Option(
-            "--subject",
-            metavar="NAME",
-            help="The subject of single recordings.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = "",
-    day: Annotated[
-        str,
-        typer.Option(
-            "--day",
-            metavar="NAME",
-            help="The day of single recordings.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = "",
-    joint: Annotated[
-        str,
-        typer.Option(
-            "--joint",
-            metavar="NAME",
-            help="The joint of single recordings, as elbow.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = "",
-    started: Annotated[
-        datetime | None,
-        typer.Option(
-            "--started",
-            metavar="TIME",
-            formats=["%Y-%m-%dT%H:%M:%S%z", "%Y-%m-%dT%H:%M%z"],
-            help="When single recordings began that do not say so, as 2026-03-01T10:30+0100.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = None,
-    key: KeyOption = None,
+    to: str = WRITE.option("--to FORMAT", "Format: nwb, bids, parquet, csv, mat.", ...),
+    out: Path = WRITE.option("--out PATH", "File, or folder of several files.", ...),
+    overwrite: bool = WRITE.flag("--overwrite", "Replace files of the same name.", hidden=True),
+    estimates: bool = WRITE.further(
+        "--estimates/--no-estimates", "Whether J, B, K and scores travel along.", True
+    ),
+    subject: str = HOW_TO_READ.further("--subject NAME", "The subject of single recordings.", ""),
+    day: str = HOW_TO_READ.further("--day NAME", "The day of single recordings.", ""),
+    joint: str = HOW_TO_READ.further(
+        "--joint NAME", "The joint of single recordings, as elbow.", ""
+    ),
+    started: datetime | None = HOW_TO_READ.further(
+        "--started TIME",
+        "When single recordings began that do not say so, as 2026-03-01T10:30+0100.",
+        formats=["%Y-%m-%dT%H:%M:%S%z", "%Y-%m-%dT%H:%M%z"],
+    ),
+    key: Path | None = KEY,
 ) -> None:
     """Write sessions, recordings or a study in another format.
 
@@ -116,7 +53,7 @@ def export(
       rigidimeter export elbow.csv --to mat --out elbow.mat --subject S1
     """
     from rigidimeter.analysis.export import export_sessions, format_named
-    from rigidimeter.cli.progress import Meter
+    from rigidimeter.cli.inputs import study_of
 
     format_named(to)
     if any((folder / "manifest.json").exists() for folder in (out, *out.resolve().parents)):
@@ -148,14 +85,15 @@ def export(
 
 
 def _of_recordings(
-    recordings: Recordings, said: Mapping[str, str], *, estimates: bool
+    recordings: Recordings, said: dict[str, str], *, estimates: bool
 ) -> tuple[list[ExportedSession], int]:
     from rigidimeter.analysis.export import sessions_of_recording
+    from rigidimeter.cli.inputs import analyse_recordings
 
     analysis = None
     if estimates:
-        read, analysis = analyse_recordings(recordings)
-        status = say_analysed(read, analysis)
+        read, analysed = analyse_recordings(recordings)
+        analysis, status = analysed.result.analysis, analysed.say()
     else:
         read = recordings.read()
         say(read.notices)
@@ -163,11 +101,9 @@ def _of_recordings(
     sessions = sessions_of_recording(
         read,
         analysis,
-        subject=said["subject"],
-        day=said["day"],
-        joint=said["joint"],
-        started_utc=said["started"],
+        started_utc=said.pop("started"),
         blinded=recordings.blinded,
+        **said,
     )
     return sessions, status
 
@@ -176,20 +112,9 @@ def _of_study(
     folder: Path, recordings: Recordings, key: Path | None, *, estimates: bool
 ) -> tuple[list[ExportedSession], int]:
     from rigidimeter.analysis.export import sessions_of_study
-    from rigidimeter.analysis.study import estimate_study, read_study
-    from rigidimeter.cli.progress import Meter
-    from rigidimeter.core.settings import load_settings
+    from rigidimeter.cli.inputs import estimate_study_inputs, read_study_inputs
 
-    chosen = load_settings(recordings.settings) if recordings.settings is not None else None
-    with Meter("read", 1.0) as meter:
-        read = read_study(
-            folder, key=key, settings=chosen, method=recordings.method, progress=meter.advance
-        )
-    read = replace(read, settings=recordings.adjust(read.settings))
-    notices, analysis = list(read.notices), None
-    if estimates:
-        with Meter("estimate", 1.0) as meter:
-            analysis, found = estimate_study(read, meter.advance)
-        notices += found
+    read = read_study_inputs(folder, recordings, key)
+    analysis, notices = estimate_study_inputs(read) if estimates else (None, read.notices)
     say(notices)
     return sessions_of_study(read, analysis), int(any(n.level == "error" for n in notices))

@@ -1,32 +1,75 @@
 """Help pages: `--help` on one screen, `--help-all` with everything.
 
-Both are made from what a command declares. `--help` shows the first paragraph and the examples of
-its docstring, and the first sentence of each option; an option that is declared `hidden` is shown
-by `--help-all` only. An option's `rich_help_panel` is the group that it is shown in.
+Both are made from what a command declares, each option in the `Group` under whose heading it is
+shown. `--help` shows the first paragraph and the examples of a command's docstring, and the first
+sentence of each option; an option declared by `Group.further` is shown by `--help-all` only.
 """
 
 from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Iterator, Sequence
-from typing import Annotated, Any
+import shlex
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperArgument, TyperCommand, TyperGroup, TyperOption
 from typer.main import get_command
 
-READ = "What to read"
-HOW_TO_READ = "How to read it"
-COMPARE = "What to compare"
-PERTURB = "How to perturb"
-DETECT = "What to detect"
-ESTIMATE = "How to estimate"
-WRITE = "What to write"
-RUN = "How to run"
-PAGE = "The page in the browser"
-_OTHER = "Options"
-_ORDER = (READ, HOW_TO_READ, COMPARE, DETECT, PERTURB, ESTIMATE, RUN, PAGE, _OTHER, WRITE)
+from rigidimeter.core.words import plural
+
+
+class Group(str):
+    """A heading of help pages, which declares the options below it."""
+
+    __slots__ = ()
+
+    def option(self, declared: str, text: str, default: Any = None, **more: Any) -> Any:
+        """Return the default of a parameter of a command, which makes the parameter an option.
+
+        Parameters
+        ----------
+        declared : str
+            As the help page shows it, such as ``--out DIR``; a flag has its name alone.
+        text : str
+            Of which `--help` shows the first sentence.
+        default : object
+            ``...`` for an option that must be given.
+        **more
+            What typer takes, such as `min` and `max`.
+        """
+        name, _, metavar = declared.partition(" ")
+        return typer.Option(
+            default, name, metavar=metavar or None, help=text, rich_help_panel=self, **more
+        )
+
+    def flag(self, name: str, text: str, **more: Any) -> Any:
+        """Return an option that is given or not."""
+        return self.option(name, text, False, **more)
+
+    def further(self, declared: str, text: str, default: Any = None, **more: Any) -> Any:
+        """Return an option that `--help-all` alone shows."""
+        return self.option(declared, text, default, hidden=True, **more)
+
+
+def argument(metavar: str, text: str, default: Any = ..., **more: Any) -> Any:
+    """Return the default of a parameter that is given without a name, as an option is."""
+    return typer.Argument(default, metavar=metavar, help=text, show_default=False, **more)
+
+
+READ = Group("What to read")
+HOW_TO_READ = Group("How to read it")
+COMPARE = Group("What to compare")
+PERTURB = Group("How to perturb")
+DETECT = Group("What to detect")
+ESTIMATE = Group("How to estimate")
+WRITE = Group("What to write")
+RUN = Group("How to run")
+PAGE = Group("The page in the browser")
+OPTIONS = Group("Options")
+_ORDER = (READ, HOW_TO_READ, COMPARE, DETECT, PERTURB, ESTIMATE, RUN, PAGE, OPTIONS, WRITE)
 
 _WIDEST_NAME = 26
 _EVERYTHING = "rigidimeter.help_all"
@@ -43,11 +86,19 @@ class HelpCommand(TyperCommand):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the page that was asked for."""
-        _write_page(self, ctx, formatter, self.full_text)
+        _write_page(self, ctx, formatter)
 
-    def full_text(self, parameter: Any) -> str:
-        """Return what `--help-all` shows of a parameter."""
-        return str(parameter.help)
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Refuse a TOML file without `--settings` where nothing but options is taken."""
+        options = [each for each in self.params if isinstance(each, TyperOption)]
+        with_value = {name for each in options if not each.is_flag for name in each.opts}
+        if len(options) == len(self.params) and "--settings" in with_value:
+            for before, word in pairwise(["", *args]):
+                if word.endswith(".toml") and word[0] != "-" and before not in with_value:
+                    raise typer.BadParameter(
+                        f"{word}: if it holds settings, say --settings {shlex.quote(word)}", ctx
+                    )
+        return super().parse_args(ctx, args)
 
 
 class HelpGroup(TyperGroup):
@@ -60,6 +111,33 @@ class HelpGroup(TyperGroup):
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the page that was asked for."""
         _write_page(self, ctx, formatter)
+
+
+def full_text(parameter: Any) -> str:
+    """Return what `--help-all` shows of a parameter, with all that there is to choose from."""
+    if isinstance(parameter, TyperArgument) and parameter.name == "paths":
+        from rigidimeter.analysis.reading.formats import formats_text
+
+        return f"What to read: {formats_text()}."
+    if "--method" in parameter.opts:
+        from rigidimeter.analysis.estimation import METHODS
+
+        known = ", ".join(f"{method.name} ({method.title})" for method in METHODS)
+        return (
+            f"auto (iv where the perturbation was recorded, else bandlimited), or one of: {known}."
+        )
+    if "--to" in parameter.opts:
+        from rigidimeter.analysis.export import FORMATS
+
+        return f"Format: {', '.join(f'{each.name} ({each.title})' for each in FORMATS)}."
+    if "--terms" in parameter.opts:
+        from rigidimeter.analysis.estimation.terms import term_names
+
+        return (
+            f"Terms of the torque: {', '.join(term_names())} (+ or - after a reflex: the "
+            "direction that stretches the muscle). Repeat to compare your own models."
+        )
+    return str(parameter.help)
 
 
 def first_sentence(text: str) -> str:
@@ -98,27 +176,15 @@ def _help_all() -> Any:
 
     @app.command()
     def page(
-        help_all: Annotated[
-            bool,
-            typer.Option(
-                "--help-all",
-                is_eager=True,
-                expose_value=False,
-                callback=_show_all,
-                help="Show everything.",
-            ),
-        ] = False,
+        help_all: bool = OPTIONS.flag(
+            "--help-all", "Show everything.", is_eager=True, expose_value=False, callback=_show_all
+        ),
     ) -> None: ...
 
     return next(each for each in get_command(app).params if each.name == "help_all")
 
 
-def _write_page(
-    command: Any,
-    ctx: Any,
-    formatter: Any,
-    full_text: Callable[[Any], str] = lambda parameter: str(parameter.help),
-) -> None:
+def _write_page(command: Any, ctx: Any, formatter: Any) -> None:
     everything = ctx.meta.get(_EVERYTHING, False)
     command.format_usage(ctx, formatter)
     first, *rest = inspect.cleandoc(command.help or "").split("\n\n")
@@ -126,9 +192,10 @@ def _write_page(
     formatter.write_paragraph()
     with formatter.indentation():
         formatter.write_text("\n\n".join(shown))
-    groups = [*_commands(command), *_options(command, ctx, everything, full_text)]
+    groups = [*_groups(command, ctx, everything)]
     more = sum(each.name in command.in_full_only for each in command.params)
-    names, this = "-h, --help", f"This page; --help-all: {_options_text(more)}all details"
+    others = f"{plural(more, 'more option')}, " if more else ""
+    names, this = "-h, --help", f"This page; --help-all: {others}all details"
     if everything:
         names, this = "-h, --help, --help-all", "One screen; this page"
     rows = [row for _, group in groups for row in group]
@@ -144,31 +211,23 @@ def _write_page(
         formatter.write_dl([(names.ljust(width), this)], col_max=max(width, len(names)))
 
 
-def _options_text(more: int) -> str:
-    return f"{more} more option{'s' if more > 1 else ''}, " if more else ""
-
-
-def _commands(command: Any) -> Iterator[tuple[str, list[tuple[str, str]]]]:
-    """Yield the commands of a group under their panels, in the order of their declaration."""
-    panels: dict[str, list[tuple[str, str]]] = {}
+def _groups(
+    command: Any, ctx: Any, everything: bool
+) -> Iterator[tuple[str, list[tuple[str, str]]]]:
+    """Yield commands in the order of their declaration, and options in that of their groups."""
+    commands: dict[str, list[tuple[str, str]]] = {}
     for name, each in getattr(command, "commands", {}).items():
-        if not each.hidden:
-            rows = panels.setdefault(each.rich_help_panel or "Commands", [])
-            rows.append((name, first_sentence(each.help or "")))
-    yield from panels.items()
-
-
-def _options(
-    command: Any, ctx: Any, everything: bool, full_text: Callable[[Any], str]
-) -> Sequence[tuple[str, list[tuple[str, str]]]]:
-    panels: dict[str, list[tuple[str, str]]] = {}
+        panel = commands.setdefault(each.rich_help_panel or "Commands", [])
+        panel.append((name, first_sentence((each.help or "").partition("\n\n")[0])))
+    options: dict[str, list[tuple[str, str]]] = {}
     for each in command.params:
         if each.name != "help_all" and (everything or each.name not in command.in_full_only):
             name, text = each.get_help_record(ctx)
-            group = _OTHER
+            group = OPTIONS
             if each.param_type_name == "argument":
                 name, group = each.metavar, READ
             words = full_text(each) if everything else first_sentence(each.help)
-            panel = panels.setdefault(each.rich_help_panel or group, [])
+            panel = options.setdefault(each.rich_help_panel or group, [])
             panel.append((name, words + text.removeprefix(each.help)))  # [required] and the default
-    return sorted(panels.items(), key=lambda panel: _ORDER.index(panel[0]))
+    yield from commands.items()
+    yield from sorted(options.items(), key=lambda panel: _ORDER.index(panel[0]))

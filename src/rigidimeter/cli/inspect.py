@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from rigidimeter.cli.help_pages import WRITE
-from rigidimeter.cli.inputs import keep_inputs, say
-from rigidimeter.cli.options import FullOption
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.options import FULL
+from rigidimeter.cli.output import echo, keep_inputs, say
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import Table, show
 from rigidimeter.core.errors import UserError
@@ -24,25 +23,11 @@ if TYPE_CHECKING:
 @reads_recordings
 def inspect(
     recordings: Recordings,
-    write_mapping: Annotated[
-        Path | None,
-        typer.Option(
-            "--write-mapping",
-            metavar="FILE",
-            help="A mapping file that reads the file.",
-            rich_help_panel=WRITE,
-        ),
-    ] = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option(
-            "--plot",
-            metavar="FILE",
-            help="The columns as an image (.png, .svg, .pdf).",
-            rich_help_panel=WRITE,
-        ),
-    ] = None,
-    full: FullOption = False,
+    write_mapping: Path | None = WRITE.option(
+        "--write-mapping FILE", "A mapping file that reads the file."
+    ),
+    plot: Path | None = WRITE.option("--plot FILE", "The columns as an image (.png, .svg, .pdf)."),
+    full: bool = FULL,
 ) -> None:
     """Show what is in a file and how it would be read.
 

@@ -12,6 +12,7 @@ import os
 import signal
 import sys
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
 from typing import Annotated
@@ -28,9 +29,9 @@ from rigidimeter.cli.emulate import emulate
 from rigidimeter.cli.estimate import estimate
 from rigidimeter.cli.explain import explain
 from rigidimeter.cli.export import export
+from rigidimeter.cli.help_pages import HelpCommand
 from rigidimeter.cli.inspect import inspect
 from rigidimeter.cli.model import model
-from rigidimeter.cli.options import RegistryCommand
 from rigidimeter.cli.output import VisibleErrors, echo
 from rigidimeter.cli.ratings import ratings
 from rigidimeter.cli.report import report
@@ -101,7 +102,7 @@ for panel, commands in {
     "Start": (demo,),
 }.items():
     for command in commands:
-        app.command(cls=RegistryCommand, rich_help_panel=panel)(command)
+        app.command(cls=HelpCommand, rich_help_panel=panel)(command)
 app.add_typer(study, rich_help_panel="Start")
 
 
@@ -137,25 +138,21 @@ def main() -> None:
             stream.reconfigure(errors="replace")  # a terminal without "−" is no reason to fail
     try:
         app()
+        return
     except UserError as error:
-        for index, line in enumerate(error.lines):
-            echo(line if index else f"rigidimeter: {line}", err=True)
-        sys.exit(1)
+        lines: Sequence[str] = error.lines
     except MemoryError:
-        echo(
-            "rigidimeter: this needs more memory than the computer has; split the input, or "
-            "analyse less of it at once",
-            err=True,
+        lines = (
+            "this needs more memory than the computer has; split the input, or analyse less of it "
+            "at once",
         )
-        sys.exit(1)
     except BrokenPipeError:
         # The reader of our output has gone, as in `rigidimeter ... | head`: not our error.
         sys.stderr.close()
         sys.exit(0)
     except OSError as error:
         what = f"{error.filename}: " if error.filename else ""
-        echo(f"rigidimeter: {what}{error.strerror or error}", err=True)
-        sys.exit(1)
+        lines = (f"{what}{error.strerror or error}",)
     except KeyboardInterrupt:  # before typer has read the command line
         _say_interrupted()
         sys.exit(_INTERRUPTED)
@@ -163,3 +160,6 @@ def main() -> None:
         if end.code == _INTERRUPTED:  # typer turns the interruption of a command into this
             _say_interrupted()
         raise
+    for index, line in enumerate(lines):
+        echo(line if index else f"rigidimeter: {line}", err=True)
+    sys.exit(1)

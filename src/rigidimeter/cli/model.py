@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated
+from pathlib import Path
 
 import typer
 
 from rigidimeter.cli.help_pages import ESTIMATE
-from rigidimeter.cli.inputs import keep_inputs, say
-from rigidimeter.cli.model_text import model_blocks
-from rigidimeter.cli.options import FullOption, JsonOption
-from rigidimeter.cli.output import echo
+from rigidimeter.cli.options import FULL, JSON
+from rigidimeter.cli.output import echo, keep_inputs, say
+from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import show
 from rigidimeter.core.errors import UserError
@@ -23,27 +22,18 @@ COMPARED = f"{USUAL},reflex,cubic,directional-damping,coulomb"
 @reads_recordings
 def model(
     recordings: Recordings,
-    terms: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--terms",
-            metavar="NAME,NAME,...",
-            help="Terms of the torque, by their names. Repeat to compare your own models.",
-            rich_help_panel=ESTIMATE,
-        ),
-    ] = None,
-    compare: Annotated[
-        bool,
-        typer.Option(
-            "--compare",
-            help="Compare models, and recommend one. Each model predicts blocks of an epoch that "
-            "it has not seen. With one --terms, J, B and K alone are tried, with each "
-            "further term, and more beside the best as long as they predict better.",
-            rich_help_panel=ESTIMATE,
-        ),
-    ] = False,
-    json_out: JsonOption = None,
-    full: FullOption = False,
+    terms: list[str] | None = ESTIMATE.option(
+        "--terms NAME,NAME,...",
+        "Terms of the torque, by their names. Repeat to compare your own models.",
+    ),
+    compare: bool = ESTIMATE.flag(
+        "--compare",
+        "Compare models, and recommend one. Each model predicts blocks of an epoch that it has "
+        "not seen. With one --terms, J, B and K alone are tried, with each further term, and "
+        "more beside the best as long as they predict better.",
+    ),
+    json_out: Path | None = JSON,
+    full: bool = FULL,
 ) -> None:
     """Fit the torque as a sum of terms, and find the terms it needs.
 
@@ -57,7 +47,7 @@ def model(
     """
     from rigidimeter.analysis.estimation.terms import candidates, parse_terms
     from rigidimeter.analysis.study.torque_models import model_document, model_recording
-    from rigidimeter.cli.progress import Meter
+    from rigidimeter.cli.model_text import model_blocks
     from rigidimeter.core.files import write_json
 
     if recordings.method not in ("auto", "bandlimited"):

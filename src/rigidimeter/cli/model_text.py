@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from statistics import median
-from typing import TYPE_CHECKING
 
+from rigidimeter.analysis.estimation.terms import Comparison, ModelRow
+from rigidimeter.analysis.study.torque_models import ModelledEpoch
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
 from rigidimeter.core.words import plural, with_error
-
-if TYPE_CHECKING:
-    from rigidimeter.analysis.estimation.terms import Comparison, ModelRow
-    from rigidimeter.analysis.study.torque_models import ModelledEpoch
 
 _COMPARED = ("parameters", "VAF %", "held out, 95 %", "AIC", "BIC", "white p", "input p")
 MOST_FINDINGS = 3
@@ -36,7 +33,11 @@ def model_blocks(found: Sequence[ModelledEpoch], *, full: bool = False) -> Itera
     failed = f", {len(found) - len(fitted)} failed" if len(fitted) < len(found) else ""
     yield Heading(f"{count}{failed}, {low:.4g} to {high:.4g} Hz")
     yield ""
-    yield from _models(fitted) if fitted[0].compared else _parameters(fitted)
+    if fitted[0].compared:
+        yield from _models(fitted)
+    else:
+        for rows in _rows(fitted).values():
+            yield from _parameters(rows)
     if notes := list(_findings(fitted)):
         yield ""
         yield Table((), notes, "<<", 1)
@@ -52,28 +53,32 @@ def _rows(fitted: Sequence[ModelledEpoch]) -> dict[str, list[ModelRow]]:
     return found
 
 
-def _parameters(fitted: Sequence[ModelledEpoch]) -> Iterator[Block]:
-    """Yield each parameter: median of the epochs ± the error of one, and the range of epochs."""
-    for terms, rows in _rows(fitted).items():
-        fits = [row.fit for row in rows if row.fit is not None]
-        if not fits:
-            yield f" {terms}: {rows[0].problem}"
-            continue
-        values: dict[tuple[str, str], list[tuple[float, float]]] = {}
-        for fit in fits:
-            for one in fit.parameters:
-                if not one.name.startswith("response"):
-                    key = f"{one.term} {one.name}".strip(), one.unit
-                    values.setdefault(key, []).append((one.value, one.standard_error))
-        cells: list[Sequence[str] | str] = []
-        for (name, unit), own in values.items():
-            middle, error = (median(sizes) for sizes in zip(*own, strict=True))
-            ends = [with_error(end(value for value, _ in own), 0.0) for end in (min, max)]
-            cells.append((name, unit, with_error(middle, error), " to ".join(ends)))
-        vaf = [fit.vaf_percent for fit in fits]
-        least = f"VAF {median(vaf):.2f} %, at least {min(vaf):.2f} %"
-        yield f" {terms}: {least}"
-        yield Table(("", "unit", "median of epochs", "range"), cells, "<<>>", 1)
+def _parameters(rows: Sequence[ModelRow]) -> Iterator[Block]:
+    """Yield the parameters of a model in one epoch, or their median and range in several."""
+    terms, fits = "+".join(rows[0].terms), [row.fit for row in rows if row.fit is not None]
+    if not fits:
+        yield f" {terms}: {rows[0].problem}"
+        return
+    several = len(rows) > 1
+    vaf = [fit.vaf_percent for fit in fits]
+    yield f" {terms}, VAF {median(vaf):.2f} %" + f", at least {min(vaf):.2f} %" * several
+    values: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    for fit in fits:
+        for one in fit.parameters:
+            if not one.name.startswith("response"):
+                key = f"{one.term} {one.name}".strip(), one.unit
+                values.setdefault(key, []).append((one.value, one.standard_error))
+    cells: list[Sequence[str] | str] = []
+    for (name, unit), own in values.items():
+        middle, error = (median(sizes) for sizes in zip(*own, strict=True))
+        ends = [with_error(end(value for value, _ in own), 0.0) for end in (min, max)]
+        cells.append((name, unit, with_error(middle, error), " to ".join(ends) * several))
+    yield Table(("", "unit", "median of epochs" * several, "range"), cells, "<<>>", 1)
+    if not several:
+        yield from (f"    {remark}" for remark in fits[0].remarks)
+        for gain in rows[0].beyond:
+            size = with_error(gain.value, gain.standard_error)
+            yield f"    {gain.term} from what no linear loop explains: {size} {gain.unit}"
 
 
 def _models(fitted: Sequence[ModelledEpoch]) -> Iterator[Block]:
@@ -108,24 +113,25 @@ def _findings(fitted: Sequence[ModelledEpoch]) -> Iterator[tuple[str, str]]:
         yield level, f"{name}  {first.headline}; {count} of {plural(len(fitted), 'epoch')}"
 
 
-def _epoch_blocks(found: ModelledEpoch) -> list[Block]:
+def _epoch_blocks(found: ModelledEpoch) -> Iterator[Block]:
     if found.models is None:
-        return [f"{found.epoch.name}: failed, {found.problem}"]
+        yield f"{found.epoch.name}: failed, {found.problem}"
+        return
     low, high = found.models.band_hz
     compared = found.models.compared
-    heading: list[Block] = [Heading(f"{found.epoch.name}, {low:.4g} to {high:.4g} Hz")]
+    yield Heading(f"{found.epoch.name}, {low:.4g} to {high:.4g} Hz")
     if found.clock:
-        heading.append(f"  {found.clock}")
-    findings = [f"  {one.level}  {one.name}  {one.headline}" for one in found.models.findings]
-    if not found.compared:
-        fits = (block for row in compared.rows for block in _fit_blocks(row))
-        return [*heading, *fits, *findings]
-    recommended = compared.recommended
-    shown = _fit_blocks(recommended) if recommended is not None else []
-    return [*heading, *_table(compared), *shown, *findings]
+        yield f"  {found.clock}"
+    shown: Iterable[ModelRow] = compared.rows
+    if found.compared:
+        yield from _compared_blocks(compared)
+        shown = filter(None, (compared.recommended,))
+    for row in shown:
+        yield from _parameters([row])
+    yield from (f"  {one.level}  {one.name}  {one.headline}" for one in found.models.findings)
 
 
-def _table(compared: Comparison) -> list[Block]:
+def _compared_blocks(compared: Comparison) -> Iterator[Block]:
     rows: list[Sequence[str] | str] = []
     for row in compared.rows:
         if row.fit is None:
@@ -137,45 +143,14 @@ def _table(compared: Comparison) -> list[Block]:
             (
                 f"{fit.n_parameters}",
                 f"{fit.vaf_percent:.2f}",
-                _held_out(row),
+                "" if row.held_out is None else "{:.2f} [{:.2f}, {:.2f}]".format(*row.held_out),
                 f"{fit.aic:.1f}",
                 f"{fit.bic:.1f}",
                 f"{fit.test.ljung_box_p:.2g}",
                 f"{fit.test.input_p:.2g}",
             )
         )
-    pushing = [f"  {row.name}: {row.problem}" for row in compared.rows if row.fit and row.problem]
+    yield Table(_COMPARED, rows, ">>=>>>>")
+    yield from (f"  {row.name}: {row.problem}" for row in compared.rows if row.fit and row.problem)
     verdict = "no model is recommended" if compared.recommended is None else "recommended"
-    table = Table(_COMPARED, rows, ">>=>>>>")
-    return [table, *pushing, f"  {verdict}: {compared.reason}"]
-
-
-def _held_out(row: ModelRow) -> str:
-    if row.held_out is None:
-        return ""
-    return "{:.2f} [{:.2f}, {:.2f}]".format(*row.held_out)
-
-
-def _fit_blocks(row: ModelRow) -> list[Block]:
-    if row.fit is None:
-        return [f"  {'+'.join(row.terms)}: {row.problem}"]
-    fit = row.fit
-    rows = [
-        (
-            f"{one.term} {one.name}".strip(),
-            with_error(one.value, one.standard_error),
-            one.unit,
-        )
-        for one in fit.parameters
-        if not one.name.startswith("response")
-    ]
-    return [
-        f"  {'+'.join(row.terms)}, VAF {fit.vaf_percent:.2f} %",
-        Table(("", "", "unit"), rows, "<>=", indent=4),
-        *(f"    {remark}" for remark in fit.remarks),
-        *(
-            f"    {one.term} from what no linear loop explains: "
-            f"{with_error(one.value, one.standard_error)} {one.unit}"
-            for one in row.beyond
-        ),
-    ]
+    yield f"  {verdict}: {compared.reason}"

@@ -8,18 +8,36 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.realtime_rig import run_loop
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.session import (
+    Protocol,
+    again,
+    codes_of,
+    count_epochs,
+    drawn_codes,
+    is_session,
+    read_manifest,
+    require_all,
+    rest_of,
+)
+from rigidimeter.core.settings import Settings, changed_settings, load_settings
+from rigidimeter.planning import plan
+from rigidimeter.rig.acquisition.processes import (
+    Ended,
+    Realtime,
+    RecordingPlan,
+    SessionMemory,
+    supervise,
+)
+from rigidimeter.rig.commissioning import as_measured, check_record, require_daily_check
+from rigidimeter.rig.console import SessionPlan, new_folder, next_steps, resume_command
+from rigidimeter.rig.devices import load_rig
 
-if TYPE_CHECKING:
-    from rigidimeter.core.session import Protocol
-    from rigidimeter.core.settings import Settings
-    from rigidimeter.rig.acquisition.processes import Ended, Realtime, SessionMemory
-    from rigidimeter.rig.console import SessionPlan
-
-Console = Callable[["SessionMemory"], object]
+Console = Callable[[SessionMemory], object]
 
 
 @dataclass(frozen=True)
@@ -49,16 +67,11 @@ class PlannedSession:
 
     def shown(self, *, virtual: bool) -> SessionPlan:
         """Return the plan as consoles take it, with the codes of a blinded session."""
-        from rigidimeter.core.session import codes_of
-        from rigidimeter.rig.console import SessionPlan
-
         codes = codes_of(self.about)
         return SessionPlan(self.settings, self.protocol.epochs, self.done, codes, virtual)
 
     def blinded(self) -> PlannedSession:
         """Return the session with codes for its conditions, which one that has them keeps."""
-        from rigidimeter.core.session import drawn_codes
-
         if self.about.get("codes"):
             return self
         names = [epoch.condition for epoch in self.protocol.epochs]
@@ -70,8 +83,6 @@ def new_session(
     settings: Settings, about: Mapping[str, Any], source: Path | None
 ) -> PlannedSession:
     """Return a new session of these settings."""
-    from rigidimeter.planning import plan
-
     planned = plan(settings.protocol, settings.prbs, settings.sinusoid, settings.seed)
     return PlannedSession(settings, planned, about=about, source=source)
 
@@ -86,8 +97,6 @@ def rest_of_session(
     UserError
         If nothing is left, or it was recorded on another kind of rig.
     """
-    from rigidimeter.core.session import Protocol, again, rest_of
-
     rest = rest_of(resume) if epoch is None else again(resume, epoch)
     if left:
         epochs = tuple(one for one in rest.epochs if one.number in left)
@@ -122,9 +131,6 @@ def checked_rig(planned: PlannedSession, rig: Path | None) -> PlannedSession:
     """
     if rig is None:
         return planned
-    from rigidimeter.rig.commissioning import as_measured, check_record, require_daily_check
-    from rigidimeter.rig.devices import load_rig
-
     rigfile, settings = load_rig(rig), planned.settings
     commissioned = check_record(rigfile, None, settings)
     today = require_daily_check(rigfile, commissioned, settings, settings_path=planned.source)
@@ -141,9 +147,6 @@ def run_planned(
     operator_seen_ns: Callable[[], int] | None = None,
 ) -> Ended:
     """Run a session that was checked, to its end."""
-    from rigidimeter.cli.realtime_rig import run_loop
-    from rigidimeter.rig.acquisition.processes import RecordingPlan, supervise
-
     home_rad = planned.continues.get("origin_rad") if rig is not None else None
     recording = RecordingPlan(
         out,
@@ -161,6 +164,62 @@ def run_planned(
         console=console,
         operator_seen_ns=operator_seen_ns,
     )
+
+
+def planned_session(
+    path: Path | None, resume: Path | None, seed: int | None, *, virtual: bool
+) -> PlannedSession:
+    """Return what is to be run: a new session, or the rest of one."""
+    if resume is None:
+        settings = load_settings(path)
+        if seed is not None:
+            settings = changed_settings(settings, {"seed": seed}, "the options")
+        return new_session(settings, {}, path)
+    if path is not None or seed is not None:
+        raise UserError(
+            "--resume uses the settings and the seed of that session; leave out "
+            + (f"{path}" if path is not None else "--seed")
+        )
+    return rest_of_session(resume, virtual=virtual)
+
+
+def offer_to_continue(out: Path) -> None:
+    """Say how to continue if the folder holds a session that was interrupted."""
+    if not is_session(out):
+        return
+    rest = rest_of(out)
+    if rest.epochs:
+        again = resume_command(out, None if rest.virtual else "RIG.toml", new_folder(out))
+        raise UserError(
+            f"{out}: holds a session of which {len(rest.epochs)} epochs are left; continue it with "
+            f"`{again}`, or name a new folder"
+        )
+
+
+def conclude(ended: Ended, out: Path, rig: Path | None, *, nwb: bool) -> None:
+    """Say how the session ended; a session that is not whole ends the program with status 1."""
+    folder = ended.folder if ended.folder != out.absolute() else out
+    good, of = count_epochs(folder)
+    echo(f"{good} of {of} epochs ended with success; session in {folder}")
+    if nwb:
+        echo(write_nwb_beside(folder))
+    closed = bool(ended.outcome)
+    left = len(rest_of(folder).epochs)
+    steps = next_steps(
+        folder,
+        closed=closed,
+        good=good,
+        left=left,
+        rig=rig,
+        out=new_folder(folder),
+        blinded=bool(codes_of(read_manifest(folder).get("about", {}))),
+    )
+    echo("\n".join(["What to do next:", *(f"  {step}" for step in steps)]))
+    if ended.outcome != "success":
+        raise UserError(
+            f"{folder}: the session ended with {ended.outcome or 'no outcome'}: {ended.reason}"
+        )
+    require_all(folder, good, of)
 
 
 def require_packages(settings: Settings) -> None:
@@ -188,9 +247,9 @@ def write_nwb_beside(folder: Path) -> str:
     A blinded session is written with its codes. The session is recorded whatever becomes of this,
     so a failure is a sentence.
     """
+    # Not before the session: it begins without what it does not need.
     from rigidimeter.analysis.export import export_sessions, sessions_of_recording
     from rigidimeter.analysis.reading import read, with_codes
-    from rigidimeter.core.session import codes_of, read_manifest
 
     out = folder.with_name(f"{folder.name}.nwb")
     try:

@@ -38,8 +38,6 @@ class Meter:
     from_first : bool
         The speed counts from the first report on: before that processes are started, or libraries
         loaded.
-    foreseen : bool
-        Whether it is known how long the work takes; without that no time left is shown.
     """
 
     def __init__(
@@ -49,7 +47,6 @@ class Meter:
         clock: Callable[[], float] = time.monotonic,
         *,
         from_first: bool = False,
-        foreseen: bool = True,
     ) -> None:
         self._title = title
         self._total = max(total, 1e-12)
@@ -57,7 +54,6 @@ class Meter:
         self._clock = clock
         self._start_s = clock()
         self._first = None if from_first else (self._start_s, 0.0)
-        self._foreseen = foreseen
         self._line_s: float | None = None
         self._replaces = sys.stderr.isatty()
 
@@ -82,7 +78,7 @@ class Meter:
     def left_s(self) -> float | None:
         """The time left at the mean speed so far; None before a tenth of the work is done."""
         first_s, first = self._first or (0.0, self._done)
-        if not self._foreseen or self.share < LEAST_SHARE or self._done <= first:
+        if self.share < LEAST_SHARE or self._done <= first:
             return None
         return (self._clock() - first_s) * (self._total - self._done) / (self._done - first)
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from rigidimeter.cli.inputs import keep_inputs, say
-from rigidimeter.cli.options import FullOption, JsonOption
+from rigidimeter.cli.help_pages import OPTIONS, argument
+from rigidimeter.cli.options import FULL, JSON
+from rigidimeter.cli.output import keep_inputs, say
 from rigidimeter.cli.terminal_tables import Block, Heading, Table, show
 from rigidimeter.core.errors import UserError
 
@@ -22,53 +21,27 @@ MOST_OFFSETS, MOST_PAIRS = 6, 3
 
 
 def ratings(
-    table: Annotated[
-        Path,
-        typer.Argument(metavar="FILE", help="CSV file with one rating a row.", show_default=False),
-    ],
-    json_out: JsonOption = None,
-    condition: Annotated[
-        str, typer.Option("--condition", metavar="COLUMN", help="Column of the condition.")
-    ] = "condition",
-    score: Annotated[
-        str, typer.Option("--score", metavar="COLUMN", help="Column of the rating.")
-    ] = "score",
-    examiner: Annotated[
-        str, typer.Option("--examiner", metavar="COLUMN", help="Column of the examiner.")
-    ] = "examiner",
-    subject: Annotated[
-        str, typer.Option("--subject", metavar="COLUMN", help="Column of the subject.")
-    ] = "subject",
-    day: Annotated[
-        str,
-        typer.Option("--day", metavar="COLUMN", help="Column of the day."),
-    ] = "day",
-    random: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--random",
-            metavar="NAME",
-            help="Random offset of examiner, subject or subject/day. Default: examiner; repeat "
-            "for several.",
-        ),
-    ] = None,
-    scale: Annotated[
-        tuple[float, float],
-        typer.Option("--scale", metavar="LOW HIGH", help="Lowest and highest rating."),
-    ] = (0.0, 3.0),
-    step: Annotated[
-        float, typer.Option("--step", metavar="STEP", help="Step of the scale; 0 for none.")
-    ] = 0.5,
-    contrast: Annotated[
-        tuple[str, str] | None,
-        typer.Option(
-            "--contrast",
-            metavar="A B",
-            help="Test A minus B. Default: the first two conditions in the file's order, OFF "
-            "first where it occurs.",
-        ),
-    ] = None,
-    full: FullOption = False,
+    table: Path = argument("FILE", "CSV file with one rating a row."),
+    json_out: Path | None = JSON,
+    condition: str = OPTIONS.option("--condition COLUMN", "Column of the condition.", "condition"),
+    score: str = OPTIONS.option("--score COLUMN", "Column of the rating.", "score"),
+    examiner: str = OPTIONS.option("--examiner COLUMN", "Column of the examiner.", "examiner"),
+    subject: str = OPTIONS.option("--subject COLUMN", "Column of the subject.", "subject"),
+    day: str = OPTIONS.option("--day COLUMN", "Column of the day.", "day"),
+    random: list[str] | None = OPTIONS.option(
+        "--random NAME",
+        "Random offset of examiner, subject or subject/day. Default: examiner; repeat for several.",
+    ),
+    scale: tuple[float, float] = OPTIONS.option(
+        "--scale LOW HIGH", "Lowest and highest rating.", (0.0, 3.0)
+    ),
+    step: float = OPTIONS.option("--step STEP", "Step of the scale; 0 for none.", 0.5),
+    contrast: tuple[str, str] | None = OPTIONS.option(
+        "--contrast A B",
+        "Test A minus B. Default: the second minus the first condition of the file, OFF being "
+        "first where it occurs.",
+    ),
+    full: bool = FULL,
 ) -> None:
     """Model ratings by several examiners, each with an offset.
 
@@ -162,7 +135,7 @@ def _blocks(found: RatingsFound, full: bool) -> Iterator[Block]:
 
 
 def _contrast(found: RatingsFound) -> Iterator[Block]:
-    first, second = found.reference, found.other
+    first, second = found.other, found.reference
     c, (low, high) = found.contrast, found.interval
     way = "higher" if c.estimate > 0 else "lower" if c.estimate < 0 else "neither higher nor lower"
     yield (

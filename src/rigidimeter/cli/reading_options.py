@@ -5,14 +5,13 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast, get_type_hints
+from typing import TYPE_CHECKING, Any, cast, get_type_hints
 
-import typer
-
-from rigidimeter.cli.help_pages import ESTIMATE, HOW_TO_READ
-from rigidimeter.cli.options import SettingsOption
+from rigidimeter.cli.help_pages import ESTIMATE, HOW_TO_READ, argument
+from rigidimeter.cli.options import SETTINGS
+from rigidimeter.cli.progress import Meter
 from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
@@ -25,218 +24,93 @@ if TYPE_CHECKING:
 class Recordings:
     """What the user named, and how to read and fit it; the fields are options of the commands."""
 
-    paths: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="INPUT", help="Sessions, tables and other recordings.", show_default=False
-        ),
-    ]
-    method: Annotated[
-        str,
-        typer.Option(
-            "--method",
-            metavar="NAME",
-            help="iv, bandlimited, spectral, published.",
-            rich_help_panel=ESTIMATE,
-        ),
-    ] = "auto"
-    column: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--column",
-            metavar="NAME=COLUMN",
-            help="Column of a quantity, such as torque=Fz. Write torque_nm=Fz to say that it is "
-            "in N·m. Repeat as needed.",
-            rich_help_panel=HOW_TO_READ,
-        ),
-    ] = None
-    unit: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--unit",
-            metavar="NAME=UNIT",
-            help="Unit of a column, such as angle=deg. Where the file does not state it; repeat "
-            "as needed.",
-            rich_help_panel=HOW_TO_READ,
-        ),
-    ] = None
-    scale: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--scale",
-            metavar="NAME=FACTOR",
-            help='What a column is multiplied by, for example "torque=2.5 Nm/V", or "torque=0.25 '
-            'm" for a force with a lever arm; repeat as needed.',
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = None
-    offset: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--offset",
-            metavar="NAME=VALUE",
-            help='What a column reads at zero, for example "torque=0.1 V"; repeat as needed.',
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = None
-    skip_rows: Annotated[
-        int,
-        typer.Option(
-            "--skip-rows",
-            metavar="N",
-            min=0,
-            help="Lines at the beginning of a text not to read.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = 0
-    names: Annotated[
-        str | None,
-        typer.Option(
-            "--names",
-            metavar="A,B,...",
-            help="The names of the columns of a text that does not name them.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = None
-    table: Annotated[
-        str | None,
-        typer.Option(
-            "--table",
-            metavar="NAME",
-            help="The sheet, or the variable of a MATLAB "
-            "file, that is read, of a file with several.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = None
-    mapping: Annotated[
-        Path | None,
-        typer.Option(
-            "--mapping",
-            metavar="FILE",
-            help="A mapping file, which says columns, units and the like for the files of one "
-            "laboratory; `rigidimeter inspect` writes one.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = None
-    join: Annotated[
-        bool,
-        typer.Option(
-            "--join",
-            help="The inputs are one recording, such as torque and motion in two files.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = False
-    clock_offset: Annotated[
-        str | None,
-        typer.Option(
-            "--clock-offset",
-            metavar="S|found",
-            help="With --join: seconds to add to the clocks of the second and later inputs; found: "
-            "estimated from torque and motion.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = None
-    rate_hz: Annotated[
-        float | None,
-        typer.Option(
-            "--rate-hz",
-            metavar="HZ",
-            help="Sampling rate of a file without a time_s column.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = None
-    reaction: Annotated[
-        bool,
-        typer.Option(
-            "--reaction",
-            help="Torque is the joint's reaction, of opposite sign. The file holds the negative "
-            "of the torque that drives the joint.",
-            rich_help_panel=HOW_TO_READ,
-        ),
-    ] = False
-    epoch_length_s: Annotated[
-        float | None,
-        typer.Option(
-            "--epoch-length-s",
-            metavar="S",
-            help="Cut into epochs of this length. For a file without an epoch column.",
-            rich_help_panel=HOW_TO_READ,
-        ),
-    ] = None
-    condition: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--condition",
-            metavar="NAME",
-            help="Condition of each input, in their order. For files without a condition column; "
-            "once for all of them, or once for each.",
-            rich_help_panel=HOW_TO_READ,
-        ),
-    ] = None
-    task: Annotated[
-        str | None,
-        typer.Option(
-            "--task",
-            metavar="prbs|sinusoid",
-            help="Fit J, B and K (prbs) or score (sinusoid). Default: found from the motion.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = None
-    leave_out: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--leave-out",
-            metavar='"[NAME=]START:STOP REASON"',
-            help="Seconds on the recording's clock that no estimate uses, for example "
-            '"12.3:14.0 cough"; NAME is a recording, where there are several. Repeat as needed.',
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = None
-    blinded: Annotated[
-        bool,
-        typer.Option(
-            "--blinded",
-            help="Of sessions that were recorded blinded: codes for the conditions.",
-            rich_help_panel=HOW_TO_READ,
-            hidden=True,
-        ),
-    ] = False
-    band_hz: Annotated[
-        tuple[float, float] | None,
-        typer.Option(
-            "--band-hz",
-            metavar="LOW HIGH",
-            help="Band of the fit. Default: bandlimited 0.15 to 10 where the perturbation is "
-            "known, else to 50; iv and spectral 0.15 to 30; at most 0.4 times the slowest "
-            "channel's rate.",
-            rich_help_panel=ESTIMATE,
-            hidden=True,
-        ),
-    ] = None
-    controller: Annotated[
-        tuple[float, float] | None,
-        typer.Option(
-            "--controller",
-            metavar="J_C B_C",
-            help="Inertia in kg·m² and damping in N·m·s/rad of the admittance, for files without "
-            "a manifest. Default: those of the settings, else the paper's. A wrong value makes iv "
-            "less precise but does not bias it.",
-            rich_help_panel=ESTIMATE,
-            hidden=True,
-        ),
-    ] = None
-    settings: SettingsOption = None
+    paths: list[Path] = argument("INPUT", "Sessions, tables and other recordings.")
+    method: str = ESTIMATE.option("--method NAME", "iv, bandlimited, spectral, published.", "auto")
+    column: list[str] | None = HOW_TO_READ.option(
+        "--column NAME=COLUMN",
+        "Column of a quantity, such as torque=Fz. Write torque_nm=Fz to say that it is in N·m. "
+        "Repeat as needed.",
+    )
+    unit: list[str] | None = HOW_TO_READ.option(
+        "--unit NAME=UNIT",
+        "Unit of a column, such as angle=deg. Where the file does not state it; repeat as needed.",
+    )
+    scale: list[str] | None = HOW_TO_READ.further(
+        "--scale NAME=FACTOR",
+        'What a column is multiplied by, for example "torque=2.5 Nm/V", or "torque=0.25 m" for a '
+        "force with a lever arm; repeat as needed.",
+    )
+    offset: list[str] | None = HOW_TO_READ.further(
+        "--offset NAME=VALUE",
+        'What a column reads at zero, for example "torque=0.1 V"; repeat as needed.',
+    )
+    skip_rows: int = HOW_TO_READ.further(
+        "--skip-rows N", "Lines at the beginning of a text not to read.", 0, min=0
+    )
+    names: str | None = HOW_TO_READ.further(
+        "--names A,B,...", "The names of the columns of a text that does not name them."
+    )
+    table: str | None = HOW_TO_READ.further(
+        "--table NAME",
+        "The sheet, or the variable of a MATLAB file, that is read, of a file with several.",
+    )
+    mapping: Path | None = HOW_TO_READ.further(
+        "--mapping FILE",
+        "A mapping file, which says columns, units and the like for the files of one laboratory; "
+        "`rigidimeter inspect` writes one.",
+    )
+    join: bool = HOW_TO_READ.flag(
+        "--join",
+        "The inputs are one recording, such as torque and motion in two files.",
+        hidden=True,
+    )
+    clock_offset: str | None = HOW_TO_READ.further(
+        "--clock-offset S|found",
+        "With --join: seconds to add to the clocks of the second and later inputs; found: "
+        "estimated from torque and motion.",
+    )
+    rate_hz: float | None = HOW_TO_READ.further(
+        "--rate-hz HZ", "Sampling rate of a file without a time_s column."
+    )
+    reaction: bool = HOW_TO_READ.flag(
+        "--reaction",
+        "Torque is the joint's reaction, of opposite sign. The file holds the negative of the "
+        "torque that drives the joint.",
+    )
+    epoch_length_s: float | None = HOW_TO_READ.option(
+        "--epoch-length-s S", "Cut into epochs of this length. For a file without an epoch column."
+    )
+    condition: list[str] | None = HOW_TO_READ.option(
+        "--condition NAME",
+        "Condition of each input, in their order. For files without a condition column; once for "
+        "all of them, or once for each.",
+    )
+    task: str | None = HOW_TO_READ.further(
+        "--task prbs|sinusoid",
+        "Fit J, B and K (prbs) or score (sinusoid). Default: found from the motion.",
+    )
+    leave_out: list[str] | None = HOW_TO_READ.further(
+        '--leave-out "[NAME=]START:STOP REASON"',
+        "Seconds on the recording's clock that no estimate uses, for example "
+        '"12.3:14.0 cough"; NAME is a recording, where there are several. Repeat as needed.',
+    )
+    blinded: bool = HOW_TO_READ.flag(
+        "--blinded",
+        "Of sessions that were recorded blinded: codes for the conditions.",
+        hidden=True,
+    )
+    band_hz: tuple[float, float] | None = ESTIMATE.further(
+        "--band-hz LOW HIGH",
+        "Band of the fit. Default: bandlimited 0.15 to 10 where the perturbation is known, else "
+        "to 50; iv and spectral 0.15 to 30; at most 0.4 times the slowest channel's rate.",
+    )
+    controller: tuple[float, float] | None = ESTIMATE.further(
+        "--controller J_C B_C",
+        "Inertia in kg·m² and damping in N·m·s/rad of the admittance, for files without a "
+        "manifest. Default: those of the settings, else the paper's. A wrong value makes iv less "
+        "precise but does not bias it.",
+    )
+    settings: Path | None = SETTINGS
 
     def read(self) -> Recording:
         """Read every input, with the band and the controller of the options in its settings.
@@ -247,7 +121,6 @@ class Recordings:
             If an option is wrong, or not one input can be read.
         """
         from rigidimeter.analysis.reading import read, with_codes
-        from rigidimeter.cli.progress import Meter
 
         with Meter("read", 1.0) as meter:
             recording = read(
@@ -336,6 +209,12 @@ class Recordings:
             inertia, damping = self.controller
             values = {"inertia_kg_m2": inertia, "damping_nm_s_rad": damping}
             yield f"--controller {inertia:g} {damping:g}", {"controller": values}
+
+
+def plain_recordings(path: Path) -> Recordings:
+    """Return what to read without any option."""
+    defaults = {each.name: cast(Any, each.default).default for each in fields(Recordings)}
+    return Recordings(**{**defaults, "paths": [path]})
 
 
 def reads_recordings(command: Callable[..., None]) -> Callable[..., None]:

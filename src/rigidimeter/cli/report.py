@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from rigidimeter.cli.help_pages import WRITE
-from rigidimeter.cli.inputs import (
-    analyse_recordings,
-    analyse_study_folder,
-    command_line,
-    say_analysed,
-    study_of,
-)
-from rigidimeter.cli.options import KeyOption
+from rigidimeter.cli.options import KEY
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import Heading, show
 from rigidimeter.core.errors import UserError
@@ -31,25 +23,11 @@ if TYPE_CHECKING:
 @reads_recordings
 def report(
     recordings: Recordings,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out",
-            metavar="DIR",
-            help="Folder of the report.",
-            rich_help_panel=WRITE,
-        ),
-    ],
-    title: Annotated[
-        str | None,
-        typer.Option(
-            "--title",
-            metavar="TEXT",
-            help="Title of the page. Default: the title of the study, or Joint rigidity.",
-            rich_help_panel=WRITE,
-        ),
-    ] = None,
-    key: KeyOption = None,
+    out: Path = WRITE.option("--out DIR", "Folder of the report.", ...),
+    title: str | None = WRITE.option(
+        "--title TEXT", "Title of the page. Default: the title of the study, or Joint rigidity."
+    ),
+    key: Path | None = KEY,
 ) -> None:
     """Write one HTML page of results, with its tables and figures.
 
@@ -62,7 +40,8 @@ def report(
       rigidimeter report study --out study/report
       rigidimeter report ankle.csv --reaction --epoch-length-s 20 --out report
     """
-    from rigidimeter.analysis.study import lead, recording_result
+    from rigidimeter.analysis.study import lead
+    from rigidimeter.cli.inputs import analyse_recordings, analyse_study_folder, study_of
     from rigidimeter.core.session import is_session
 
     if any(is_session(folder) for folder in (out, *out.resolve().parents)):
@@ -76,19 +55,15 @@ def report(
                 f"--out {out}: is the study or its stored analysis; name another folder, such as "
                 f"{folder / 'report'}"
             )
-        study = analyse_study_folder(folder, recordings, key)
-        last: Callable[[], int] = study.say
-        result = study.result
+        analysed = analyse_study_folder(folder, recordings, key)
     else:
-        read, analysis = analyse_recordings(recordings)
-        last = partial(say_analysed, read, analysis)
-        result = recording_result(read, analysis, command_line())
+        _, analysed = analyse_recordings(recordings)
     try:
-        page = write_page(result, out, title)
-        show([Heading(lead(result)), ""])
+        page = write_page(analysed.result, out, title)
+        show([Heading(lead(analysed.result)), ""])
         echo(str(page))
     finally:
-        status = last()
+        status = analysed.say()
     raise typer.Exit(status)
 
 
@@ -104,7 +79,6 @@ def write_page(result: StudyResult, out: Path, title: str | None = None) -> Path
     """Write the report of a result with progress; return the path of its page."""
     from rigidimeter.analysis import report as reporting
     from rigidimeter.analysis.reading import write_estimates_json
-    from rigidimeter.cli.progress import Meter
 
     with Meter("report", 1.0) as meter:
         page = reporting.report(result, out, title, progress=meter.reach)

@@ -3,26 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
+from rigidimeter.cli.help_pages import OPTIONS
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.terminal_tables import Heading, Table, show
 from rigidimeter.core.errors import UserError
 
 
 def reproduce(
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder for page, ledger and figures.")
-    ],
-    seed: Annotated[
-        int, typer.Option("--seed", min=0, max=2**31, help="Seed of everything random.")
-    ] = 2023,
-    only: Annotated[
-        list[str] | None,
-        typer.Option("--only", metavar="ID", help="Only this row; repeat for several."),
-    ] = None,
+    out: Path = OPTIONS.option("--out DIR", "Folder for page, ledger and figures.", ...),
+    seed: int = OPTIONS.option("--seed", "Seed of everything random.", 2023, min=0, max=2**31),
+    only: list[str] | None = OPTIONS.option("--only ID", "Only this row; repeat for several."),
 ) -> None:
     """Recompute every equation, figure and table of the paper.
 
@@ -36,7 +28,6 @@ def reproduce(
       rigidimeter reproduce --out paper
       rigidimeter reproduce --out paper --only fig-6b --only eq-8-largest
     """
-    from rigidimeter.cli.progress import Meter
     from rigidimeter.paper import Context, chosen, make_rows, tally, write_ledger
 
     names = [name for text in only or [] for name in text.split(",") if name]

@@ -8,14 +8,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rigidimeter.core.errors import UserError
-
-if TYPE_CHECKING:
-    from rigidimeter.core.settings import Settings
-    from rigidimeter.rig.commissioning import CommissioningRecord, DailyRecord
-    from rigidimeter.rig.console.page import RigStep
+from rigidimeter.core.settings import Settings
+from rigidimeter.rig.commissioning import (
+    CommissioningRecord,
+    DailyRecord,
+    check_record,
+    daily_path,
+    read_daily,
+    read_record,
+    record_path,
+    require_daily_check,
+)
+from rigidimeter.rig.console.page import RigStep
+from rigidimeter.rig.devices import load_rig
 
 COMMISSIONED, CHECKED, ZEROED = (
     "Commissioning record",
@@ -40,8 +47,6 @@ def rig_steps(
     >>> [step.state for step in rig_steps(None, Settings())]
     ['not needed', 'not needed', 'optional']
     """
-    from rigidimeter.rig.console.page import RigStep
-
     zero = RigStep(ZEROED, "optional", BY_ITSELF, action="zero", required=False)
     if rig is None:
         nobody = "the virtual rig moves nobody"
@@ -56,17 +61,6 @@ def rig_steps(
 def _records(
     rig: Path, settings: Settings, source: Path | None, now_utc: datetime | None
 ) -> tuple[RigStep, ...]:
-    from rigidimeter.rig.commissioning import (
-        check_record,
-        daily_path,
-        read_daily,
-        read_record,
-        record_path,
-        require_daily_check,
-    )
-    from rigidimeter.rig.console.page import RigStep
-    from rigidimeter.rig.devices import load_rig
-
     try:
         rigfile = load_rig(rig)
     except UserError as error:

@@ -4,74 +4,38 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from rigidimeter.cli.console import HostOption, PortOption, TokenOption, run_on_page
-from rigidimeter.cli.help_pages import RUN
-from rigidimeter.cli.options import (
-    CpuOption,
-    NewSessionOption,
-    PriorityOption,
-    RigOption,
-    SeedOption,
-)
+from rigidimeter.cli.console import HOST, PORT, TOKEN
+from rigidimeter.cli.help_pages import OPTIONS, RUN, argument
+from rigidimeter.cli.options import CPU, NEW_SESSION, PRIORITY, RIG, SEED
 from rigidimeter.cli.output import echo
 from rigidimeter.core.errors import UserError
 
-if TYPE_CHECKING:
-    from rigidimeter.cli.planned_session import PlannedSession
-    from rigidimeter.rig.acquisition.processes import Ended
-
 
 def run(
-    out: NewSessionOption,
-    protocol: Annotated[
-        Path | None,
-        typer.Argument(metavar="[PROTOCOL.toml]", help="Settings with the protocol."),
-    ] = None,
-    rig: RigOption = None,
-    resume: Annotated[
-        Path | None,
-        typer.Option(
-            "--resume",
-            metavar="DIR",
-            help="Continue this session: run the epochs that are left.",
-            rich_help_panel=RUN,
-        ),
-    ] = None,
-    seed: SeedOption = None,
-    unattended: Annotated[
-        bool,
-        typer.Option(
-            "--unattended",
-            help="Run without an operator. What would pause the session ends it instead.",
-            rich_help_panel=RUN,
-        ),
-    ] = False,
-    priority: PriorityOption = 80,
-    cpu: CpuOption = None,
-    page: Annotated[
-        bool,
-        typer.Option(
-            "--console",
-            help="Lead the session from a page in a browser. As `rigidimeter console` does.",
-            rich_help_panel=RUN,
-        ),
-    ] = False,
-    blinded: Annotated[
-        bool,
-        typer.Option(
-            "--blinded",
-            help="Show codes in place of conditions. For an examiner who may see the screen; "
-            "also with `estimate --blinded`.",
-            rich_help_panel=RUN,
-        ),
-    ] = False,
-    host: HostOption = "127.0.0.1",
-    port: PortOption = 8765,
-    token: TokenOption = "",
+    out: Path = NEW_SESSION,
+    protocol: Path | None = argument("[PROTOCOL.toml]", "Settings with the protocol.", None),
+    rig: Path | None = RIG,
+    resume: Path | None = RUN.option(
+        "--resume DIR", "Continue this session: run the epochs that are left."
+    ),
+    seed: int | None = SEED,
+    unattended: bool = RUN.flag(
+        "--unattended", "Run without an operator. What would pause the session ends it instead."
+    ),
+    priority: int = PRIORITY,
+    cpu: int | None = CPU,
+    page: bool = RUN.flag(
+        "--console", "Lead the session from a page in a browser. As `rigidimeter console` does."
+    ),
+    blinded: bool = RUN.flag(
+        "--blinded",
+        "Show codes in place of conditions. For an examiner who may see the screen; also with "
+        "`estimate --blinded`.",
+    ),
+    host: str = HOST,
+    port: int = PORT,
+    token: str = TOKEN,
 ) -> None:
     """Run a protocol in real time, on a rig or the virtual rig.
 
@@ -87,25 +51,39 @@ def run(
       rigidimeter run protocol.toml --rig rig.toml --out session
       rigidimeter run --resume session --rig rig.toml --out session-2
     """
-    from rigidimeter.cli.planned_session import checked_rig, require_packages, run_planned
+    from rigidimeter.cli.planned_session import (
+        checked_rig,
+        conclude,
+        offer_to_continue,
+        planned_session,
+        require_packages,
+        run_planned,
+    )
     from rigidimeter.rig.acquisition.processes import Realtime, complete_left
     from rigidimeter.rig.console import discard_typed, terminal_view
 
     for line in complete_left():
         echo(line, err=True)
-    planned = _planned(protocol, resume, seed, virtual=rig is None)
+    planned = planned_session(protocol, resume, seed, virtual=rig is None)
     planned = planned.blinded() if blinded else planned
     require_packages(planned.settings)
-    _offer(out)
+    offer_to_continue(out)
     if page:
         if unattended or resume is not None:
             raise UserError(
                 "--console goes with neither --unattended nor --resume; continue a session under "
                 "After on the page of `rigidimeter console`"
             )
-        realtime = Realtime(priority=priority, cpu=cpu)
-        ended = run_on_page(planned, out, rig, realtime, (host, port, token))
-        _conclude(ended, out, rig, nwb=False)
+        from rigidimeter.cli.page_session import serve_page
+        from rigidimeter.rig.console.page import Place
+
+        folder, source = out.absolute(), planned.source
+        name = source.name if source is not None else "the defaults"
+        place = Place(folder.parent, planned.settings, name, rig, folder.name, source)
+        led = serve_page(place, Realtime(priority=priority, cpu=cpu), (host, port, token))
+        if led is None:
+            raise UserError("the program was stopped before a session was run")
+        conclude(led, out, rig, nwb=False)
         return
     planned = checked_rig(planned, rig)
     attended = not unattended and sys.stdin is not None and sys.stdin.isatty()
@@ -116,89 +94,22 @@ def run(
     for remark in ended.remarks:
         echo(remark, err=True)
     try:
-        _conclude(ended, out, rig, nwb=planned.settings.sharing.nwb_at_close)
+        conclude(ended, out, rig, nwb=planned.settings.sharing.nwb_at_close)
     finally:
         if attended:
             discard_typed(sys.stdin)
 
 
-def _conclude(ended: Ended, out: Path, rig: Path | None, *, nwb: bool) -> None:
-    """Say how the session ended; a session that is not whole ends the program with status 1."""
-    from rigidimeter.cli.planned_session import write_nwb_beside
-    from rigidimeter.core.session import codes_of, count_epochs, read_manifest, require_all, rest_of
-    from rigidimeter.rig.console import new_folder, next_steps
-
-    folder = ended.folder if ended.folder != out.absolute() else out
-    good, of = count_epochs(folder)
-    echo(f"{good} of {of} epochs ended with success; session in {folder}")
-    if nwb:
-        echo(write_nwb_beside(folder))
-    closed = bool(ended.outcome)
-    left = len(rest_of(folder).epochs)
-    steps = next_steps(
-        folder,
-        closed=closed,
-        good=good,
-        left=left,
-        rig=rig,
-        out=new_folder(folder),
-        blinded=bool(codes_of(read_manifest(folder).get("about", {}))),
-    )
-    echo("\n".join(["What to do next:", *(f"  {step}" for step in steps)]))
-    if ended.outcome != "success":
-        raise UserError(
-            f"{folder}: the session ended with {ended.outcome or 'no outcome'}: {ended.reason}"
-        )
-    require_all(folder, good, of)
-
-
-def _planned(
-    path: Path | None, resume: Path | None, seed: int | None, *, virtual: bool
-) -> PlannedSession:
-    """Return what is to be run: a new session, or the rest of one."""
-    from rigidimeter.cli.planned_session import new_session, rest_of_session
-    from rigidimeter.core.settings import changed_settings, load_settings
-
-    if resume is None:
-        settings = load_settings(path)
-        if seed is not None:
-            settings = changed_settings(settings, {"seed": seed}, "the options")
-        return new_session(settings, {}, path)
-    if path is not None or seed is not None:
-        raise UserError(
-            "--resume uses the settings and the seed of that session; leave out "
-            + (f"{path}" if path is not None else "--seed")
-        )
-    return rest_of_session(resume, virtual=virtual)
-
-
-def _offer(out: Path) -> None:
-    """Say how to continue if the folder holds a session that was interrupted."""
-    from rigidimeter.core.session import is_session, rest_of
-    from rigidimeter.rig.console import new_folder, resume_command
-
-    if not is_session(out):
-        return
-    rest = rest_of(out)
-    if rest.epochs:
-        again = resume_command(out, None if rest.virtual else "RIG.toml", new_folder(out))
-        raise UserError(
-            f"{out}: holds a session of which {len(rest.epochs)} epochs are left; continue it with "
-            f"`{again}`, or name a new folder"
-        )
-
-
 def recover(
-    session: Annotated[
-        Path, typer.Argument(metavar="SESSION", help="Session folder.", show_default=False)
-    ],
-    reason: Annotated[
-        str, typer.Option("--reason", metavar="TEXT", help="Why it ended, if you know.")
-    ] = "the recording process ended without closing the session",
-    force: Annotated[
-        bool,
-        typer.Option("--force", help="Also a session that was closed and is damaged at its end."),
-    ] = False,
+    session: Path = argument("SESSION", "Session folder."),
+    reason: str = OPTIONS.option(
+        "--reason TEXT",
+        "Why it ended, if you know.",
+        "the recording process ended without closing the session",
+    ),
+    force: bool = OPTIONS.flag(
+        "--force", "Also a session that was closed and is damaged at its end."
+    ),
 ) -> None:
     """Close an interrupted session, keeping everything recorded.
 

@@ -2,47 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Any
 
-import typer
-
-from rigidimeter.cli.options import NewSessionOption, SeedOption, SettingsOption
+from rigidimeter.cli.help_pages import OPTIONS
+from rigidimeter.cli.options import NEW_SESSION, SEED, SETTINGS
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.progress import Meter
 from rigidimeter.core.errors import UserError
 
 
 def simulate(
-    out: NewSessionOption,
-    settings: SettingsOption = None,
-    seed: SeedOption = None,
-    task: Annotated[
-        str | None,
-        typer.Option(
-            "--task", metavar="prbs|sinusoid", help="Replace the protocol by epochs of this task."
-        ),
-    ] = None,
-    condition: Annotated[
-        str | None,
-        typer.Option("--condition", metavar="NAME", help="Condition of the epochs of --task."),
-    ] = None,
-    epochs: Annotated[
-        int | None, typer.Option("--epochs", metavar="N", help="Number of epochs of --task.")
-    ] = None,
-    paper_rates: Annotated[
-        bool,
-        typer.Option(
-            "--paper-rates",
-            help="Sample as in the paper (Sec. 2.2). Torque at 100 samples/s, motion at 50 "
-            "samples/s with up to 5 ms of jitter.",
-        ),
-    ] = False,
-    real_time: Annotated[
-        bool,
-        typer.Option(
-            "--real-time",
-            help="Run in real time, not as fast as possible.",
-        ),
-    ] = False,
+    out: Path = NEW_SESSION,
+    settings: Path | None = SETTINGS,
+    seed: int | None = SEED,
+    task: str | None = OPTIONS.option(
+        "--task prbs|sinusoid", "Replace the protocol by epochs of this task."
+    ),
+    condition: str | None = OPTIONS.option(
+        "--condition NAME", "Condition of the epochs of --task."
+    ),
+    epochs: int | None = OPTIONS.option("--epochs N", "Number of epochs of --task."),
+    paper_rates: bool = OPTIONS.flag(
+        "--paper-rates",
+        "Sample as in the paper (Sec. 2.2). Torque at 100 samples/s, motion at 50 samples/s with "
+        "up to 5 ms of jitter.",
+    ),
+    real_time: bool = OPTIONS.flag("--real-time", "Run in real time, not as fast as possible."),
 ) -> None:
     """Run a protocol on the virtual rig, and record a session folder.
 
@@ -57,7 +43,6 @@ def simulate(
       rigidimeter simulate --out session --settings study.toml --seed 7
       rigidimeter simulate --out session --task prbs --condition DBS --epochs 12
     """
-    from rigidimeter.cli.progress import Meter
     from rigidimeter.core.session import count_epochs, require_all
     from rigidimeter.core.settings import changed_settings, load_settings
     from rigidimeter.planning import too_few_cycles

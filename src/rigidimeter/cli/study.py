@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from rigidimeter.cli.help_pages import HelpCommand, HelpGroup
-from rigidimeter.cli.inputs import analyse_study_folder
-from rigidimeter.cli.options import NewStudyOption, StudySeedOption
+from rigidimeter.cli.help_pages import OPTIONS, WRITE, HelpCommand, HelpGroup, argument
+from rigidimeter.cli.options import NEW_STUDY, STUDY_SEED
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.reading_options import Recordings
+from rigidimeter.cli.progress import Meter
+from rigidimeter.cli.reading_options import plain_recordings
+from rigidimeter.cli.report import write_page
+from rigidimeter.cli.terminal_tables import show
 from rigidimeter.core.errors import UserError, refused
 
 if TYPE_CHECKING:
@@ -29,8 +31,8 @@ study = typer.Typer(
 
 @study.command(cls=HelpCommand)
 def new(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="New folder.", show_default=False)],
-    title: Annotated[str, typer.Option("--title", metavar="TEXT", help="Title of the study.")] = "",
+    folder: Path = argument("DIR", "New folder."),
+    title: str = OPTIONS.option("--title TEXT", "Title of the study.", ""),
 ) -> None:
     """Make an empty study folder: study.toml and its tables.
 
@@ -51,24 +53,14 @@ def new(
 
 @study.command(cls=HelpCommand)
 def add(
-    folder: Annotated[
-        Path,
-        typer.Argument(
-            metavar="STUDY", help="Study folder; made if it is none.", show_default=False
-        ),
-    ],
-    sessions: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            metavar="[SESSION]...",
-            help="Session folders in it. Default: all in it "
-            "and in its folder sessions that sessions.csv does not name.",
-        ),
-    ] = None,
-    subject: Annotated[
-        str,
-        typer.Option("--subject", metavar="CODE", help="Subject of sessions that do not say it."),
-    ] = "",
+    folder: Path = argument("STUDY", "Study folder; made if it is none."),
+    sessions: list[Path] | None = argument(
+        "[SESSION]...",
+        "Session folders in it. Default: all in it and in its folder sessions that sessions.csv "
+        "does not name.",
+        None,
+    ),
+    subject: str = OPTIONS.option("--subject CODE", "Subject of sessions that do not say it.", ""),
 ) -> None:
     """Add recorded sessions to a study folder.
 
@@ -95,23 +87,17 @@ def add(
 
 @study.command(cls=HelpCommand)
 def simulate(
-    out: NewStudyOption,
-    seed: StudySeedOption = 2023,
-    design: Annotated[
-        str,
-        typer.Option(
-            "--design",
-            metavar="paper|pushing|null",
-            help="What differs between conditions. Paper: as in the paper; pushing: equal joints, "
-            "and a subject who pushes; null: nothing.",
-        ),
-    ] = "paper",
-    processes: Annotated[
-        int,
-        typer.Option(
-            "--processes", metavar="N", min=1, max=64, help="Sessions to simulate in parallel."
-        ),
-    ] = 2,
+    out: Path = NEW_STUDY,
+    seed: int = STUDY_SEED,
+    design: str = OPTIONS.option(
+        "--design paper|pushing|null",
+        "What differs between conditions. Paper: as in the paper; pushing: equal joints, and a "
+        "subject who pushes; null: nothing.",
+        "paper",
+    ),
+    processes: int = OPTIONS.option(
+        "--processes N", "Sessions to simulate in parallel.", 2, min=1, max=64
+    ),
 ) -> None:
     """Make a virtual study: nine days, with ratings.
 
@@ -141,32 +127,15 @@ def simulate(
 
 
 def demo(
-    out: NewStudyOption = Path("demo-study"),
-    days: Annotated[
-        int,
-        typer.Option("--days", metavar="N", min=2, max=100, help="Days, each with OFF and DBS."),
-    ] = 8,
-    prbs_epochs: Annotated[
-        int,
-        typer.Option(
-            "--prbs-epochs",
-            metavar="N",
-            min=1,
-            max=500,
-            help="PRBS epochs for each condition and day.",
-        ),
-    ] = 5,
-    sinusoid_epochs: Annotated[
-        int,
-        typer.Option(
-            "--sinusoid-epochs",
-            metavar="N",
-            min=1,
-            max=500,
-            help="Sinusoidal epochs for each condition and day.",
-        ),
-    ] = 3,
-    seed: StudySeedOption = 2023,
+    out: Path = WRITE.option("--out DIR", "New folder for the study.", Path("demo-study")),
+    days: int = OPTIONS.option("--days N", "Days, each with OFF and DBS.", 8, min=2, max=100),
+    prbs_epochs: int = OPTIONS.option(
+        "--prbs-epochs N", "PRBS epochs for each condition and day.", 5, min=1, max=500
+    ),
+    sinusoid_epochs: int = OPTIONS.option(
+        "--sinusoid-epochs N", "Sinusoidal epochs for each condition and day.", 3, min=1, max=500
+    ),
+    seed: int = STUDY_SEED,
 ) -> None:
     """Make a virtual study, compare its conditions, write its report.
 
@@ -181,8 +150,7 @@ def demo(
       rigidimeter demo --out small --days 3 --prbs-epochs 3
     """
     from rigidimeter.cli.comparison_text import comparison_blocks
-    from rigidimeter.cli.report import write_page
-    from rigidimeter.cli.terminal_tables import show
+    from rigidimeter.cli.inputs import analyse_study_folder
     from rigidimeter.virtual import SHORT_EPOCH_S, short_design
 
     start_s = time.monotonic()
@@ -192,7 +160,7 @@ def demo(
         f"{2 * days * sinusoid_epochs} sinusoidal epochs of {SHORT_EPOCH_S:g} s"
     )
     _simulated(out, short_design(days, prbs_epochs, sinusoid_epochs), seed)
-    found = analyse_study_folder(out, Recordings([out]))
+    found = analyse_study_folder(out, plain_recordings(out))
     try:
         page = write_page(found.result, out / "report")
         show(["", *comparison_blocks(found.result), ""])
@@ -207,7 +175,6 @@ def demo(
 
 def _simulated(out: Path, design: StudyDesign, seed: int, processes: int = 2) -> list[DayPlan]:
     """Write a virtual study with progress; return its sessions."""
-    from rigidimeter.cli.progress import Meter
     from rigidimeter.virtual import plan_study, study_length_s, write_virtual_study
 
     lost: list[str] = []

@@ -5,16 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
+import numpy as np
+
+from rigidimeter.core.settings import Settings
 from rigidimeter.core.units import rad_from_deg
 from rigidimeter.core.version import __version__
-
-if TYPE_CHECKING:
-    from rigidimeter.core.settings import Settings
-    from rigidimeter.rig.commissioning import DailyRecord, Operator, Setup, ZeroFound
-    from rigidimeter.rig.devices import RigFile
-    from rigidimeter.rig.devices.base import Reading, Rig
+from rigidimeter.rig.commissioning import (
+    BRAKING,
+    CommissioningRecord,
+    Compared,
+    DailyRecord,
+    Operator,
+    Setup,
+    Timebase,
+    daily_check,
+)
+from rigidimeter.rig.devices import RigFile, SimulatedRig
+from rigidimeter.rig.devices.base import Reading, Rig
 
 NAME = "virtual rig"
 
@@ -23,9 +32,6 @@ class _VirtualRig:
     """The virtual rig with a clock, and with the facts of a device; its arm pushes nothing."""
 
     def __init__(self, settings: Settings) -> None:
-        import numpy as np
-
-        from rigidimeter.rig.devices import SimulatedRig
 
         first = next(iter(settings.subject.values()))
         passive = first.model_copy(update={"voluntary_sd_nm": 0.0, "tremor_amplitude_nm": 0.0})
@@ -44,8 +50,6 @@ class _VirtualRig:
 
     def configure(self) -> Mapping[str, Any]:
         """Return facts of a drive that brakes and stops by itself as the settings need."""
-        from rigidimeter.rig.commissioning import BRAKING
-
         guard, watchdog_s = self._settings.guard, 2.0 * self._settings.loop.stall_s
         values = {BRAKING: rad_from_deg(guard.acceleration_limit_deg_s2)}
         facts = {"model": NAME, "serial": "", "watchdog_s": watchdog_s, "values": values}
@@ -54,25 +58,14 @@ class _VirtualRig:
 
 def virtual_setup(settings: Settings, operator: Operator) -> Setup:
     """Return the virtual rig as one that is to be tried."""
-    from rigidimeter.rig.commissioning import Setup, Timebase
-
     rig = _VirtualRig(settings)
     time = Timebase(rig.now_s, lambda deadline_s: deadline_s)
     return Setup(cast("Rig", rig), settings, time, operator)
 
 
-def virtual_zero(settings: Settings, operator: Operator) -> ZeroFound:
-    """Return zero and noise of the virtual torque sensor."""
-    from rigidimeter.rig.commissioning import zero_check
-
-    return zero_check(virtual_setup(settings, operator))
-
-
-def virtual_check(settings: Settings, operator: Operator) -> DailyRecord:
+def virtual_check(setup: Setup) -> DailyRecord:
     """Return the daily check of the virtual rig; it is commissioned by what its settings say."""
-    from rigidimeter.rig.commissioning import CommissioningRecord, Compared, daily_check
-
-    torque, motion = settings.rig.torque, settings.rig.motion
+    torque, motion = setup.settings.rig.torque, setup.settings.rig.motion
     behind_s = (torque.latency_s - torque.stamp_latency_s) - (
         motion.latency_s - motion.stamp_latency_s
     )
@@ -80,7 +73,7 @@ def virtual_check(settings: Settings, operator: Operator) -> DailyRecord:
     numbers = {"torque_after_motion_s": behind_s}
     commissioned = CommissioningRecord(NAME, "", {}, {}, (), numbers, __version__, now)
     return daily_check(
-        virtual_setup(settings, operator),
+        setup,
         cast("RigFile", SimpleNamespace(name=NAME, digest="")),
         lambda _: commissioned,
         compared=Compared(),

@@ -14,7 +14,8 @@ import numpy as np
 
 from rigidimeter.analysis.estimation import scoring_cycles
 from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.sections.perturbation_figure import perturbation, spectrum
+from rigidimeter.analysis.report.curves import draw_perturbation, draw_spectrum
+from rigidimeter.analysis.report.style import drawn
 from rigidimeter.core.records import Channel
 from rigidimeter.core.settings import BlockSettings
 from rigidimeter.core.words import number
@@ -65,7 +66,7 @@ def figure_3b(context: Context) -> Claim:
                 "Fig. 3(b) computed for a 7-bit sequence at 20 Hz; shaded: the band the paper "
                 "names.",
                 "Power spectral density of the perturbation with the band 0.15 to 10 Hz marked.",
-                partial(spectrum, channel, printed.EXCITED_HZ),
+                partial(drawn, (7.4, 2.7), draw_spectrum, channel, printed.EXCITED_HZ),
             ),
         ),
     )
@@ -95,7 +96,7 @@ def figure_4a(context: Context) -> Claim:
                 "fig-4a",
                 "Fig. 4(a) with our sequence.",
                 "The two-level torque perturbation over 20 s, its first seconds enlarged.",
-                partial(perturbation, channel, 0.0),
+                partial(drawn, (7.4, 3.1), draw_perturbation, channel, 0.0, rows=2),
             ),
         ),
     )

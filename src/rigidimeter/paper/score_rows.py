@@ -24,8 +24,8 @@ from scipy.interpolate import CubicSpline
 from rigidimeter.analysis.estimation import Cycles, score_epoch, scoring_cycles
 from rigidimeter.analysis.estimation.scores import loop_area_j
 from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.sections.torque_angle_loop import loop, loop_limits
-from rigidimeter.analysis.report.style import GREY
+from rigidimeter.analysis.report.curves import draw_loops
+from rigidimeter.analysis.report.style import GREY, drawn
 from rigidimeter.core.records import Channel, Epoch, Motion, Score
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.units import rad_from_deg
@@ -201,7 +201,9 @@ def asymmetry(context: Context) -> Claim:
                 f"Fig. 7 for a computed arm that is {100 * _UNEVEN:g} % stiffer at positive angles "
                 "and as much softer at negative ones.",
                 "Torque against angle of an arm whose stiffness differs by direction: eight loops.",
-                partial(loop, cycles, GREY, loop_limits([cycles]), "uneven stiffness"),
+                partial(
+                    drawn, (3.4, 3.0), draw_loops, [("", cycles, GREY)], None, "uneven stiffness"
+                ),
                 "small",
             ),
         ),

@@ -13,9 +13,9 @@ import numpy as np
 from rigidimeter.analysis.estimation import Signals, epoch_signals, scoring_cycles
 from rigidimeter.analysis.estimation.bandlimited import zero_phase_band
 from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.sections.distribution import distribution
-from rigidimeter.analysis.report.sections.torque_angle_loop import loop, loop_limits
-from rigidimeter.analysis.report.style import condition_colours
+from rigidimeter.analysis.report.curves import draw_loops, loop_limits
+from rigidimeter.analysis.report.points import distribution_size, draw_distribution
+from rigidimeter.analysis.report.style import condition_colours, drawn
 from rigidimeter.analysis.statistics import difference, fit_mixed, summarise
 from rigidimeter.analysis.study import Comparison
 from rigidimeter.analysis.study.examples import (
@@ -141,7 +141,9 @@ def measure_figure(name: str, measure: str, context: Context) -> Claim:
                 f"{_place(name)} from virtual data: epochs, median and quartiles.",
                 f"{label} of every virtual epoch in OFF and DBS, with median and quartiles.",
                 partial(
-                    distribution,
+                    drawn,
+                    distribution_size(2),
+                    draw_distribution,
                     label,
                     compared.values,
                     _COLOURS,
@@ -187,7 +189,7 @@ def figure_5a(context: Context) -> Claim:
     p_paper = p_value(contrast.p_residual)
     return Claim(
         ours=f"virtual ratings: medians {medians}; offsets of the examiners "
-        f"{offsets.replace('-', '−')}; contrast OFF − DBS {number(contrast.estimate, 3)}, "
+        f"{offsets.replace('-', '−')}; contrast DBS − OFF {number(contrast.estimate, 3)}, "
         f"p = {p_paper}; with an offset for every day p = {p_days}",
         unpublished="The ratings were not published; virtual ones of the same number stand in.",
         figures=(
@@ -196,7 +198,9 @@ def figure_5a(context: Context) -> Claim:
                 "Fig. 5(a) from virtual ratings: each rating, median and quartiles.",
                 "Corrected virtual ratings in OFF and DBS, with median and quartiles.",
                 partial(
-                    distribution,
+                    drawn,
+                    distribution_size(2),
+                    draw_distribution,
                     "Corrected mUPDRS score",
                     values,
                     _COLOURS,
@@ -226,7 +230,8 @@ def figure_7(context: Context) -> Claim:
                 f"cycles, {number(score.work_j, 3)} J a cycle.",
                 f"Torque against angle in {score.condition}: eight loops of a virtual epoch.",
                 partial(
-                    loop, one, _COLOURS[score.condition], loop_limits(cycles), score.condition
+                    drawn, (3.4, 3.0), draw_loops, [("", one, _COLOURS[score.condition])],
+                    loop_limits(cycles), score.condition,
                 ),
                 "small",
             )

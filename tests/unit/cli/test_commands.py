@@ -11,7 +11,7 @@ from tests.unit.analysis.report.parsed_page import ParsedPage
 from tests.unit.virtual.tiny import SHORT
 
 from rigidimeter.analysis.study import compare_analysis
-from rigidimeter.cli.estimate import estimate_blocks
+from rigidimeter.cli.estimate_text import estimate_blocks
 from rigidimeter.cli.study import _simulated
 from rigidimeter.cli.terminal_tables import text_lines
 from rigidimeter.core.files import read_json

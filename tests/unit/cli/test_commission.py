@@ -7,8 +7,9 @@ import signal
 
 import pytest
 
-from rigidimeter.cli.commission import _check_known, interrupted_once
+from rigidimeter.cli.commission import _check_known
 from rigidimeter.cli.emulate import _check_target
+from rigidimeter.cli.rig_checks import interrupted_once
 from rigidimeter.core.errors import UserError
 
 HARDWARE = """

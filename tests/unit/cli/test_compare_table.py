@@ -101,7 +101,8 @@ def test_two_values_give_medians_and_no_test(compared, tmp_path) -> None:
 def test_three_against_three_cannot_show_a_difference(compared, tmp_path) -> None:
     path, _ = table(tmp_path / "t.csv", 3, 3)
     _, found = compared(path, "--value", "a")
-    assert "exact p of 0.1" in found["notices"][0]["text"]
+    assert found["reasons"][0]["name"] == "too_few_values"
+    assert "0.1 by the exact test" in found["reasons"][0]["details"]
 
 
 def test_each_further_group_is_compared_with_the_first_or_two_are_named(compared, tmp_path) -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rigidimeter.core.findings import KINDS, explained
+from rigidimeter.core.findings import KINDS, STUDY_KINDS, explained
 
 
 def test_every_finding_is_listed_with_its_level(rigidimeter):
@@ -21,7 +21,8 @@ def test_a_finding_is_explained_with_its_settings(rigidimeter, kind):
     for _, words in explained(kind):
         for text in words:
             assert text in told
-    assert f'diagnostics.levels.{kind.name} = "{kind.level}"' in told
+    in_settings = f'diagnostics.levels.{kind.name} = "{kind.level}"' in told
+    assert in_settings == (kind not in STUDY_KINDS)
     assert not kind.setting or f"diagnostics.{kind.setting} = " in told
 
 

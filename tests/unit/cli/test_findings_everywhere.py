@@ -3,11 +3,14 @@
 import csv
 import json
 import re
+import shutil
 from dataclasses import replace
 from html import escape, unescape
+from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.small_study import record
 
 import rigidimeter as rm
 from rigidimeter.analysis.study import Preparation
@@ -88,6 +91,60 @@ def test_every_output_says_the_same_words(shown):
         )
         assert unfolding in on_page
         assert escape(one.headline) in estimates._repr_html_()
+
+
+@pytest.fixture
+def pushed(fitted_study, tmp_path):
+    """Return a study whose subject pushed on one of the days in DBS."""
+    folder = Path(shutil.copytree(fitted_study, tmp_path / "study"))
+    shutil.rmtree(folder / "sessions/4-DBS")
+    record(folder / "sessions/4-DBS", "DBS", 104, subject={"DBS": {"voluntary_sd_nm": 0.3}})
+    return folder
+
+
+def test_every_output_of_a_study_says_the_same(pushed, rigidimeter, no_figures, tmp_path):
+    """Terminal, page, JSON, batch and Python: each finding, each reason, each statement, once."""
+    how = ("--method", "bandlimited")
+    ran = rigidimeter("compare", pushed, *how, "--resamples", 100)
+    assert rigidimeter("report", pushed, *how, "--out", tmp_path / "r").status == 0
+    assert rigidimeter("batch", pushed, *how, "--out", tmp_path / "b.csv").status == 0
+    page = " ".join(unescape((tmp_path / "r" / "report.html").read_text("utf-8")).split())
+    document = json.loads((pushed / "analysis/comparison.json").read_text("utf-8"))
+    estimates = json.loads((pushed / "analysis/estimates.json").read_text("utf-8"))
+    with (tmp_path / "b.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    result = rm.compare(pushed, method="bandlimited", resamples=0)
+    terminal = " ".join(ran.out.split())
+
+    said = result.statements
+    assert document["statements"][0]["concluded"] == list(said.concluded)
+    for sentence in (said.measured, said.tested, *said.concluded):
+        assert terminal.count(sentence) == 1, ran
+        assert sentence in page  # and in the sentence to quote, where nothing is shown
+    of_epochs = [(fit.epoch, one) for fit in result.analysis.fits for one in fit.findings]
+    assert [(e["epoch"], f) for e in estimates["epochs"] for f in e["findings"]] == [
+        (epoch, plain_values(one.row())) for epoch, one in of_epochs
+    ]
+    cells = [one for row in rows for one in row["findings"].split(" / ") if one]
+    assert sorted(cells) == sorted(f"{f.level}, {f.name}: {f.headline}" for _, f in of_epochs)
+    across = [plain_values(one.row()) for one in result.analysis.across]
+    assert estimates["across"] == across
+    reasons = result.findings[len(result.analysis.findings) :]
+    assert document["reasons"] == [
+        plain_values(one.row()) | {"measures": where} for one, _, where in reasons
+    ]
+    assert (
+        {one["finding"] for one in document["conclusion"]} - {""}
+        == {group.finding.name for group in reasons}
+        >= {"flagged_epochs"}
+    )
+    cautions = [g.finding for g in result.analysis.findings if g.finding.level != "note"]
+    assert len(cautions) > 1
+    for one, _, where in result.findings:
+        assert page.count(f"<strong>{one.name}</strong> {one.headline}; {where}</summary>") == 1
+        assert page.count(f"<p>{one.details}</p> <p>{one.remedy}</p>") == 1
+        assert one.headline not in ran.err
+    assert cautions[0].headline in terminal
 
 
 def names_and_levels(preparation, method):

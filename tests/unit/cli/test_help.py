@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from rigidimeter.analysis.estimation import METHODS
 from rigidimeter.analysis.export import FORMATS
-from rigidimeter.cli.help_pages import HelpCommand, HelpGroup
+from rigidimeter.cli.help_pages import HelpCommand, HelpGroup, full_text
 from rigidimeter.cli.main import app
 
 LONGER = {"estimate", "compare", "report", "batch", "run"}
@@ -56,8 +56,7 @@ def test_every_option_is_in_help_all(path, command):
     assert {"-h", "--help", *(name for name in names if name[0] == "-")} <= set(words)
     for each in command.params:
         if each.name != "help_all":
-            text = command.full_text(each) if isinstance(command, HelpCommand) else each.help
-            assert "".join(text.split()) in "".join(page.split())
+            assert "".join(full_text(each).split()) in "".join(page.split())
     assert max(map(len, page.splitlines())) <= 80
 
 

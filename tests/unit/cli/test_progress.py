@@ -72,14 +72,6 @@ def test_no_time_is_guessed_before_a_tenth_is_done(capsys: pytest.CaptureFixture
     assert capsys.readouterr().err == "work: 1 %\n"
 
 
-def test_work_that_nobody_can_foresee_has_no_time_left(capsys: pytest.CaptureFixture[str]) -> None:
-    clock = Clock()
-    meter = Meter("search", 4.0, clock, foreseen=False)
-    clock.now_s += 3.0
-    meter.advance()
-    assert capsys.readouterr().err == "search: 25 %\n"
-
-
 def made(progress: Callable[[Callable[[float], None]], object]) -> list[float]:
     """Return the shares of the work that were reported."""
     shares: list[float] = []

@@ -43,32 +43,32 @@ def test_the_document_holds_the_model_unrounded(model) -> None:
     ran, found = model()
     assert ran.status == 0, ran.err
     fit = fit_mixed(SCORES, CONDITIONS, {"examiner": EXAMINERS})
-    test = difference(fit, "OFF", "DBS")
+    test = difference(fit, "DBS", "OFF")
     assert found["schema"] == "rigidimeter.ratings/1"
     assert found["means"] == {"OFF": fit.means[0], "DBS": fit.means[1]}
     for key in ("estimate", "se", "f", "df_residual", "p_residual", "df_satterthwaite",
                 "p_satterthwaite"):  # fmt: skip
         assert found["contrast"][key] == getattr(test, key)
-    assert found["contrast"]["convention"] == "OFF minus DBS"
+    assert found["contrast"]["convention"] == "DBS minus OFF"
     assert found["offsets"] == dict(fit.offsets["examiner"])
     assert found["variance_examiner"] == fit.variances["examiner"]
     assert found["variance_residual"] == fit.variance_residual
     assert found["corrected"] == fit.corrected.tolist()
     assert [row["line"] for row in found["rows"]] == list(range(2, 17))
     assert found["notices"] == []
-    assert "OFF minus DBS" in ran.out
+    assert "DBS minus OFF" in ran.out
     assert "Satterthwaite" in ran.out
-    assert "OFF was rated higher than DBS" in ran.out
+    assert "DBS was rated lower than OFF" in ran.out
 
 
 def test_off_comes_first_whatever_the_file_s_order(model) -> None:
     _, plain = model()
     _, found = model(ROWS[::-1])
-    assert found["contrast"]["convention"] == "OFF minus DBS"
+    assert found["contrast"]["convention"] == "DBS minus OFF"
     assert found["contrast"]["estimate"] == pytest.approx(plain["contrast"]["estimate"])
-    _, turned = model(ROWS, "--contrast", "DBS", "OFF")
+    _, turned = model(ROWS, "--contrast", "OFF", "DBS")
     assert turned["contrast"]["estimate"] == pytest.approx(-plain["contrast"]["estimate"])
-    assert turned["contrast"]["convention"] == "DBS minus OFF"
+    assert turned["contrast"]["convention"] == "OFF minus DBS"
 
 
 @pytest.mark.parametrize("kind", ["bom", "semicolon", "utf16", "tab", "comments", "quoted", "crlf"])
@@ -219,7 +219,7 @@ def test_three_conditions_give_all_pairs_and_a_joint_test(model) -> None:
     rows = [*ROWS, *(("LOW", d, e, s) for _, d, e, s in ROWS[:6])]
     ran, found = model(rows)
     assert [c["convention"] for c in found["contrasts"]] == [
-        "OFF minus DBS", "OFF minus LOW", "DBS minus LOW",
+        "DBS minus OFF", "LOW minus OFF", "LOW minus DBS",
     ]  # fmt: skip
     assert all(c["p_residual_holm"] >= c["p_residual"] for c in found["contrasts"])
     assert found["joint"]["df_numerator"] == 2

@@ -42,9 +42,10 @@ def passed(*names: str) -> tuple[RigCheck, ...]:
 def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A rig of hardware that is commissioned with a person and checked."""
     path = tmp_path / "RIG.toml"
-    monkeypatch.setattr(
-        "rigidimeter.rig.devices.load_rig", lambda path: RigFile(path, "rig", {}, "abc")
-    )
+    for module in ("rig_steps", "planned_session"):
+        monkeypatch.setattr(
+            f"rigidimeter.cli.{module}.load_rig", lambda path: RigFile(path, "rig", {}, "abc")
+        )
     monkeypatch.setattr(RigFile, "claim", lambda _: SimpleNamespace(close=lambda: None))
     commissioned = CommissioningRecord(
         rig_name="rig",

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from rigidimeter.cli.console import lead_session
+from rigidimeter.cli.page_session import lead_session
 from rigidimeter.cli.realtime_rig import HOME_TOLERANCE_RAD
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import SessionWriter
@@ -60,11 +60,11 @@ def seen(monkeypatch):
 
     monkeypatch.setattr(RigFile, "build", build)
     commissioned = SimpleNamespace(rig_name="rig", numbers={})
-    monkeypatch.setattr("rigidimeter.rig.commissioning.check_record", lambda *_: commissioned)
+    monkeypatch.setattr("rigidimeter.cli.planned_session.check_record", lambda *_: commissioned)
     monkeypatch.setattr(
-        "rigidimeter.rig.commissioning.require_daily_check", lambda *_, **__: CHECKED
+        "rigidimeter.cli.planned_session.require_daily_check", lambda *_, **__: CHECKED
     )
-    monkeypatch.setattr("rigidimeter.rig.acquisition.processes.supervise", supervise)
+    monkeypatch.setattr("rigidimeter.cli.planned_session.supervise", supervise)
     return seen
 
 
@@ -113,7 +113,7 @@ def test_a_run_ends_with_1_where_a_planned_epoch_has_no_success(
         writer.event("epoch_ended", epoch=epoch.number, **ended)
     writer.close(1.0, "success", "")
     result = SimpleNamespace(folder=tmp_path / "s", outcome="success", reason="", remarks=())
-    monkeypatch.setattr("rigidimeter.rig.acquisition.processes.supervise", lambda *_, **__: result)
+    monkeypatch.setattr("rigidimeter.cli.planned_session.supervise", lambda *_, **__: result)
     ran = rigidimeter("run", "--out", tmp_path / "new", "--unattended")
     assert ran.status == status
     assert f"{2 - status} of 2 epochs ended with success" in ran.out
@@ -123,7 +123,7 @@ def test_a_run_ends_with_1_where_a_planned_epoch_has_no_success(
 def test_a_rig_without_a_record_is_refused_before_any_process_starts(
     tmp_path, monkeypatch, rigidimeter
 ):
-    monkeypatch.setattr("rigidimeter.rig.acquisition.processes.supervise", None)
+    monkeypatch.setattr("rigidimeter.cli.planned_session.supervise", None)
     rig = tmp_path / "rig.toml"
     rig.write_text(RIG)
     result = rigidimeter("run", "--rig", rig, "--out", tmp_path / "s")
@@ -135,9 +135,9 @@ def test_a_rig_without_a_record_is_refused_before_any_process_starts(
 def test_a_rig_that_was_not_checked_today_is_refused_with_the_command_to_type(
     tmp_path, monkeypatch, rigidimeter
 ):
-    monkeypatch.setattr("rigidimeter.rig.acquisition.processes.supervise", None)
+    monkeypatch.setattr("rigidimeter.cli.planned_session.supervise", None)
     commissioned = SimpleNamespace(rig_name="rig", numbers={})
-    monkeypatch.setattr("rigidimeter.rig.commissioning.check_record", lambda *_: commissioned)
+    monkeypatch.setattr("rigidimeter.cli.planned_session.check_record", lambda *_: commissioned)
     rig, protocol = tmp_path / "rig.toml", tmp_path / "protocol.toml"
     rig.write_text(RIG)
     protocol.write_text("seed = 2\n")
@@ -151,11 +151,11 @@ def test_a_rig_that_was_not_checked_today_is_refused_with_the_command_to_type(
 def test_a_rig_that_another_uses_is_refused_before_any_process_starts(
     tmp_path, monkeypatch, rigidimeter
 ):
-    monkeypatch.setattr("rigidimeter.rig.acquisition.processes.supervise", None)
+    monkeypatch.setattr("rigidimeter.cli.planned_session.supervise", None)
     commissioned = SimpleNamespace(rig_name="rig", numbers={})
-    monkeypatch.setattr("rigidimeter.rig.commissioning.check_record", lambda *_: commissioned)
+    monkeypatch.setattr("rigidimeter.cli.planned_session.check_record", lambda *_: commissioned)
     monkeypatch.setattr(
-        "rigidimeter.rig.commissioning.require_daily_check", lambda *_, **__: CHECKED
+        "rigidimeter.cli.planned_session.require_daily_check", lambda *_, **__: CHECKED
     )
     rig, copy = tmp_path / "rig.toml", tmp_path / "copy.toml"
     rig.write_text(RIG)
@@ -168,7 +168,7 @@ def test_a_rig_that_another_uses_is_refused_before_any_process_starts(
 
 
 def test_a_session_that_still_runs_is_not_gone_on_with(tmp_path, monkeypatch, rigidimeter):
-    monkeypatch.setattr("rigidimeter.rig.acquisition.processes.supervise", None)
+    monkeypatch.setattr("rigidimeter.cli.planned_session.supervise", None)
     settings = parse_settings({})
     epochs = plan(settings.protocol, settings.prbs, settings.sinusoid, 1).epochs
     planned = [asdict(epoch) for epoch in epochs]
@@ -193,7 +193,7 @@ def test_a_session_on_the_page_runs_only_while_the_page_is_there(tmp_path, monke
         told.update(options)
         raise UserError("that is enough")
 
-    monkeypatch.setattr("rigidimeter.rig.acquisition.processes.supervise", supervise)
+    monkeypatch.setattr("rigidimeter.cli.planned_session.supervise", supervise)
     settings = parse_settings({})
     state = ServerState(Place(tmp_path, settings, "the defaults"))
     assert lead_session(state, StartRequest("s", settings), Realtime()) is None

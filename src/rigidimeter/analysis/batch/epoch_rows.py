@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from rigidimeter.analysis.batch.archive_inputs import Input, content_digest, dig
 from rigidimeter.analysis.batch.parts import Row
 from rigidimeter.analysis.reading.formats import ReadOptions
 from rigidimeter.analysis.reading.recording import read_as
-from rigidimeter.analysis.study import analysis_warnings, estimate
+from rigidimeter.analysis.study import estimate
 from rigidimeter.analysis.study.exclusions import operators_exclusions
 from rigidimeter.analysis.study.sessions import gather, source_of
 from rigidimeter.core.errors import UserError
@@ -129,7 +129,7 @@ def _read(one: Input, how: How) -> tuple[Iterable[Epoch], list[Notice], Settings
 
 
 def _rows(
-    epochs: Iterable[Epoch], analysis: Analysis, notices: Iterable[Notice], one: Input
+    epochs: Iterable[Epoch], analysis: Analysis, notices: Sequence[Notice], one: Input
 ) -> Iterable[Row]:
     own = str(one.path)
     about: Row = {}
@@ -137,8 +137,7 @@ def _rows(
         session = one.study.folder.sessions[0]
         own = source_of(session["path"])
         about = {"subject": session["subject"], "day": session["day"]}
-    said = [*notices, *analysis_warnings(analysis)]
-    told = [n.text.removeprefix(f"{one.path}: ") for n in said if n.level != "error"]
+    told = [n.text.removeprefix(f"{one.path}: ") for n in notices if n.level != "error"]
     about["notices"] = " / ".join(told)
     fits = analysis.rows() if analysis.fits else []
     found = [{**fit, "task": "prbs", "method": analysis.method} for fit in fits]
@@ -149,6 +148,6 @@ def _rows(
         inside = row["source"].removeprefix(own)
         cells = plain_values({**row, **about, "source": inside})
         yield {name: cell for name, cell in cells.items() if cell not in (None, "")}
-    for notice in said:
+    for notice in notices:
         if notice.level == "error":
             yield {"outcome": "failed", "reason": notice.text}

@@ -47,6 +47,7 @@ def estimates_document(analysis: Analysis) -> dict[str, Any]:
         },
         "scores": [score.row() for score in analysis.scores],
         "sensitivity": [one.row() for one in analysis.sensitivity],
+        "across": [finding.row() for finding in analysis.across],
     }
     return dict(plain_values(document))
 
@@ -90,6 +91,7 @@ def read_estimates(path: Path) -> Analysis:
             tuple(_read_delay(row) for row in document["delays"]),
             str(document["method_reason"]),
             tuple(_band_estimate(row) for row in document["sensitivity"]),
+            tuple(map(finding_from, document.get("across", ()))),
         )
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise UserError(

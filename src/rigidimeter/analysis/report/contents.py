@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
 
 from markupsafe import Markup
 from matplotlib.figure import Figure as Drawing
 
-from rigidimeter.analysis.study import StudyResult
-from rigidimeter.core.words import Table
+from rigidimeter.analysis.study import StudyResult, result_table
+from rigidimeter.core.records import Epoch, Fit, Score
+from rigidimeter.core.words import Column, Table, short_names
 
 
 @dataclass(frozen=True)
@@ -75,9 +76,31 @@ class Section:
     printed: bool = False
 
 
+def part(title: str, *sections: Section, printed: int = 0) -> list[Section]:
+    """Return the sections of a part of the page; the first ones are printed."""
+    return [
+        replace(section, part=title, printed=place < printed)
+        for place, section in enumerate(sections)
+    ]
+
+
 def from_study_folder(result: StudyResult) -> bool:
     """Return whether a result comes from a study folder, which has days, ratings and exclusions."""
     return bool(result.sessions)
+
+
+def from_result(
+    result: StudyResult, name: str, title: str, *columns: Column, **options: Any
+) -> Table:
+    """Return a table of the rows of that name in a result; `options` are those of `Table`."""
+    return Table(name, title, columns, result_table(result, name), **options)
+
+
+def named(result: StudyResult, one: Epoch | Fit | Score) -> str:
+    """Return epoch and source, since sessions use the same labels."""
+    names = short_names(epoch.source for epoch in result.epochs)
+    label = one.label if isinstance(one, Epoch) else one.epoch
+    return f"epoch {label} of {names.get(one.source, one.source)}"
 
 
 def paragraph(text: str, kind: Literal["", "remark", "banner"] = "") -> Markup:

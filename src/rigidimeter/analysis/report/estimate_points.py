@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from rigidimeter.analysis.report.style import (
     GREY,
     OTHERS,
+    Look,
     condition_colours,
     condition_markers,
     legend_above,
     listed,
+    with_intervals,
     wrapped,
 )
 from rigidimeter.core.records import PARAMETERS, Analysis, Fit, Score
@@ -35,41 +37,42 @@ _PAIRS = ((0, 1), (0, 2), (1, 2))
 
 
 class Quantity(NamedTuple):
-    """What one panel shows of every epoch, in the order of the results; NaN where unknown."""
+    """What one panel shows of every epoch, in the order of the results; NaN where unknown.
+
+    `rows` has the shape (n, 3): values and the ends of their intervals; so has `pooled` by
+    condition, the shape (3,).
+    """
 
     title: str
     unit: str
-    values: Array
-    low: Array
-    high: Array
-    pooled: Mapping[str, tuple[float, float, float]]
+    rows: Array
+    pooled: Mapping[str, Array]
 
 
 def quantities(analysis: Analysis) -> list[Quantity]:
     """Return J, B and K of the fits; of an analysis of sinusoids alone, impulse and work."""
     if analysis.fits:
-        values, low, high = (
-            np.array([getattr(fit, at) for fit in analysis.fits]) for at in ("value", "low", "high")
-        )
         several = len({fit.condition for fit in analysis.fits}) > 1
         pooled = [fit for fit in analysis.pooled if fit.condition or not several]
         return [
             Quantity(
                 f"{p.title.capitalize()} {p.symbol}",
                 p.unit,
-                values[:, i],
-                low[:, i],
-                high[:, i],
-                {fit.condition: (fit.value[i], fit.low[i], fit.high[i]) for fit in pooled},
+                np.array([(fit.value[i], fit.low[i], fit.high[i]) for fit in analysis.fits]),
+                {
+                    condition_name(fit.condition): np.array([fit.value[i], fit.low[i], fit.high[i]])
+                    for fit in pooled
+                },
             )
             for i, p in enumerate(PARAMETERS)
         ]
-    unknown = np.full(len(analysis.scores), np.nan)
-    impulse = np.array([score.impulse_nm_s for score in analysis.scores])
-    work = np.array([score.work_j for score in analysis.scores])
+    scored = [
+        ("Angular impulse", "N·m·s", [score.impulse_nm_s for score in analysis.scores]),
+        ("Work", "J", [score.work_j for score in analysis.scores]),
+    ]
     return [
-        Quantity("Angular impulse", "N·m·s", impulse, unknown, unknown, {}),
-        Quantity("Work", "J", work, unknown, unknown, {}),
+        Quantity(title, unit, np.array([(value, np.nan, np.nan) for value in values]), {})
+        for title, unit, values in scored
     ]
 
 
@@ -93,56 +96,39 @@ def draw_epochs(
     place = np.arange(1, len(results) + 1)
     colours, markers = condition_colours(conditions), condition_markers(conditions)
     for axes, what in zip(panels, shown, strict=True):
-        factor, unit = axis_unit(what.values, what.unit)
+        factor, unit = axis_unit(what.rows[:, 0], what.unit)
+        rows = factor * what.rows
+        known = np.isfinite(rows[:, 0])
         for name, colour in colours.items():
             own = conditions == name
+            title = name if any(conditions != _NONE) else "epochs"
             for of, fill, word in (
                 (own & included, colour, ""),
                 (own & ~included, "white", ", does not count"),
             ):
-                known = of & np.isfinite(what.values)
-                if not known.any():
-                    continue
-                bars = known & np.isfinite(what.low) & np.isfinite(what.high)
-                axes.vlines(
-                    place[bars], factor * what.low[bars], factor * what.high[bars],
-                    color=colour, linewidth=0.9,
-                )  # fmt: skip
-                label = listed(f"{name if any(conditions != _NONE) else 'epochs'}{word}")
-                axes.plot(
-                    place[known], factor * what.values[known], markers[name], color=colour,
-                    mfc=fill, ms=4.5, label=label,
-                )  # fmt: skip
-            _band(axes, what, name, place[own], factor, colour)
-        lost = ~np.isfinite(what.values)
-        if lost.any():
+                if np.any(drawn := of & known):
+                    look: Look = {
+                        "width": 0.9,
+                        "mfc": fill,
+                        "ms": 4.5,
+                        "label": listed(f"{title}{word}"),
+                    }
+                    with_intervals(axes, place[drawn], rows[drawn], colour, markers[name], **look)
+            value, low, high = factor * what.pooled.get(name, np.full(3, np.nan))
+            if np.isfinite(value):
+                ends = [place[own].min() - 0.4, place[own].max() + 0.4]
+                label = listed(f"all epochs{'' if name == _NONE else f' {name}'}, 95 %")
+                axes.plot(ends, [value] * 2, color=colour, lw=0.9, zorder=1, label=label)
+                axes.fill_between(ends, low, high, color=colour, alpha=0.13, linewidth=0)
+        if not known.all():
+            foot = np.full((~known).sum(), 0.04)
             at = axes.get_xaxis_transform()
-            axes.plot(
-                place[lost], np.full(lost.sum(), 0.04), "x", color=GREY, transform=at,
-                label="no estimate",
-            )  # fmt: skip
+            axes.plot(place[~known], foot, "x", color=GREY, transform=at, label="no estimate")
         axes.set_ylabel(f"{what.title}\n({unit})")
         axes.set_xlim(0.4, len(results) + 0.6)
         axes.grid(visible=False, axis="x")
     _name_epochs(panels, results)
     legend_above(panels[0])
-
-
-def _band(
-    axes: Axes, what: Quantity, condition: str, place: Array, factor: float, colour: str
-) -> None:
-    """Draw the estimate of all epochs of a condition together, where they are."""
-    pooled = {condition_name(name): ends for name, ends in what.pooled.items()}
-    value, low, high = (factor * end for end in pooled.get(condition, (np.nan,) * 3))
-    if not np.isfinite(value):
-        return
-    first, last = place.min() - 0.4, place.max() + 0.4
-    axes.plot(
-        [first, last], [value] * 2, color=colour, linewidth=0.9, zorder=1,
-        label=listed(f"all epochs{'' if condition == _NONE else f' {condition}'}, 95 %"),
-    )  # fmt: skip
-    if np.isfinite(low) and np.isfinite(high):
-        axes.fill_between([first, last], low, high, color=colour, alpha=0.13, linewidth=0)
 
 
 def _name_epochs(panels: Sequence[Axes], results: Sequence[Fit | Score]) -> None:
@@ -185,19 +171,20 @@ def draw_pairs(panels: Sequence[Axes], fit: Fit) -> None:
     taken = {line.get_color() for line in panels[0].lines}  # of a fit that was drawn before
     colour = next((one for one in (*own.values(), *OTHERS) if one not in taken), GREY)
     scaled = [axis_unit([value], p.unit) for value, p in zip(fit.value, PARAMETERS, strict=True)]
+    factors = np.array([factor for factor, _ in scaled])
+    value, low, high = (factors * ends for ends in (fit.value, fit.low, fit.high))
     label = "all epochs" if fit.epoch == "pooled" else f"epoch {fit.epoch}"
     label = listed(f"{label} {fit.condition}")
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     for axes, (i, k) in zip(panels, _PAIRS, strict=True):
-        (x, y), (in_x, in_y) = fit.value[[i, k]], (scaled[i][0], scaled[k][0])
-        axes.hlines(in_y * y, in_x * fit.low[i], in_x * fit.high[i], color=colour, linewidth=1.6)
-        axes.vlines(in_x * x, in_y * fit.low[k], in_y * fit.high[k], color=colour, linewidth=1.6)
-        axes.plot(in_x * x, in_y * y, "o", color=colour, ms=5, label=label)
-        covariance = fit.covariance[np.ix_((i, k), (i, k))]
+        axes.hlines(value[k], low[i], high[i], color=colour, linewidth=1.6)
+        upward = value[k], low[k], high[k]
+        with_intervals(axes, value[i], upward, colour, "o", width=1.6, ms=5, label=label)
+        covariance = (fit.covariance * np.outer(factors, factors))[np.ix_((i, k), (i, k))]
         if np.all(np.isfinite(covariance)) and np.linalg.det(covariance) > 0:
             circle = np.sqrt(_CHI2_95) * np.array([np.cos(turn), np.sin(turn)])
             across, up = np.linalg.cholesky(covariance) @ circle
-            axes.plot(in_x * (x + across), in_y * (y + up), color=colour, linewidth=0.9)
+            axes.plot(value[i] + across, value[k] + up, color=colour, linewidth=0.9)
         for axis, at in ((axes.xaxis, i), (axes.yaxis, k)):
             p = PARAMETERS[at]
             axis.set_label_text(f"{p.title.capitalize()} {p.symbol} ({scaled[at][1]})")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Iterable
+from importlib import resources
 from typing import NamedTuple
 
+import jinja2
 from markupsafe import Markup
 
-from rigidimeter.analysis.report.interval_plot import MOST_PERCENT, interval_plot, reach
 from rigidimeter.analysis.study import (
     WANTED_PERCENT,
     DifferenceRow,
@@ -30,6 +33,9 @@ from rigidimeter.core.words import (
     within,
 )
 
+_WIDTH, _PAD = 190, 12
+MOST_PERCENT = 100.0
+"""An axis in per cent reaches at most so far; what is beyond it is drawn as an arrow."""
 DIGITS = 3
 _PERCENT = "\N{NO-BREAK SPACE}%"
 KINDS = {"lower": "shown", "higher": "shown", "not supported": "unsupported"}
@@ -79,13 +85,84 @@ def _plot(row: DifferenceRow, to: float) -> Markup:
     drawn, unit = d.percent, " %"
     if math.isnan(d.percent[0]):
         drawn, unit = d.tested, f" {row.unit}".rstrip()
-        to = reach(list(drawn))
+        to = reach(drawn)
     kind = KINDS.get(row.conclusion.verdict, "")
-    end = f"{number(to, 2 + (to >= 100))}{unit}"
     words = f"{row.measure} {row.difference}, 95 % interval {row.interval or 'unknown'}"
-    return interval_plot(
-        drawn[0], drawn[1:], (f"−{end}", "0", f"+{end}"), to, kind=kind, words=words
+    return interval_plot(drawn, to, unit, kind=kind, words=words)
+
+
+@functools.cache
+def _drawing() -> jinja2.Template:
+    place = resources.files("rigidimeter.analysis.report") / "interval.html"
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    return environment.from_string(place.read_text(encoding="utf-8"))
+
+
+def interval_plot(
+    drawn: tuple[float, float, float],
+    to: float,
+    unit: str,
+    *,
+    kind: str = "",
+    middle: str = "0",
+    band: float = 0.0,
+    words: str = "",
+) -> Markup:
+    """Return a value with its interval on a small axis, as SVG of the page with text as text.
+
+    Parameters
+    ----------
+    drawn : (float, float, float)
+        The value and the ends of its interval; what is NaN is not drawn.
+    to : float
+        The axis goes from −`to` to `to`; what is beyond is an arrow.
+    unit : str
+        Behind the numbers at the ends of the axis.
+    kind : str
+        A class of the page's style: ``shown``, ``unsupported`` or nothing.
+    middle : str
+        What is written below zero.
+    band : float
+        The half width of a shaded band around zero.
+    words : str
+        What the drawing shows, for those who cannot see it.
+    """
+
+    def x(at: float) -> float:
+        inside = min(max(at / to, -1.0), 1.0)
+        return round(_WIDTH / 2 + inside * (_WIDTH / 2 - _PAD), 1)
+
+    value, *ends = drawn
+    low, high = sorted(ends) if all(map(math.isfinite, ends)) else (None, None)
+    end = f"{number(to, 2 + (to >= 100))}{unit}"
+    text = _drawing().render(
+        x=x,
+        to=to,
+        most=to * 1.0000001,  # a rounded end is not beyond
+        value=value if math.isfinite(value) and abs(value) <= to else None,
+        low=low,
+        high=high,
+        axis=(f"−{end}", middle, f"+{end}"),
+        kind=kind,
+        band=band,
+        words=words,
     )
+    return Markup(text)
+
+
+def reach(sizes: Iterable[float], most: float = math.inf) -> float:
+    """Return the end of an axis that holds these sizes: 1, 2 or 5 times a power of ten.
+
+    Examples
+    --------
+    >>> reach([3.1, 17.0]), reach([0.31]), reach([260.0], most=100.0), reach([])
+    (20.0, 0.5, 100.0, 1.0)
+    """
+    largest = max((abs(size) for size in sizes if math.isfinite(size)), default=0.0)
+    if not largest:
+        return min(1.0, most)
+    power = 10.0 ** math.floor(math.log10(largest))
+    return min(next(k * power for k in (1, 2, 5, 10) if k * power >= largest), most)
 
 
 def precision_tables(result: StudyResult) -> dict[str, list[PrecisionRow]]:
@@ -109,7 +186,6 @@ def _precision_row(one: Precision, to: float) -> PrecisionRow:
     digits = resolving(one.value, (one.high - one.low) / 2)
     low, high = (number(factor * end, digits) for end in (one.low, one.high))
     known = not math.isnan(one.percent)
-    axis = f"{number(to, 2 + (to >= 100))}{_PERCENT}"
     percent = f"±\N{NO-BREAK SPACE}{number(one.percent, 2)}{_PERCENT}" if known else ""
     return PrecisionRow(
         one.measure.title,
@@ -121,11 +197,11 @@ def _precision_row(one: Precision, to: float) -> PrecisionRow:
         one.n,
         "" if one.epochs_needed is None else str(one.epochs_needed),
         interval_plot(
-            0.0,
-            (-one.percent, one.percent),
-            (f"−{axis}", "estimate", f"+{axis}"),
+            (0.0, -one.percent, one.percent),
             to,
+            _PERCENT,
             kind="shown",
+            middle="estimate",
             band=WANTED_PERCENT,
             words=f"{one.measure.title} {percent}",
         ),

@@ -18,8 +18,8 @@ from rigidimeter.analysis.report import first_screen
 from rigidimeter.analysis.report.contents import Block, Figure, Section
 from rigidimeter.analysis.report.epoch_traces import page_traces, traces_json
 from rigidimeter.analysis.report.inline_svg import inline_svg
+from rigidimeter.analysis.report.methods_prose import methods_prose
 from rigidimeter.analysis.report.sections import SECTIONS
-from rigidimeter.analysis.report.sections.methods_prose import methods_prose
 from rigidimeter.analysis.report.style import svg_text
 from rigidimeter.analysis.study import StudyResult, lead, traffic_light
 from rigidimeter.core.files import csv_text, visible

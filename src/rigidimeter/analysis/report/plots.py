@@ -6,8 +6,7 @@ the page. Nothing else of matplotlib's global state changes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import matplotlib as mpl
@@ -18,26 +17,22 @@ from numpy.typing import NDArray
 from rigidimeter.analysis.estimation import aligned, epoch_signals
 from rigidimeter.analysis.estimation.stretches import longest_part
 from rigidimeter.analysis.reading import Recording
-from rigidimeter.analysis.report.estimate_points import draw_epochs, draw_pairs, quantities
-from rigidimeter.analysis.report.representative import origin_s
-from rigidimeter.analysis.report.sections.day_points import draw_days
-from rigidimeter.analysis.report.sections.distribution import draw_comparison
-from rigidimeter.analysis.report.sections.forest import draw_forest, forest_label, forest_size
-from rigidimeter.analysis.report.sections.perturbation_figure import (
-    draw_perturbation,
-    draw_spectrum,
-)
-from rigidimeter.analysis.report.sections.recorded_signals import (
-    draw_recorded,
-    recorded_size,
-    shown_channels,
-)
-from rigidimeter.analysis.report.sections.torque_fit import (
+from rigidimeter.analysis.report.curves import (
+    EXCITATION_HEIGHTS,
+    EXCITATION_SIZE,
     TORQUE_HEIGHTS,
     TORQUE_SIZE,
-    draw_torque_parts,
+    draw_excitation,
+    draw_recorded,
+    draw_torque,
+    origin_s,
+    recorded_size,
+    shown_channels,
     torque_limit_nm,
 )
+from rigidimeter.analysis.report.estimate_points import draw_epochs, draw_pairs, quantities
+from rigidimeter.analysis.report.interval_rows import draw_effects, effects_label, effects_size
+from rigidimeter.analysis.report.points import draw_comparisons, draw_days
 from rigidimeter.analysis.report.style import condition_colours, drawable, styled
 from rigidimeter.analysis.study import Comparison, StudyResult
 from rigidimeter.core.records import Analysis, Channel, Epoch, Fit
@@ -48,33 +43,48 @@ Panels = NDArray[Any]
 _One = TypeVar("_One", Epoch, Fit)
 
 
-@contextmanager
-def _panels(
-    given: Any, count: int, size: tuple[float, float], columns: int = 1, **options: Any
-) -> Iterator[list[Axes]]:
-    """Yield the Axes of the caller, or those of a new figure."""
+def _plotted(
+    given: Any,
+    count: int,
+    size: tuple[float, float],
+    draw: Callable[..., None],
+    *arguments: Any,
+    columns: int = 1,
+    title: str = "",
+    **options: Any,
+) -> Panels:
+    """Draw on the Axes of the caller, or on those of a new figure, and return them."""
     if given is not None:
         panels = list(np.ravel(np.asarray(given, dtype=object)))
         if len(panels) != count:
             raise ValueError(f"this draws {count} panels; got {len(panels)} Axes")
         with mpl.rc_context({"text.parse_math": False}):  # a condition may be called "$5"
-            yield panels
-        return
+            _draw(panels, draw, arguments, title)
+        return np.array(panels)
     import matplotlib.pyplot as plt
 
     with styled():
         rows, columns = -(-count // columns), min(columns, count)
         figure, made = plt.subplots(rows, columns, figsize=size, squeeze=False, **options)
         try:
-            panels = list(made.ravel())
-            for unused in panels[count:]:
-                unused.remove()
-            yield panels[:count]
+            panels, unused = made.ravel()[:count], made.ravel()[count:]
+            for each in unused:
+                each.remove()
+            _draw(list(panels), draw, arguments, title)
             figure.align_ylabels()
             figure.draw_without_rendering()  # ticks that are made later have the user's style
         except BaseException:
             plt.close(figure)
             raise
+    return np.array(panels)
+
+
+def _draw(
+    panels: list[Axes], draw: Callable[..., None], arguments: Sequence[Any], title: str
+) -> None:
+    draw(panels, *arguments)
+    if title:
+        panels[0].set_title(drawable(title), loc="left")
 
 
 def plot_recording(recording: Recording, epoch: int, span_s: float | None, axes: Any) -> Panels:
@@ -86,19 +96,16 @@ def plot_recording(recording: Recording, epoch: int, span_s: float | None, axes:
     begins_s = origin_s(one)
     length_s = max(float(channel.time_s[-1]) for channel in shown.values()) - begins_s
     span_s = length_s if span_s is None else min(span_s, length_s)
-    with _panels(axes, len(shown), recorded_size(len(shown)), sharex=True) as panels:
-        draw_recorded(panels, shown, begins_s, span_s)
-        sources = short_names(each.source for each in recording.epochs)
-        panels[0].set_title(_title(one.label, sources[one.source], one.condition), loc="left")
-    return np.array(panels)
+    title = _title(recording, one.source, one.label, one.condition)
+    size = recorded_size(len(shown))
+    drawing = draw_recorded, shown, begins_s, span_s
+    return _plotted(axes, len(shown), size, *drawing, title=title, sharex=True)
 
 
 def plot_fit(fit: Fit, axes: Any) -> Panels:
     """Draw J, B and K in pairs."""
     _need_numbers(fit)
-    with _panels(axes, 3, (7.4, 2.7), columns=3) as panels:
-        draw_pairs(panels, fit)
-    return np.array(panels)
+    return _plotted(axes, 3, (7.4, 2.7), draw_pairs, fit, columns=3)
 
 
 def plot_estimates(analysis: Analysis, axes: Any) -> Panels:
@@ -107,9 +114,8 @@ def plot_estimates(analysis: Analysis, axes: Any) -> Panels:
     if not results:
         raise ValueError("no epoch was estimated, so there is nothing to plot")
     shown = quantities(analysis)
-    with _panels(axes, len(shown), (7.4, 0.7 + 1.6 * len(shown)), sharex=True) as panels:
-        draw_epochs(panels, results, shown)
-    return np.array(panels)
+    size = 7.4, 0.7 + 1.6 * len(shown)
+    return _plotted(axes, len(shown), size, draw_epochs, results, shown, sharex=True)
 
 
 def plot_torque(
@@ -131,20 +137,12 @@ def plot_torque(
     signals = epoch_signals(own, fit.method, recording.settings.estimation)
     window_s = float(signals.time_s[-1] - signals.time_s[0]) if span_s is None else span_s
     name = condition_name(fit.condition)
-    with _panels(axes, 5, TORQUE_SIZE, sharex=True, height_ratios=TORQUE_HEIGHTS) as panels:
-        draw_torque_parts(
-            panels,
-            signals,
-            fit,
-            condition_colours([name])[name],
-            origin_s=origin_s(own),
-            window_s=window_s,
-            limit_nm=torque_limit_nm(signals, fit, window_s),
-        )
-        sources = short_names(each.source for each in recording.epochs)
-        which = _title(fit.epoch, sources[fit.source], fit.condition)
-        panels[0].set_title(f"Torque of {which}", loc="left")
-    return np.array(panels)
+    limit_nm = torque_limit_nm(signals, fit, window_s)
+    shown = signals, fit, condition_colours([name])[name], origin_s(own), limit_nm, window_s
+    title = f"Torque of {_title(recording, fit.source, fit.epoch, fit.condition)}"
+    drawing = draw_torque, *shown
+    heights = TORQUE_HEIGHTS
+    return _plotted(axes, 5, TORQUE_SIZE, *drawing, title=title, sharex=True, height_ratios=heights)
 
 
 def plot_result(result: StudyResult, measures: Sequence[str] | None, axes: Any) -> Panels:
@@ -154,12 +152,9 @@ def plot_result(result: StudyResult, measures: Sequence[str] | None, axes: Any) 
     ]
     if not compared:
         raise ValueError("the comparison has no values to plot")
-    colours = condition_colours(result.condition_names)
-    rows = -(-len(compared) // 3)
-    with _panels(axes, len(compared), (7.4, 0.2 + 2.6 * rows), columns=3) as panels:
-        for one, c in zip(panels, compared, strict=True):
-            draw_comparison(one, c, colours)
-    return np.array(panels)
+    size = 7.4, 0.2 + 2.6 * -(-len(compared) // 3)
+    shown = compared, condition_colours(result.condition_names)
+    return _plotted(axes, len(compared), size, draw_comparisons, *shown, columns=3)
 
 
 def plot_days(result: StudyResult, measure: str, ax: Any) -> Axes:
@@ -168,8 +163,7 @@ def plot_days(result: StudyResult, measure: str, ax: Any) -> Axes:
     if not c.day_medians:
         raise ValueError(f"{measure} has no days: they are known of a study folder alone")
     order = [condition_name(name) for name in result.condition_names]
-    with _panels(ax, 1, (7.4, 2.9)) as (axes,):
-        draw_days(axes, c, order)
+    axes: Axes = _plotted(ax, 1, (7.4, 2.9), draw_days, c, order)[0]
     return axes
 
 
@@ -179,8 +173,8 @@ def plot_effects(result: StudyResult, ax: Any) -> Axes:
     if not found:
         why = next((c.remark for c in result.comparisons if c.remark), "nothing was compared")
         raise ValueError(f"no measure has an effect size: {why}")
-    with _panels(ax, 1, forest_size(len(found))) as (axes,):
-        draw_forest(axes, found, forest_label(result))
+    drawing = draw_effects, found, effects_label(result)
+    axes: Axes = _plotted(ax, 1, effects_size(len(found)), *drawing)[0]
     return axes
 
 
@@ -189,10 +183,9 @@ def plot_design(design: Design, axes: Any) -> Panels:
     prbs, rate_hz = design.settings.prbs, design.settings.rig.tick_rate_hz
     values = design.perturbation_nm
     channel = Channel("perturbation_nm", tick_times_s(values.size, rate_hz), values)
-    with _panels(axes, 3, (7.4, 5.8), height_ratios=(1.0, 1.0, 1.8)) as panels:
-        draw_perturbation(panels[:2], channel, 0.0)
-        draw_spectrum(panels[2], channel, (prbs.wanted_low_hz, prbs.wanted_high_hz))
-    return np.array(panels)
+    shown = channel, 0.0, (prbs.wanted_low_hz, prbs.wanted_high_hz)
+    heights = EXCITATION_HEIGHTS
+    return _plotted(axes, 3, EXCITATION_SIZE, draw_excitation, *shown, height_ratios=heights)
 
 
 def _at(each: Sequence[_One], place: int) -> _One:
@@ -215,5 +208,6 @@ def _compared(result: StudyResult, measure: str) -> Comparison:
     return found
 
 
-def _title(epoch: str, source: str, condition: str) -> str:
-    return drawable(f"epoch {epoch} of {source}" + (f", {condition}" if condition else ""))
+def _title(recording: Recording, source: str, epoch: str, condition: str) -> str:
+    name = short_names(each.source for each in recording.epochs)[source]
+    return f"epoch {epoch} of {name}" + (f", {condition}" if condition else "")

@@ -11,9 +11,9 @@ from __future__ import annotations
 import io
 import re
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -24,9 +24,12 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rigidimeter.core.files import visible
+
+Look = dict[str, Any]
+"""Arguments of a line or of points, by name."""
 
 GREY = "#555555"
 INK = "#1C1C1C"
@@ -72,6 +75,34 @@ def styled() -> Iterator[None]:
         mpl.rcdefaults()  # a matplotlibrc of the user must not change the report
         mpl.rcParams.update(_STYLE)
         yield
+
+
+def drawn(
+    size: tuple[float, float],
+    draw: Callable[..., None],
+    *arguments: Any,
+    rows: int = 1,
+    columns: int = 1,
+    **options: Any,
+) -> Figure:
+    """Return a figure of its own of what a function draws on panels.
+
+    Parameters
+    ----------
+    size : (float, float)
+        In inches.
+    draw : callable
+        Takes the list of panels, then `arguments`.
+    rows, columns : int
+    **options
+        Of the panels, as `matplotlib.figure.Figure.subplots` takes them.
+    """
+    with styled():
+        figure = Figure(figsize=size)
+        panels = figure.subplots(rows, columns, squeeze=False, **options)
+        draw(list(panels.ravel()), *arguments)
+        figure.align_ylabels()
+    return figure
 
 
 def svg_text(figure: Figure, mark: str = "") -> str:
@@ -139,6 +170,51 @@ def spread(count: int, reach: float) -> NDArray[np.float64]:
     return np.asarray(reach * (2 * share - 1), dtype=np.float64)
 
 
+def with_intervals(
+    axes: Axes,
+    places: ArrayLike,
+    rows: ArrayLike,
+    colour: str,
+    marker: str,
+    *,
+    across: bool = False,
+    width: float = 1.2,
+    faint: float = 1.0,
+    **style: Any,
+) -> None:
+    """Draw values as points with their intervals.
+
+    Parameters
+    ----------
+    places : float or array, shape (n,)
+        Where they stand along the other axis.
+    rows : array, shape (3,) or (n, 3)
+        Each value and the ends of its interval, which is drawn where both are finite.
+    across : bool
+        The values are those of the horizontal axis.
+    width, faint : float
+        Width and opacity of the intervals.
+    **style
+        Of the points.
+    """
+    values, low, high = np.reshape(np.asarray(rows, dtype=np.float64), (-1, 3)).T
+    at = np.broadcast_to(places, values.shape)
+    known = np.isfinite(low) & np.isfinite(high)
+    if np.any(known):
+        lines = axes.hlines if across else axes.vlines
+        lines(at[known], low[known], high[known], color=colour, linewidth=width, alpha=faint)
+    x, y = (values, at) if across else (at, values)
+    axes.plot(x, y, marker, color=colour, **style)
+
+
+def write_at(
+    axes: Axes, x: float, y: float, text: str, *, share: Literal["x", "y"], **style: Any
+) -> None:
+    """Write a few words where one of the coordinates is a share of the axes, from 0 to 1."""
+    place = axes.get_yaxis_transform() if share == "x" else axes.get_xaxis_transform()
+    axes.text(x, y, drawable(text), transform=place, fontsize=8, **style)
+
+
 def plain_ticks(*axes: Axis) -> None:
     """Label the ticks of logarithmic axes with plain numbers."""
 
@@ -155,6 +231,22 @@ def legend_above(axes: Axes) -> None:
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, handletextpad=0.4, borderpad=0.1,
         fontsize=8, frameon=False,
     )  # fmt: skip
+
+
+def legend_outside(axes: Axes) -> None:
+    """Write the legend of axes above all panels of their figure."""
+    axes.figure.legend(
+        *axes.get_legend_handles_labels(), loc="outside upper left", ncols=4, handletextpad=0.4
+    )
+
+
+def named_places(axes: Axes, names: Iterable[str]) -> None:
+    """Name the places 0, 1, … of the horizontal axis, without lines at them."""
+    labels = list(names)
+    axes.set_xticks(range(len(labels)), labels)
+    axes.set_xlim(-0.55, len(labels) - 0.45)
+    axes.tick_params(axis="x", length=0)
+    axes.grid(visible=False, axis="x")
 
 
 def note(axes: Axes, text: str) -> None:

@@ -7,7 +7,6 @@ from rigidimeter.analysis.statistics.contrasts import (
     difference,
     interval_of,
     joint_test,
-    pairwise,
 )
 from rigidimeter.analysis.statistics.day_components import DayComponents, day_components
 from rigidimeter.analysis.statistics.day_levels import (

@@ -9,7 +9,6 @@ deviance. Kenward and Roger enlarge C for what the variances are uncertain, and 
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -87,11 +86,6 @@ def difference(fit: Mixed, first: str, second: str) -> Contrast:
         raise ValueError(f"a difference needs two conditions, got {first} twice")
     weights = [float(name == first) - float(name == second) for name in fit.conditions]
     return contrast(fit, weights)
-
-
-def pairwise(fit: Mixed) -> dict[tuple[str, str], Contrast]:
-    """Return the difference of every pair of conditions, the earlier less the later."""
-    return {pair: difference(fit, *pair) for pair in itertools.combinations(fit.conditions, 2)}
 
 
 def interval_of(

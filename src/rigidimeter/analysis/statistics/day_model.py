@@ -20,9 +20,6 @@ from rigidimeter.analysis.statistics.day_levels import DayWeights, SubjectEpochs
 from rigidimeter.analysis.statistics.ranks import exact_ranksum
 from rigidimeter.analysis.statistics.summary import checked_sample
 
-FEW_DF = 3.0
-"""With fewer degrees of freedom the interval is wider than ± 3.2 standard errors."""
-
 
 @dataclass(frozen=True)
 class DayDifference:
@@ -82,17 +79,9 @@ class DayDifference:
     unit: str = "day"
     weights: DayWeights = field(default=({}, {}), repr=False)
 
-    @property
-    def few(self) -> str:
-        """Say what so few degrees of freedom ask of a difference; empty where they are enough."""
-        if not self.df < FEW_DF:
-            return ""
-        errors = float(t_distribution.isf((1 - self.confidence) / 2, self.df))
-        df = f"{self.df:.1f}".removesuffix(".0")
-        return (
-            f"with {df} degree{'s' * (df != '1')} of freedom only a difference above {errors:.3g} "
-            f"standard errors is shown; more {self.unit}s would show smaller ones"
-        )
+    def least_shown(self, level: float) -> float:
+        """Return how many standard errors a difference has whose p is this level."""
+        return float(t_distribution.isf(level / 2, self.df))
 
 
 def day_difference(

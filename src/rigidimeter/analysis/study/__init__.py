@@ -21,7 +21,11 @@ from rigidimeter.analysis.study.conclusions import (
     conclusion_rows,
 )
 from rigidimeter.analysis.study.day_scatter import DayScatter, day_scatter
-from rigidimeter.analysis.study.difference_rows import DifferenceRow, difference_rows
+from rigidimeter.analysis.study.difference_rows import (
+    DifferenceRow,
+    difference_cells,
+    difference_rows,
+)
 from rigidimeter.analysis.study.differences import Difference
 from rigidimeter.analysis.study.measures import RATING, Measure, Observation, conditions
 from rigidimeter.analysis.study.provenance import provenance
@@ -52,4 +56,3 @@ from rigidimeter.analysis.study.tables import (
     table_csv,
 )
 from rigidimeter.analysis.study.traffic_light import TrafficLight, traffic_light
-from rigidimeter.analysis.study.warnings import analysis_warnings

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -30,8 +30,13 @@ from rigidimeter.analysis.estimation.screening import before_fit
 from rigidimeter.analysis.estimation.stretches import longest_part
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.findings import Fact, Finding, found_between
 from rigidimeter.core.records import Analysis, BandEstimate, Delay, Epoch, Fit, Task
 from rigidimeter.core.settings import Settings, settings_from
+from rigidimeter.core.words import short_names
+
+DIFFERENT_INERTIA_PERCENT = 15.0
+"""Recordings whose median J differ by more hardly are of one joint."""
 
 
 class StepCosts(NamedTuple):
@@ -238,6 +243,7 @@ def analyse_prepared(
         delays,
         reason,
         tuple(sensitivity),
+        () if fits_alone else tuple(_of_recordings(fits)),
     )
 
 
@@ -248,6 +254,24 @@ def _with_differences(
     own = [fit for fit in fits if fit.outcome.included and fit.condition == pooled.condition]
     found = between_epochs(own, by_perturbation, settings.diagnostics)
     return pooled if found is None else replace(pooled, findings=(*pooled.findings, found))
+
+
+def _of_recordings(fits: Sequence[Fit]) -> Iterator[Finding]:
+    """Yield that recordings differ in J: one median for all puts that into B and K."""
+    by_source: dict[str, list[float]] = {}
+    for fit in fits:
+        if fit.outcome.included:
+            by_source.setdefault(fit.source, []).append(fit.inertia_kg_m2)
+    medians = {source: float(np.median(values)) for source, values in by_source.items()}
+    if len(medians) < 2 or min(medians.values()) <= 0:
+        return
+    low, high = min(medians, key=medians.__getitem__), max(medians, key=medians.__getitem__)
+    percent = 100.0 * (medians[high] / medians[low] - 1.0)
+    if percent >= DIFFERENT_INERTIA_PERCENT:
+        names = short_names(medians)
+        facts: dict[str, Fact] = {"high": names[high], "high_j": medians[high]}
+        facts |= {"low": names[low], "low_j": medians[low]}
+        yield found_between("inertia_of_recordings", facts, percent, DIFFERENT_INERTIA_PERCENT)
 
 
 def _without_drive(epochs: Sequence[PreparedEpoch], after: bool) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
@@ -28,7 +27,6 @@ from rigidimeter.analysis.study.measures import (
 )
 from rigidimeter.analysis.study.results import StudyResult
 from rigidimeter.analysis.study.study_analysis import analyse_study, read_study
-from rigidimeter.analysis.study.tested import LEVEL
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import TextTable, lines_text, read_text_table
 from rigidimeter.core.records import Analysis, Notice
@@ -210,8 +208,13 @@ def _compare_columns(
         comparisons, seed=seed, resamples=resamples, progress=progress
     )
     tested, more = with_further(tested, against_reference(tested, further))
-    for each in (*tested, *more):
-        notices += _cautions(table.source, each, units is not None)
+    for each in (*tested, *more) if units is not None else ():
+        count = min(len({o.unit for o in each.of(group)}) for group in each.pair)
+        if count < _FEW_SESSIONS:
+            notices.append(
+                f"{table.source}: {each.measure.name} has {count} sessions in one group; so few "
+                "make a bootstrap interval too narrow"
+            )
     return StudyResult(
         "",
         *names,
@@ -271,26 +274,3 @@ def _column(
             )
     notices = [f"{table.source}: no {name} in {lines_text(missing)}; left out"] if missing else []
     return found, notices
-
-
-def _cautions(source: str, found: Comparison, by_session: bool) -> list[str]:
-    """Say where a test could not find a difference, or an interval comes out too narrow."""
-    name = found.measure.name
-    if found.test is None:
-        return [f"{source}: {name}: {found.remark}. Medians and quartiles are given without one"]
-    sizes = [found.summaries[group].n for group in found.pair]
-    counts = " and ".join(f"{n} in {group}" for n, group in zip(sizes, found.pair, strict=True))
-    said = []
-    least = 2 / math.comb(sum(sizes), sizes[0])
-    if least > LEVEL:
-        said.append(
-            f"{source}: {name} has {counts}; even groups that do not overlap have an exact p of "
-            f"{least:.2g}, so this test cannot show a difference"
-        )
-    sessions = min(len({o.unit for o in found.of(group)}) for group in found.pair)
-    if by_session and sessions < _FEW_SESSIONS:
-        said.append(
-            f"{source}: {name} has {sessions} sessions in one group; so few make a bootstrap "
-            "interval too narrow"
-        )
-    return said

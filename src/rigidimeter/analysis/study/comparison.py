@@ -30,7 +30,6 @@ from rigidimeter.analysis.study.compared import Comparison, DayMedian
 from rigidimeter.analysis.study.measures import MEASURES, Measure, Observation, conditions
 from rigidimeter.analysis.study.provenance import provenance
 from rigidimeter.analysis.study.results import EffectPair, SessionEntry, StudyResult
-from rigidimeter.analysis.study.warnings import analysis_warnings
 from rigidimeter.core.records import Analysis, Fit, Score
 
 FEWEST_FOR_TEST = 3
@@ -95,7 +94,7 @@ def recording_result(recording: Recording, analysis: Analysis, command: str = ""
         compare_analysis(analysis, resamples=0),
         settings=recording.settings,
         epochs=recording.epochs,
-        notices=(*recording.notices, *analysis_warnings(analysis)),
+        notices=recording.notices,
         own_rig=recording.own_rig,
         provenance=provenance(recording.paths, recording.digests, recording.settings, command),
     )

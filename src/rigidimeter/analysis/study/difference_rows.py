@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rigidimeter.analysis.study.conclusions import Conclusion, Conclusions
+from rigidimeter.analysis.study.conclusions import Conclusion, Conclusions, conclude
 from rigidimeter.analysis.study.differences import Difference, Three
-from rigidimeter.core.words import decimals, fixed, number, p_value, scaled
+from rigidimeter.analysis.study.results import StudyResult
+from rigidimeter.core.words import condition_name, decimals, fixed, number, p_value, scaled
 
 VERDICTS = {
     "lower": "lower",
@@ -32,6 +33,26 @@ class DifferenceRow(NamedTuple):
     interval: str
     p: str
     verdict: str
+
+
+def difference_cells(result: StudyResult) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return headings and cells; of a virtual study what was simulated in the place of p."""
+    concluded = conclude(result)
+    rows = [] if concluded is None else difference_rows(concluded)
+    virtual = any(row.simulated for row in rows)
+    holm = "p, Holm" if concluded is not None and concluded.adjusted_for > 1 else "p"
+    reference, other = condition_name(result.reference), condition_name(result.other)
+    headings = ("", reference, other, f"{other} − {reference}", "simulated" if virtual else "",
+                "95 % interval", "" if virtual else holm, "difference")  # fmt: skip
+    return headings, [
+        (
+            ", ".join(filter(None, (row.measure, row.unit))),
+            *(row.reference, row.other, row.difference, row.simulated, row.interval),
+            "" if virtual else row.p,
+            row.verdict,
+        )
+        for row in rows
+    ]
 
 
 def difference_rows(concluded: Conclusions) -> list[DifferenceRow]:

@@ -1,33 +1,49 @@
-"""What else than the condition may have made a difference that a test found.
+"""What else than the condition may have made a difference that a test found, or have hidden one.
 
-Each objection is a clause that names the cause; the most specific comes first.
+Each is a finding; the most specific comes first.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import date
 
 from rigidimeter.analysis.estimation import method_named
+from rigidimeter.analysis.statistics import ranksum
 from rigidimeter.analysis.study.compared import Comparison
-from rigidimeter.analysis.study.doubted_epochs import (
-    OF_SUBJECT,
-    carried,
-    doubted_epochs,
-    doubted_together,
-    in_words,
-)
 from rigidimeter.analysis.study.ratings_found import RatingsFound
 from rigidimeter.analysis.study.ratings_model import rated_one_condition, without_examiners
 from rigidimeter.analysis.study.results import StudyResult
 from rigidimeter.analysis.study.tested import LEVEL, Basis, Test, by_days, tested_again
-from rigidimeter.core.findings import Finding
-from rigidimeter.core.records import Fit
+from rigidimeter.core.findings import Fact, Finding, found_between
+from rigidimeter.core.records import Analysis, Fit
+from rigidimeter.core.words import condition_name, plural, series
 
-SHARE_THAT_HIDES = 0.1
-"""Of the epochs of a condition: so many with a caution can hide a difference."""
+OF_SUBJECT = {"tremor", "voluntary_torque", "active_movement", "emg_activity", "loop_bias"}
+"""Checks of the subject's own torque."""
+
+CAUSES = {
+    "tremor": "",
+    "varying_with_time": "a joint that changes during the epoch",
+    "varying_with_angle": "a joint that changes with the angle",
+    "varying_with_phase": "a joint that changes with the imposed movement",
+    "voluntary_torque": "torque of the subject's own",
+    "active_movement": "torque of the subject's own",
+    "emg_activity": "muscle activity",
+    "implausible_parameters": "values that no joint has, as wrong units give",
+}
+"""Checks that say what is wrong, in the order in which they are named; of the others the one that
+flags most epochs is named. A joint that changes leaves torque as a pushing subject does, but a
+subject who pushes is hardly ever taken for a joint that changes."""
+
+ALIKE_IN_BOTH = ("between_samples", "varying_between_epochs")
+"""Checks that make no difference: of the rig, and of a scatter that is in the test."""
+
+SHARE_THAT_HIDES = 10.0
+"""In % of the epochs of a condition: so many with a caution can hide a difference."""
 
 SHARE_OF_INERTIA = 0.5
 """Of a measure's relative difference: if that of the inertia is larger, the joint or the contact
@@ -37,10 +53,15 @@ DEGREES = 180.0 / math.pi
 UNIT_WITHIN = 1.5
 """Factor by which a ratio of inertias may miss that of the units."""
 
+FEW_DF = 3.0
+"""With fewer degrees of freedom the interval is wider than ± 3.2 standard errors."""
+
+Flagged = Mapping[tuple[str, str], Sequence[str]]
+
 
 def objections(
     test: Test, basis: Basis, result: StudyResult, inertia: Comparison | None
-) -> Iterator[str]:
+) -> Iterator[Finding]:
     """Yield what else may have made a difference that was found.
 
     Parameters
@@ -55,92 +76,158 @@ def objections(
     if result.ratings is not None and c.measure.origin == "ratings":
         yield from _one_sided(test, result.ratings)
     if c.measure.origin in ("fits", "scores"):
-        yield from _of_degrees(inertia)
-        yield from _of_epochs(test, basis, result)
-        yield from _of_conditions(test, result)
+        flagged = flagged_epochs(c, result.analysis)
         if inertia is not None:
-            yield from _of_inertia(test, result, inertia)
+            yield from _of_degrees(inertia)
+        yield from _of_epochs(test, basis, result, flagged)
+        yield from _of_conditions(test, result, flagged)
+        if inertia is not None:
+            yield from _of_inertia(c, inertia, flagged)
     if basis == "recordings":
-        yield (
-            "which recordings are of one day is not known, and a day may move all of them alike; "
-            "a study folder states their days"
-        )
+        yield found_between("unknown_days", {}, len({o.source for o in c.observations}))
     elif basis == "days":
         yield from _in_order(c)
 
 
-def hidden(c: Comparison, result: StudyResult) -> str:
-    """Return what can hide a difference that was not found; empty without any."""
-    said = ""
-    doubted = doubted_epochs(c, result.analysis)
-    shares = [
-        sum((o.source, o.epoch) in doubted for o in own) / len(own)
-        for own in map(c.of, c.pair)
-        if own
-    ]
-    if max(shares, default=0.0) >= SHARE_THAT_HIDES:
-        said = carried(c, doubted)
-    elif result.ratings is not None and c.measure.origin == "ratings":
-        said = _who_rated_one(rated_one_condition(result.ratings))
-    return f"{said}, which can hide a difference" if said else ""
+def hidden(c: Comparison, result: StudyResult, tests: int) -> Finding | None:
+    """Return what can hide a difference that was not found, the most specific; None without any."""
+    flagged = flagged_epochs(c, result.analysis)
+    if flagged and (share := _largest_share(c, flagged)) >= SHARE_THAT_HIDES:
+        facts = _carried(c, flagged) | {"variant": "hides"}
+        return found_between("flagged_epochs", facts, share, SHARE_THAT_HIDES)
+    if result.ratings is not None and c.measure.origin == "ratings":
+        examiners = rated_one_condition(result.ratings)
+        if examiners:
+            return _of_examiners(examiners, {"variant": "hides"})
+    if c.days is not None and c.days.df < FEW_DF:
+        units: dict[str, Fact] = {
+            "df": c.days.df,
+            "tests": plural(tests, "test"),
+            "units": f"{c.days.unit}s",
+        }
+        return found_between("few_units", units, c.days.least_shown(LEVEL / max(tests, 1)))
+    return None
 
 
-def untested(c: Comparison, result: StudyResult) -> str:
-    """Return why a condition has no values, where the recordings say so."""
+def without_test(c: Comparison, result: StudyResult, remark: str) -> Finding:
+    """Return why there is no test: where the recordings say so, that they could not be read."""
     read = {session.condition for session in result.sessions}
     for name in c.pair:
         lost = [out for out in result.left_out if out.condition == name]
         if lost and name not in read:
             which = "the recording" if len(lost) == 1 else f"all {len(lost)} recordings"
-            return f"{which} in {name} could not be used: {lost[0].reason}"
-    return ""
+            facts = {"which": which, "condition": name, "reason": lost[0].reason}
+            return found_between("unused_recordings", facts, len(lost))
+    return found_between("no_test", {"remark": remark})
 
 
-def negligible(c: Comparison, result: StudyResult) -> str:
-    """Return that a difference is smaller than an error which no check doubts; else nothing.
+def too_few(c: Comparison, tests: int) -> Finding | None:
+    """Return that no values could be far enough apart for a rank-sum test; else None."""
+    n_x, n_y = (len(c.values[name]) for name in c.pair)
+    least = ranksum(range(n_x), range(n_x, n_x + n_y)).p * tests
+    if least < LEVEL:
+        return None
+    of = f" for {tests} measures" if tests > 1 else ""
+    facts: dict[str, Fact] = {"first": n_x, "second": n_y, "of": of}
+    facts["exact"] = 2.0 / math.comb(n_x + n_y, n_x)
+    return found_between("too_few_values", facts, least, LEVEL)
+
+
+def negligible(c: Comparison, result: StudyResult) -> Finding | None:
+    """Return that a difference is smaller than an error which no check finds; else None.
 
     How the joint moves between the samples is known to `max_between_samples_percent` alone.
     """
     allowed = result.settings.diagnostics.max_between_samples_percent
-    if c.measure.origin != "fits":
-        return ""
-    size = 100.0 * _relative(*(c.summaries[name].median for name in c.pair))
-    if size > allowed:
-        return ""
-    return (
-        f"the difference of {size:.2g} % is within the {allowed:g} % by which the motion between "
-        "samples may move it"
-    )
+    size = 100.0 * _relative(c)
+    if c.measure.origin != "fits" or size > allowed:
+        return None
+    return found_between("within_accuracy", {}, size, allowed)
 
 
-def _of_epochs(test: Test, basis: Basis, result: StudyResult) -> Iterator[str]:
-    """Yield the checks that doubt epochs, if the others do not show the difference."""
-    c = test.comparison
-    doubted = doubted_epochs(c, result.analysis)
-    if not doubted:
+def flagged_epochs(c: Comparison, analysis: Analysis) -> Flagged:
+    """Return the checks that flag each epoch which counts in the comparison, where there are any.
+
+    A score is not an estimate: only torque of the subject's own changes it, which may be a note for
+    the method of the estimate.
+    """
+    counting = {(o.source, o.epoch) for name in c.pair for o in c.of(name)}
+    flagged = {}
+    for fit in analysis.fits:
+        names = [f.name for f in fit.findings if _counts(f, of_score=c.measure.origin == "scores")]
+        if names and (fit.source, fit.epoch) in counting:
+            flagged[fit.source, fit.epoch] = names
+    return flagged
+
+
+def _counts(finding: Finding, *, of_score: bool = False) -> bool:
+    if of_score:
+        return finding.name in OF_SUBJECT
+    return finding.level != "note" and finding.name not in ALIKE_IN_BOTH
+
+
+def _largest_share(c: Comparison, flagged: Flagged) -> float:
+    """Return the largest share of a condition's epochs that are flagged, in %."""
+    of_each = [own for own in map(c.of, c.pair) if own]
+    shares = (sum((o.source, o.epoch) in flagged for o in own) / len(own) for own in of_each)
+    return 100.0 * max(shares, default=0.0)
+
+
+def _carried(c: Comparison, flagged: Flagged) -> dict[str, Fact]:
+    """Return which check flags epochs, and how many of each condition are flagged."""
+    counts = Counter(name for names in flagged.values() for name in names)
+    first = next((name for name in CAUSES if name in counts), counts.most_common(1)[0][0])
+    parts: list[str] = []
+    for condition in c.pair:
+        of = c.of(condition)
+        carry = sum((o.source, o.epoch) in flagged for o in of)
+        epochs = "" if parts else " epochs"
+        parts.append(f"{carry} of {len(of)}{epochs} in {condition_name(condition)}")
+    others = f" (or {plural(len(counts) - 1, 'other finding')})" if len(counts) > 1 else ""
+    return {"cause": _in_words(first), "others": others, "counts": ", ".join(parts)}
+
+
+def _in_words(check: str) -> str:
+    """Return a check with what it finds, where its name does not say it."""
+    return f"{CAUSES[check]} ({check})" if CAUSES.get(check) else check
+
+
+def _of_epochs(
+    test: Test, basis: Basis, result: StudyResult, flagged: Flagged
+) -> Iterator[Finding]:
+    """Yield the checks that flag epochs, if the others do not show the difference."""
+    if not flagged:
         return
-    sound = [o for o in c.observations if (o.source, o.epoch) not in doubted]
+    c = test.comparison
+    sound = [o for o in c.observations if (o.source, o.epoch) not in flagged]
     again = tested_again(c, sound, basis)
-    names = {name for one in doubted.values() for name in one}
-    if not (again.agrees(test) or (names <= {*OF_SUBJECT} and _cleared(test, result))):
-        yield f"{carried(c, doubted)}; without these epochs {again.said}"
+    names = {name for one in flagged.values() for name in one}
+    if not (again.agrees(test) or (names <= OF_SUBJECT and _cleared(test, result))):
+        facts = _carried(c, flagged) | {"without": again.said}
+        yield found_between("flagged_epochs", facts, _largest_share(c, flagged))
 
 
-def _of_conditions(test: Test, result: StudyResult) -> Iterator[str]:
-    """Yield what a check doubts in all epochs of a condition, unless it is too small for it."""
+def _of_conditions(test: Test, result: StudyResult, flagged: Flagged) -> Iterator[Finding]:
+    """Yield what a check finds in all epochs of a condition, unless it is too small for it."""
     c = test.comparison
     if c.measure.origin == "scores":
         return
-    found = list(doubted_together(c, result.analysis))
-    bias = sum(_bias(c, fit, finding) for fit, finding in found)
-    if not found or test.stands_against(bias):
+    together = [
+        (fit, finding)
+        for fit in result.analysis.pooled
+        if fit.condition in c.pair
+        for finding in fit.findings
+        if _counts(finding)
+    ]
+    if not together or test.stands_against(sum(_bias(c, *one) for one in together)):
         return
-    names = list(dict.fromkeys(finding.name for _, finding in found))
-    if {*names} <= {*OF_SUBJECT} and _cleared(test, result):
+    names = list(dict.fromkeys(finding.name for _, finding in together))
+    if {*names} <= OF_SUBJECT and _cleared(test, result):
         return
-    doubted = doubted_epochs(c, result.analysis)
-    epochs = f"; {carried(c, doubted)}" if doubted else ""
-    yield f"{in_words(names[0])} in all epochs of a condition together{epochs}"
+    where = series(list(dict.fromkeys(condition_name(fit.condition) for fit, _ in together)))
+    counts = "; {cause} in {counts}".format_map(_carried(c, flagged)) if flagged else ""
+    facts = {"cause": _in_words(names[0]), "where": where, "counts": counts}
+    yield found_between("flagged_epochs", {**facts, "variant": "together"})
 
 
 def _bias(c: Comparison, fit: Fit, finding: Finding) -> float:
@@ -155,40 +242,35 @@ def _bias(c: Comparison, fit: Fit, finding: Finding) -> float:
     return bias if math.isfinite(bias) else math.inf
 
 
-def _differs(inertia: Comparison) -> str:
-    size = 100 * _relative(*(inertia.summaries[name].median for name in inertia.pair))
-    return f"inertia differs by {size:.2g} %, and no treatment changes it"
-
-
-def _of_degrees(inertia: Comparison | None) -> Iterator[str]:
+def _of_degrees(inertia: Comparison) -> Iterator[Finding]:
     """Yield that inertias differ as degrees do from radians."""
-    if inertia is None:
-        return
     low, high = sorted(inertia.summaries[name].median for name in inertia.pair)
     if low > 0 and DEGREES / UNIT_WITHIN < high / low < DEGREES * UNIT_WITHIN:
-        yield (
-            f"{_differs(inertia)}: one is about {DEGREES:.0f} times the other, as where degrees "
-            "are read as radians"
-        )
+        yield _differs(inertia, {"variant": "degrees"})
 
 
-def _of_inertia(test: Test, result: StudyResult, inertia: Comparison) -> Iterator[str]:
+def _of_inertia(c: Comparison, inertia: Comparison, flagged: Flagged) -> Iterator[Finding]:
     """Yield that the inertia differs, as far as that may have made the difference.
 
     What makes another inertia, such as a unit or torque of the subject, changes B and K in
     proportion.
     """
-    c = test.comparison
-    of_inertia = _relative(*(inertia.summaries[name].median for name in inertia.pair))
-    medians = (c.summaries[name].median for name in c.pair)
-    if c is inertia or of_inertia > SHARE_OF_INERTIA * _relative(*medians):
-        doubted = doubted_epochs(c, result.analysis)
-        cause = "the posture, the contact with the robot, a unit, or the subject's own torque was "
-        yield f"{_differs(inertia)}: {carried(c, doubted) if doubted else f'{cause}different'}"
+    if c is inertia or _relative(inertia) > SHARE_OF_INERTIA * _relative(c):
+        carried = {**_carried(c, flagged), "variant": "flagged"} if flagged else {}
+        yield _differs(inertia, carried)
 
 
-def _relative(first: float, second: float) -> float:
-    """Return a difference as a share of the larger value."""
+def _differs(inertia: Comparison, facts: Mapping[str, Fact]) -> Finding:
+    first, second = (inertia.summaries[name].median for name in inertia.pair)
+    of_each: dict[str, Fact] = {"reference": inertia.reference, "first": first}
+    of_each |= {"other": inertia.other, "second": second}
+    size = 100.0 * _relative(inertia)
+    return found_between("inertia_of_conditions", {**facts, **of_each}, size)
+
+
+def _relative(c: Comparison) -> float:
+    """Return the difference of the medians as a share of the larger."""
+    first, second = (c.summaries[name].median for name in c.pair)
     return abs(first - second) / max(abs(first), abs(second))
 
 
@@ -203,24 +285,21 @@ def _cleared(test: Test, result: StudyResult) -> bool:
     )
 
 
-def _one_sided(test: Test, ratings: RatingsFound) -> Iterator[str]:
+def _one_sided(test: Test, ratings: RatingsFound) -> Iterator[Finding]:
     """Yield that an examiner who rated one condition alone makes the difference."""
-    examiners = rated_one_condition(ratings)
-    if not examiners:
-        return
-    again = by_days(test.comparison, without_examiners(ratings, examiners))
-    if not again.agrees(test):
-        yield f"{_who_rated_one(examiners)}; without these ratings {again.said}"
+    if examiners := rated_one_condition(ratings):
+        again = by_days(test.comparison, without_examiners(ratings, examiners))
+        if not again.agrees(test):
+            yield _of_examiners(examiners, {"without": again.said})
 
 
-def _who_rated_one(examiners: Sequence[str]) -> str:
-    if not examiners:
-        return ""
-    who = f"{'examiners' if len(examiners) > 1 else 'examiner'} {', '.join(examiners)}"
-    return f"{who} rated one of the conditions alone"
+def _of_examiners(examiners: Sequence[str], facts: Mapping[str, Fact]) -> Finding:
+    who = f"examiner{'s' * (len(examiners) > 1)} {', '.join(examiners)}"
+    name = "examiners_of_one_condition"
+    return found_between(name, {**facts, "who": who}, len(examiners))
 
 
-def _in_order(c: Comparison) -> Iterator[str]:
+def _in_order(c: Comparison) -> Iterator[Finding]:
     """Yield that all days of one condition came after all days of the other, in every subject."""
     days: dict[str, tuple[set[str], set[str]]] = {}
     for k, name in enumerate(c.pair):
@@ -228,11 +307,9 @@ def _in_order(c: Comparison) -> Iterator[str]:
             days.setdefault(o.subject, (set(), set()))[k].add(o.day)
     later = {_later(*both) for both in days.values() if all(both)}
     if len(later) == 1 and (last := later.pop()) is not None:
-        yield (
-            f"all days in {c.pair[last]} came after all days in {c.pair[1 - last]}, and a "
-            "change with time would have the same effect; alternate days, or days with both "
-            "conditions, separate them"
-        )
+        n = sum(len(both[last]) for both in days.values())
+        facts = {"later": c.pair[last], "earlier": c.pair[1 - last]}
+        yield found_between("order_of_conditions", facts, n)
 
 
 def _later(x: Iterable[str], y: Iterable[str]) -> int | None:

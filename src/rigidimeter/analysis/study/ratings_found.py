@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -18,8 +19,8 @@ from rigidimeter.analysis.statistics import (
     holm,
     interval_of,
     joint_test,
-    pairwise,
 )
+from rigidimeter.analysis.study.measures import off_first
 from rigidimeter.analysis.study.rating_table import Rating, groupings
 
 RATINGS_SCHEMA = "rigidimeter.ratings/1"
@@ -58,7 +59,7 @@ class RatingsFound:
         In the order of the table; the corrected scores in `fit` go with them.
     fit : Mixed
     reference, other : str
-        The two conditions of `contrast`; its estimate is reference − other.
+        The two conditions of `contrast`; its estimate is other − reference.
     notices : tuple of str
         What is odd about the ratings.
     left_out_lines : tuple of int
@@ -83,7 +84,7 @@ class RatingsFound:
     @cached_property
     def contrast(self) -> Contrast:
         """The contrast of the two conditions."""
-        return difference(self.fit, self.reference, self.other)
+        return difference(self.fit, self.other, self.reference)
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -103,8 +104,9 @@ class RatingsFound:
 
     @cached_property
     def pairs(self) -> tuple[RatingsPair, ...]:
-        """The contrasts of every two conditions."""
-        every = pairwise(self.fit)
+        """The contrasts of every two conditions: a later one less an earlier one, OFF first."""
+        names = itertools.combinations(off_first(self.fit.conditions), 2)
+        every = {(b, a): difference(self.fit, b, a) for a, b in names}
         residual = holm([c.p_residual for c in every.values()])
         satterthwaite = holm([c.p_satterthwaite for c in every.values()])
         return tuple(
@@ -169,7 +171,7 @@ def with_days(found: RatingsFound, fit: Mixed | None) -> RatingsFound:
     first, second = (
         float(fit.means[fit.conditions.index(name)]) for name in (found.reference, found.other)
     )
-    contrast_days = difference(fit, found.reference, found.other)
+    contrast_days = difference(fit, found.other, found.reference)
     return replace(found, contrast_days=contrast_days, means_days=(first, second))
 
 
@@ -186,10 +188,10 @@ def ratings_document(found: RatingsFound) -> dict[str, Any]:
         "means_se": dict(zip(fit.conditions, errors, strict=True)),
         "means_low": {mean.condition: mean.low for mean in found.means},
         "means_high": {mean.condition: mean.high for mean in found.means},
-        "contrast": _contrast(found.contrast, found.reference, found.other),
+        "contrast": _contrast(found.contrast, found.other, found.reference),
         "contrast_days": None
         if found.contrast_days is None
-        else _contrast(found.contrast_days, found.reference, found.other),
+        else _contrast(found.contrast_days, found.other, found.reference),
         "contrasts": [
             _contrast(pair.contrast, pair.first, pair.second)
             | {

@@ -141,10 +141,10 @@ def ratings_days(found: RatingsFound) -> DayDifference:
     se, df = c.se_kenward_roger, c.df_kenward_roger
     low, high = interval_of(c.estimate, se, df)
     return DayDifference(
-        estimate=c.estimate,
+        estimate=-c.estimate,  # of a test by days: reference − other
         se=se,
-        low=low,
-        high=high,
+        low=-high,
+        high=-low,
         p=c.p_kenward_roger,
         df=df,
         n_days_x=days_x,
@@ -201,7 +201,8 @@ def model_ratings(
     step : float
         Of the scale; 0 for none.
     pair : (str, str), optional
-        The contrast; by default the first two conditions, ``OFF`` first where it occurs.
+        The contrast, A less B; by default of the first two conditions, ``OFF`` first where it
+        occurs, the second less the first.
 
     Raises
     ------
@@ -219,7 +220,7 @@ def model_ratings(
         )
     found = ratings_of(table, columns, chosen, scale, step)
     conditions = [row.condition for row in found.rows]
-    first, second = pair or off_first(conditions)[:2]
+    first, second = pair or off_first(conditions)[:2][::-1]
     for name in (first, second):
         if name not in conditions:
             known = ", ".join(dict.fromkeys(conditions))
@@ -228,7 +229,7 @@ def model_ratings(
         raise UserError(f"--contrast {first} {second}: name two different conditions")
     try:
         return fit_ratings(
-            table.source, found.rows, chosen, (first, second), found.notices, found.left_out
+            table.source, found.rows, chosen, (second, first), found.notices, found.left_out
         )
     except (ValueError, ArithmeticError) as error:
         raise UserError(f"{table.source}: {error}") from None

@@ -15,9 +15,9 @@ from rigidimeter.analysis.statistics import (
 from rigidimeter.analysis.study.compared import Comparison, comparison_rows
 from rigidimeter.analysis.study.measures import Measure
 from rigidimeter.analysis.study.ratings_found import RatingsFound
-from rigidimeter.core.records import Analysis, Epoch, Fit, Notice, Score
+from rigidimeter.core.records import Analysis, Epoch, FindingGroup, Fit, Notice, Score
 from rigidimeter.core.settings import Settings
-from rigidimeter.core.words import html_table, interval_text, one_cell, one_line, with_error
+from rigidimeter.core.words import html_table, one_line, with_error
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,9 +27,8 @@ if TYPE_CHECKING:
     from rigidimeter.core.drawing import Axes
 
 _READ = (
-    *("measure", "unit", "reference", "other", "n_reference", "n_other"),
-    *("median_reference", "median_other", "shift", "shift_low", "shift_high"),
-    *("p_holm", "days_p_holm"),
+    *("measure", "unit", "reference", "other", "value_reference", "value_other"),
+    *("difference", "difference_low", "difference_high", "p_holm", "verdict", "reason"),
 )
 """The columns of a table that is read by people."""
 
@@ -250,20 +249,30 @@ class StudyResult:
 
         return statements(self)
 
+    @property
+    def findings(self) -> tuple[FindingGroup, ...]:
+        """What the checks found in the epochs, and the reasons of the verdicts, by measures."""
+        from rigidimeter.analysis.study.conclusions import reasons
+
+        return (*self.analysis.findings, *reasons(self))
+
     def table(self, *, full: bool = False) -> pd.DataFrame:
         """Return the comparisons as a pandas table, a row for each measure.
 
         Parameters
         ----------
         full : bool
-            All columns of ``rigidimeter compare --csv``. Otherwise measure, unit and conditions,
-            the number of values and their median in each, the shift (reference − other) with its
-            95 % interval, p of the rank-sum test after Holm and, of a study, p by days after Holm.
+            All columns of ``rigidimeter compare --csv``, and a single condition. Otherwise the two
+            values of each measure, their difference (other − reference) with the 95 % interval of
+            its test, p after Holm, and what is concluded.
         """
         import pandas as pd
 
-        found = pd.DataFrame(comparison_rows((*self.comparisons, *self.further)))
-        return found if full else found[[name for name in _READ if name in found.columns]]
+        from rigidimeter.analysis.study.conclusions import conclusion_rows
+
+        if full or not self.other:
+            return pd.DataFrame(comparison_rows((*self.comparisons, *self.further)))
+        return pd.DataFrame(conclusion_rows(self), columns=list(_READ))
 
     def plot(
         self, measures: Sequence[str] | None = None, *, axes: Sequence[Axes] | None = None
@@ -333,19 +342,9 @@ class StudyResult:
         return one_line(self.title, pair, medians)
 
     def _repr_html_(self) -> str:
-        """Return the medians, their shift with its 95 % interval, and p after Holm."""
-        every = (*self.comparisons, *self.further)
-        p = ["p_holm", "days_p_holm"] if any(c.days is not None for c in every) else ["p_holm"]
-        rows = []
-        for c, row in zip(every, comparison_rows(every), strict=True):
-            known = {name: math.nan if value is None else value for name, value in row.items()}
-            medians = [known[f"median_{side}"] for side in ("reference", "other")]
-            rows.append(
-                [c.measure.label, c.reference, c.other]
-                + [with_error(number, math.nan) for number in (*medians, known["shift"])]
-                + [one_cell(interval_text(known["shift_low"], known["shift_high"]))]
-                + [f"{known.get(name, math.nan):.3g}".replace("nan", "–") for name in p]
-            )
-        heading = ["measure", "reference", "other", "median of reference", "median of other"]
-        heading += ["shift, reference − other", "95\xa0% interval", "p", "p by days"]
-        return f"<p>{escape(self.title)}</p>\n{html_table(heading[: 7 + len(p)], rows)}"
+        """Return what the terminal shows of each measure, by pairs of conditions."""
+        from rigidimeter.analysis.study.difference_rows import difference_cells
+
+        tables = [difference_cells(pair) for pair in (self, *self.further_pairs) if pair.other]
+        shown = [html_table(headings, cells) for headings, cells in tables]
+        return "\n".join([f"<p>{escape(self.title)}</p>", *(shown or [escape(repr(self))])])

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from typing import Any, Literal
 
 from rigidimeter.analysis.estimation import METHODS
-from rigidimeter.analysis.study.compared import Comparison
 from rigidimeter.analysis.study.comparison import FEWEST_FOR_TEST, day_test, observed, rank_test
 from rigidimeter.analysis.study.measures import MEASURES, Measure
 from rigidimeter.analysis.study.results import SensitivityRow, SessionEntry
@@ -15,6 +14,7 @@ from rigidimeter.analysis.study.tested import LEVEL
 from rigidimeter.core.records import Analysis, Fit, Notice
 
 _INERTIA, _DAMPING, _STIFFNESS = MEASURES[:3]
+_TEST = ("shift", "shift_low", "shift_high", "p", "r")
 _STAGES: Mapping[Measure, tuple[Literal["fixed", "free"], ...]] = {
     _INERTIA: ("free",),
     _DAMPING: ("free", "fixed"),
@@ -61,10 +61,21 @@ def sensitivity_rows(
         for method, analysis in usable.items():
             for inertia in stages:
                 fits = analysis.fixed_inertia if inertia == "fixed" else analysis.fits
-                used = method == chosen and inertia == "free"
                 found = rank_test(observed(measure, fits, pair, sessions))
-                p_day = day_test(found).p
-                rows.append(_row(found, method, inertia, p_day, used))
+                test: dict[str, Any] = {name: getattr(found.test, name, math.nan) for name in _TEST}
+                n_reference, n_other = (found.summaries[name].n for name in pair)
+                rows.append(
+                    SensitivityRow(
+                        measure=measure,
+                        method=method,
+                        inertia=inertia,
+                        n_reference=n_reference,
+                        n_other=n_other,
+                        **test,
+                        p_day=day_test(found).p,
+                        chosen=method == chosen and inertia == "free",
+                    )
+                )
     return rows, notices
 
 
@@ -80,26 +91,6 @@ def _lacking(fits: Sequence[Fit], pair: tuple[str, str]) -> str:
     )
     failed = next((fit.outcome.reason for fit in fits if fit.outcome.kind == "failed"), "")
     return f"it leaves {told}" + (f" ({failed})" if failed else "")
-
-
-def _row(
-    found: Comparison,
-    method: str,
-    inertia: Literal["fixed", "free"],
-    p_day: float,
-    chosen: bool,
-) -> SensitivityRow:
-    numbers = ("shift", "shift_low", "shift_high", "p", "r")
-    return SensitivityRow(
-        measure=found.measure,
-        method=method,
-        inertia=inertia,
-        n_reference=found.summaries[found.reference].n,
-        n_other=found.summaries[found.other].n,
-        **{name: getattr(found.test, name, math.nan) for name in numbers},
-        p_day=p_day,
-        chosen=chosen,
-    )
 
 
 def method_caveats(rows: Sequence[SensitivityRow]) -> dict[str, str]:

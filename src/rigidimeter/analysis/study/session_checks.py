@@ -44,8 +44,8 @@ def twice(sessions: Sequence[Session]) -> list[tuple[TableRow, str]]:
                     (
                         row,
                         f"subject {entry.subject}, day {entry.day}, {entry.condition}, {task}"
-                        f"{part} is in the table already ({line_of(seen[key])}); if both are parts "
-                        "of one day, give each a name in the column part",
+                        f"{part} is in the table already (line {seen[key].line}); if both are "
+                        "parts of one day, give each a name in the column part",
                     )
                 )
                 break
@@ -116,8 +116,3 @@ def other_settings(sessions: Sequence[Session]) -> list[Notice]:
             )
             said.append(Notice("warning", text))
     return said
-
-
-def line_of(row: TableRow) -> str:
-    """Return where in the table a row is."""
-    return f"line {row.line}"

@@ -22,7 +22,6 @@ from rigidimeter.analysis.study.results import LeftOut, SessionEntry
 from rigidimeter.analysis.study.session_checks import (
     Session,
     commanded_otherwise,
-    line_of,
     other_settings,
     twice,
 )
@@ -193,7 +192,7 @@ def _read(
     first = samples.get(digest, row) if digest else row
     if first not in before:
         raise _Refused(
-            f"{path} holds the same samples as {first['path']} ({line_of(first)}); "
+            f"{path} holds the same samples as {first['path']} (line {first.line}); "
             "take the copy out"
         )
     samples.setdefault(digest, row)
@@ -267,7 +266,7 @@ def _joined(
 def _differs(path: Path, row: TableRow, before: Sequence[TableRow], names: Naming) -> None:
     """Refuse a row of a recording that has one already, but for another of its conditions."""
     for other in before:
-        there = f"{path} is in the table already ({line_of(other)})"
+        there = f"{path} is in the table already (line {other.line})"
         if names.named(other["condition"]) == names.named(row["condition"]):
             raise _Refused(there)
         if any(other[key] != row[key] for key in ("subject", "day")):

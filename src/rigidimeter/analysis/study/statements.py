@@ -10,8 +10,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 
-from rigidimeter.analysis.study.conclusions import Conclusion, Conclusions, conclude
-from rigidimeter.analysis.study.days_to_decide import WANTED
+from rigidimeter.analysis.study.conclusions import WANTED, Conclusion, Conclusions, conclude
 from rigidimeter.analysis.study.differences import Three
 from rigidimeter.analysis.study.reached_precision import precisions
 from rigidimeter.analysis.study.results import StudyResult
@@ -21,7 +20,7 @@ from rigidimeter.core.words import (
     decimals,
     fixed,
     number,
-    p_value,
+    p_text,
     plural,
     series,
     within,
@@ -58,7 +57,9 @@ def lead(result: StudyResult) -> str:
     if concluded is None:
         return prefix + _only_condition(result)
     shown = concluded.of("lower", "higher")
-    said = _quoted(shown) if shown else f"{_measured(concluded)} {_concluded(concluded)[0]}"
+    said = f"{_measured(concluded)} {_concluded(concluded)[0]}"
+    if shown:
+        said = f"{_quoted(shown)}{_adjusted(concluded)}."
     paths = {out.path for out in result.left_out}
     if paths:
         total = len(paths | {session.source for session in result.sessions})
@@ -78,9 +79,9 @@ def _quoted(shown: Sequence[Conclusion]) -> str:
         inside += [one.test] if one.test and one.test != (shown[0].test if parts else "") else []
         title = within(c.measure.title) if parts else c.measure.title
         was = " was" if not parts else ""
-        inside.append(_p_text(one.p))
+        inside.append(p_text(one.p, LEAST_P))
         parts.append(f"{title}{was} {size.value} {one.verdict}{against} ({', '.join(inside)})")
-    return f"{series(parts)}."
+    return series(parts)
 
 
 class _Size(NamedTuple):
@@ -133,11 +134,14 @@ def _tested(concluded: Conclusions) -> str:
         return "Nothing could be tested."
     of = len(tests) > 1
     text = "; ".join(f"{test} ({', '.join(own)})" if of else test for test, own in tests.items())
+    return f"{text[:1].upper()}{text[1:]}{_adjusted(concluded)}."
+
+
+def _adjusted(concluded: Conclusions) -> str:
+    """Return for how many tests p is adjusted, as the end of a sentence that gives p."""
     count = concluded.adjusted_for
     what = "measures" if count == concluded.tested else "tests"
-    holm = f"; p adjusted by Holm’s method for {count} {what}, intervals not"
-    adjusted = holm if count > 1 else ""
-    return f"{text[:1].upper()}{text[1:]}{adjusted}."
+    return f"; p adjusted by Holm’s method for {count} {what}, intervals not" if count > 1 else ""
 
 
 def _concluded(concluded: Conclusions) -> list[str]:
@@ -198,9 +202,3 @@ def _only_condition(result: StudyResult) -> str:
     name = f"{condition_name(result.reference)}: " if result.reference else ""
     text = f"{name}{', '.join(parts)} (95 % intervals)."
     return text[:1].upper() + text[1:]
-
-
-def _p_text(p: float) -> str:
-    """Return a p-value as a sentence quotes it."""
-    text = p_value(p, 2) if p >= LEAST_P else f"< {LEAST_P:.4f}"
-    return f"p {text if text.startswith('<') else f'= {text}'}"

@@ -35,7 +35,6 @@ from rigidimeter.analysis.study.ratings_model import rated, ratings_comparison, 
 from rigidimeter.analysis.study.results import SensitivityRow, SessionEntry, StudyResult
 from rigidimeter.analysis.study.sensitivity import sensitivity_methods, sensitivity_rows
 from rigidimeter.analysis.study.sessions import Gathered, gather
-from rigidimeter.analysis.study.warnings import analysis_warnings, lacking
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import Analysis, Epoch, Notice
 from rigidimeter.core.settings import Settings
@@ -177,7 +176,7 @@ def analyse_study(
         progress=lambda share: done(share * statistics),
     )
     comparisons, further = with_further(comparisons, _further(read, comparisons))
-    notices += [*lacking([c for c in comparisons if c.measure is not RATING], pair), *said]
+    notices += [*_lacking([c for c in comparisons if c.measure is not RATING], pair), *said]
     ready = {} if ratings is None else {RATING.name: ratings_days(ratings)}
     every = day_tests((*comparisons, *further), ready)
     comparisons, further = every[: len(comparisons)], every[len(comparisons) :]
@@ -218,6 +217,24 @@ def analyse_study(
         own_rig=read.gathered.settings is not None,
         further=further,
     )
+
+
+def _lacking(comparisons: Sequence[Comparison], pair: tuple[str, str]) -> list[Notice]:
+    """Say what keeps all measures of recordings from being compared."""
+    if not comparisons:
+        return [Notice("error", "no epoch could be fitted or scored, so nothing is compared")]
+    recorded = {
+        name: sum(c.summaries[name].n + c.excluded[name] for c in comparisons if name in c.pair)
+        for name in pair
+    }
+    absent = [name or "a second condition" for name, count in recorded.items() if not count]
+    if not absent:
+        return []
+    present = next((name for name, count in recorded.items() if count), "other conditions")
+    text = (
+        f"there is no session in {' or '.join(absent)}, only in {present}, so nothing is compared"
+    )
+    return [Notice("error", text)]
 
 
 def _further(read: StudyRead, comparisons: Sequence[Comparison]) -> list[Comparison]:
@@ -270,7 +287,7 @@ def _analysed(
     if len(subjects) < 2:
         (preparation,) = subjects.values()
         found = analyse_prepared(preparation, method, fits_alone=fits_alone, progress=progress)
-        return found, list(analysis_warnings(found))
+        return found, []
     reason = ""
     if method == "auto":
         everything = [p for own in subjects.values() for p in own.perturbed(as_recorded=True)]
@@ -279,10 +296,14 @@ def _analysed(
         subject: analyse_prepared(own, method, fits_alone=fits_alone, progress=progress)
         for subject, own in subjects.items()
     }
-    notices = [
-        Notice(notice.level, f"subject {subject}: {notice.text}")
+    across = [
+        replace(finding, condition=where, facts={**finding.facts, "subject": subject})
         for subject, part in parts.items()
-        for notice in analysis_warnings(part)
+        for where, finding in (
+            *((fit.condition, one) for fit in part.pooled for one in fit.findings),
+            *((one.condition, one) for one in part.across),
+        )
+        if finding.level != "note"
     ]
     reasons = dict.fromkeys([reason, *(part.method_reason for part in parts.values())])
     fits = [fit for part in parts.values() for fit in part.fits]
@@ -295,7 +316,9 @@ def _analysed(
         scores=tuple(score for part in parts.values() for score in part.scores),
         delays=tuple(delay for part in parts.values() for delay in part.delays),
         method_reason=". ".join(filter(None, reasons)),
+        across=tuple(across),
     )
+    notices = []
     if included:
         held = ", ".join(f"{subject} {part.inertia_kg_m2:.4g}" for subject, part in parts.items())
         text = f"J is held at the median of each subject, in kg·m²: {held}"

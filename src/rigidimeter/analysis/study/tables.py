@@ -12,7 +12,7 @@ from typing import Any
 
 from rigidimeter.analysis.reading import estimates_document
 from rigidimeter.analysis.study.compared import comparison_rows, comparison_values, measure_names
-from rigidimeter.analysis.study.conclusions import conclusion_rows
+from rigidimeter.analysis.study.conclusions import conclusion_rows, reasons
 from rigidimeter.analysis.study.rating_relation import relations
 from rigidimeter.analysis.study.ratings_found import (
     RatingsFound,
@@ -58,6 +58,9 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
             if (said := statements(pair)) is not None
         ],
         "conclusion": result_table(result, "conclusion"),
+        "reasons": [
+            reason.row() | {"measures": measures} for reason, _, measures in reasons(result)
+        ],
         "quality": None if light is None else light.row(),
         "comparisons": [
             comparison_values(comparison) for comparison in (*result.comparisons, *result.further)
@@ -188,7 +191,9 @@ def _estimates(result: StudyResult) -> Iterator[dict[str, Any]]:
         findings = one.pop("findings")
         found = [finding["name"] for finding in findings]
         cautions = dict.fromkeys(f["name"] for f in findings if f["level"] != "note")
-        beside = {name: two[name] for name in ("outcome", "reason", *_numbers(two))}
+        # A number that does not exist is null.
+        numbers = [name for name in two if isinstance(two[name], float | None)]
+        beside = {name: two[name] for name in ("outcome", "reason", *numbers) if name != "band_hz"}
         yield (
             whose.get(one["source"], {})
             | one
@@ -199,24 +204,15 @@ def _estimates(result: StudyResult) -> Iterator[dict[str, Any]]:
         )
 
 
-def _numbers(row: Mapping[str, Any]) -> list[str]:
-    """Return the names of the numbers of an estimate; one that does not exist is null."""
-    return [name for name in row if name != "band_hz" and isinstance(row[name], float | None)]
-
-
 def _scores(result: StudyResult) -> Iterator[dict[str, Any]]:
     whose = _whose(result)
     for row in estimates_document(result.analysis)["scores"]:
-        yield whose.get(row["source"], {}) | _flat(row)
+        cells = {name: one for name, one in row.items() if not isinstance(one, (list, dict))}
+        yield whose.get(row["source"], {}) | cells
 
 
 def _whose(result: StudyResult) -> dict[str, dict[str, str]]:
     return {s.source: {"subject": s.subject, "day": s.day} for s in result.sessions}
-
-
-def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the cells that fit into a table."""
-    return {name: value for name, value in row.items() if not isinstance(value, (list, dict))}
 
 
 TABLES: Mapping[str, Callable[[StudyResult], Rows]] = {

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from rigidimeter.analysis.statistics import DayDifference, ranksum, summarise
+from rigidimeter.analysis.statistics import DayDifference, summarise
 from rigidimeter.analysis.study.compared import Comparison
 from rigidimeter.analysis.study.comparison import day_test, rank_test
 from rigidimeter.analysis.study.differences import Difference, by_units, by_values
@@ -106,15 +106,3 @@ def tested_again(c: Comparison, observations: Sequence[Observation], basis: Basi
     if basis == "days":
         again = replace(again, days=day_test(rank_test(again)))
     return tested(rank_test(again), basis)
-
-
-def too_few(test: Test, basis: Basis, tests: int) -> str:
-    """Return that no values could be far enough apart for this test; else nothing."""
-    if basis != "values":
-        return ""
-    n_x, n_y = (len(test.comparison.values[name]) for name in test.comparison.pair)
-    least = ranksum(range(n_x), range(n_x, n_x + n_y)).p * tests
-    if least < LEVEL:
-        return ""
-    of = f" for {tests} measures" if tests > 1 else ""
-    return f"{n_x} values against {n_y} cannot reach p < {LEVEL:g}{of}, whatever they are"

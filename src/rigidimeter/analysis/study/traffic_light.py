@@ -1,7 +1,7 @@
 """How far the data can be trusted: a traffic light, the epochs that are sound, the main finding.
 
-An epoch is sound if it counts and no check casts doubt on it. What doubts all epochs together
-counts too, but for checks that make no difference between conditions where two are compared.
+An epoch is sound if it counts without a caution. What concerns all epochs together counts too, but
+for checks that make no difference between conditions where two are compared.
 """
 
 from __future__ import annotations
@@ -10,9 +10,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from rigidimeter.analysis.study.conclusions import conclude
-from rigidimeter.analysis.study.doubted_epochs import ALIKE_IN_BOTH, Doubt, doubts
+from rigidimeter.analysis.study.objections import ALIKE_IN_BOTH
 from rigidimeter.analysis.study.results import StudyResult
-from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Fit, Score
 
 Level = Literal["good", "caution", "poor"]
@@ -30,10 +29,10 @@ class TrafficLight:
     level : {"good", "caution", "poor"}
     epochs, sound, excluded, doubted : int
         Epochs recorded; of them those that are sound, that do not count, and that count in spite
-        of a doubt.
+        of a caution.
     doubt, doubt_epochs : str, int
-        The check that flags most epochs, and how many it flags: 0 if only all of
-        them together. Empty without a doubt, or where a reason in `text` is no check.
+        The finding of most epochs, and of how many: 0 if only of all of them together. Empty
+        without a caution, or where a reason in `text` is no finding of epochs.
     text, remedy : str
         What was found, and what to do about it.
     """
@@ -62,46 +61,45 @@ def traffic_light(result: StudyResult) -> TrafficLight | None:
     if not recorded:
         return None
     counting = {(one.source, one.epoch) for one in estimates if one.outcome.included}
-    doubted = {
-        (fit.source, fit.epoch) for fit in analysis.fits if fit.outcome.included and fit.cautions
-    }
-    found = [one for one in doubts(analysis) if not _harmless(one, result)]
-    most_serious = found[0] if found else None
-    finding = None if most_serious is None else _first(most_serious.check, result)
+    included = [fit for fit in analysis.fits if fit.outcome.included]
+    flagged = {(fit.source, fit.epoch) for fit in included if fit.cautions}
+    carried = [
+        (len({(fit.source, fit.epoch) for fit in group.fits} & counting), group)
+        for group in analysis.findings
+        if group.finding.level != "note"
+    ]
+    carried = [
+        (epochs, group)
+        for epochs, group in carried
+        if epochs or not (result.other and group.finding.name in ALIKE_IN_BOTH)
+    ]
+    doubt, doubt_epochs, found = "", 0, None
+    if carried:
+        doubt_epochs, group = max(carried, key=lambda one: one[0])
+        doubt, found = group.finding.name, group.finding
     concluded = conclude(result)
     unsupported = () if concluded is None else concluded.of("not supported")
-    text = finding.headline if finding else unsupported[0].reason if unsupported else ""
+    text = found.headline if found else unsupported[0].reason if unsupported else ""
     if result.left_out and not text:
         n_out = len({out.path for out in result.left_out})
         text = f"{n_out} of the study's recordings could not be used"
-    impossible = any(fit.inertia_kg_m2 <= 0 for fit in analysis.fits if fit.outcome.included)
+    impossible = any(fit.inertia_kg_m2 <= 0 for fit in included)
     if impossible:
-        text = "J is not greater than zero in some epochs, which is impossible"
-    share = len(counting - doubted) / len(recorded)
-    together = most_serious is not None and not most_serious.epochs
+        text, doubt = "J is not greater than zero in some epochs, which is impossible", ""
+    share = len(counting - flagged) / len(recorded)
     level: Level = "good"
     if share < POOR_SHARE or impossible:
         level = "poor"
-    elif share < GOOD_SHARE or together or unsupported or result.left_out:
+    elif share < GOOD_SHARE or (found and not doubt_epochs) or unsupported or result.left_out:
         level = "caution"
     return TrafficLight(
         level,
         len(recorded),
-        len(counting - doubted),
+        len(counting - flagged),
         len(recorded - counting),
-        len(doubted),
-        "" if most_serious is None or impossible else most_serious.check,
-        0 if most_serious is None else most_serious.epochs,
+        len(flagged),
+        doubt,
+        doubt_epochs,
         text,
-        finding.remedy if finding else "",
+        found.remedy if found else "",
     )
-
-
-def _harmless(doubt: Doubt, result: StudyResult) -> bool:
-    return bool(result.other) and not doubt.epochs and doubt.check in ALIKE_IN_BOTH
-
-
-def _first(check: str, result: StudyResult) -> Finding | None:
-    fits = (*result.analysis.fits, *result.analysis.pooled)
-    found = (finding for fit in fits if fit.outcome.included for finding in fit.findings)
-    return next((one for one in found if one.name == check and one.level != "note"), None)

@@ -12,8 +12,9 @@ from rigidimeter.core.findings.finding import (
     Finding,
     Three,
     finding_from,
+    found_between,
 )
 from rigidimeter.core.findings.kind import Kind, Level
 from rigidimeter.core.findings.kinds import KINDS, default_level
-from rigidimeter.core.findings.sentence_parts import epochs_text, in_full, p_text
+from rigidimeter.core.findings.kinds_of_study import STUDY_KINDS
 from rigidimeter.core.findings.words import Words, explained, words_of

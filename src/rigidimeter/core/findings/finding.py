@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from rigidimeter.core.findings.kind import Level
+from rigidimeter.core.findings.kinds import KINDS
 from rigidimeter.core.findings.words import Words, words_of
 
 SERIOUS_FIRST: tuple[Level, ...] = ("exclude", "caution", "note")
@@ -155,6 +156,21 @@ class Finding:
             "facts": dict(self.facts),
             **self.words._asdict(),
         }
+
+
+def found_between(
+    name: str, facts: Mapping[str, Fact], value: float = math.nan, limit: float = math.nan
+) -> Finding:
+    """Return a finding of recordings beside each other (`STUDY_KINDS`), with the level of its kind.
+
+    Parameters
+    ----------
+    name : str
+    facts : mapping
+        What its templates show; `variant` names the wording.
+    value, limit : float
+    """
+    return Finding(name, KINDS[name].level, value, limit, KINDS[name].unit, facts=facts)
 
 
 def finding_from(row: Mapping[str, Any]) -> Finding:

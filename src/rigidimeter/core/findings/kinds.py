@@ -7,9 +7,11 @@ from rigidimeter.core.findings.kinds_of_fit import FIT_KINDS
 from rigidimeter.core.findings.kinds_of_joint import JOINT_KINDS
 from rigidimeter.core.findings.kinds_of_model import MODEL_KINDS
 from rigidimeter.core.findings.kinds_of_sensors import SENSOR_KINDS
+from rigidimeter.core.findings.kinds_of_study import STUDY_KINDS
 
 KINDS: dict[str, Kind] = {
-    kind.name: kind for kind in (*SENSOR_KINDS, *FIT_KINDS, *MODEL_KINDS, *JOINT_KINDS)
+    kind.name: kind
+    for kind in (*SENSOR_KINDS, *FIT_KINDS, *MODEL_KINDS, *JOINT_KINDS, *STUDY_KINDS)
 }
 
 

@@ -17,13 +17,9 @@ OF_SUBJECT = {
 }
 """Why torque that something but the robot adds does not matter to an estimate."""
 
-OF_SUBJECT_EXAMPLE = {"method": "iv", "share": 12.0, "percent_of": (-0.4, 0.31, 0.0)}
-
 FIT_KINDS = (
     Kind(
         "conditioning",
-        "1",
-        "caution",
         "condition number of acceleration, velocity and angle, each scaled to unit length; which "
         "two are indistinguishable, and the band of the motion's power",
         headline="The motion cannot tell {first} from {second}",
@@ -31,6 +27,7 @@ FIT_KINDS = (
         "the velocity's power lies between {low_hz:.2g} and {high_hz:.2g} Hz.",
         meaning="{first} and {second} trade against each other, so neither is known.",
         remedy="Use a perturbation with more frequencies, or hold J at the median of other epochs.",
+        unit="1",
         setting="max_condition_number",
         variants={
             "at_rest": {
@@ -39,19 +36,10 @@ FIT_KINDS = (
                 "meaning": "The joint did not move, so J, B and K are not in the torque.",
             }
         },
-        example={
-            "value": 34.0,
-            "limit": 10.0,
-            "first": "J",
-            "second": "K",
-            "low_hz": 1.8,
-            "high_hz": 2.3,
-        },
+        example={"value": 34.0, "limit": 10.0, "low_hz": 1.8, "high_hz": 2.3},
     ),
     Kind(
         "imposed_sinusoid",
-        "%",
-        "exclude",
         "share of the angle's variance in its strongest line, where that line also holds half of "
         "the velocity's: steps to and fro are no sinusoid",
         headline="The motion is a sinusoid: one frequency holds {value:.0f} % of it",
@@ -59,13 +47,12 @@ FIT_KINDS = (
         "{limit:g} %) and {velocity:.0f} % of the velocity's.",
         meaning="At a single frequency J and K are one number, K − J ω², so neither is known.",
         remedy="Score it as an imposed sinusoid (--task sinusoid), or use a PRBS.",
+        level="exclude",
         setting="max_single_frequency_percent",
-        example={"value": 97.0, "limit": 85.0, "velocity": 94.0},
+        example={"value": 97.0, "limit": 85.0},
     ),
     Kind(
         "static_torque",
-        "%",
-        "exclude",
         "share of the torque's variance that is not a function of the angle: squared differences "
         "of the torque between samples sorted by angle",
         headline="The torque is a function of the angle alone",
@@ -74,13 +61,12 @@ FIT_KINDS = (
         meaning="The torque was computed from the angle, or the joint moved too slowly for inertia "
         "and damping: J and B are not in it.",
         remedy="Record what the torque sensor measured, or use a faster perturbation.",
+        level="exclude",
         setting="min_static_torque_percent",
         example={"value": 0.02, "limit": 0.5},
     ),
     Kind(
         "band_share",
-        "%",
-        "caution",
         "share of the power of torque and velocity about their means, as recorded, that lies in "
         "the band of the fit or less than 0.75 spectral lines from it; the smaller. Epochs below "
         "14 s cannot tell drift from the slowest part of a band that begins at 0.15 Hz",
@@ -92,12 +78,10 @@ FIT_KINDS = (
         remedy="Look for drift and slow pushes, check rate and unit of the time, and set the band "
         "to what was perturbed (--band-hz).",
         setting="min_band_share_percent",
-        example={"value": 21.0, "limit": 50.0, "signal": "torque", "low_hz": 0.15, "high_hz": 10.0},
+        example={"value": 21.0, "limit": 50.0},
     ),
     Kind(
         "coherence",
-        "1",
-        "caution",
         "median coherence of the perturbation with torque and velocity in the band; the smaller. "
         "Unrelated signals show about 0.2",
         headline="Only {percent:.0f} % of the {signal}'s power follows the perturbation",
@@ -107,34 +91,27 @@ FIT_KINDS = (
         meaning="That may bias J, B and K.",
         remedy="Perturb more strongly, pool epochs, or repeat while the robot alone moves the "
         "joint.",
+        unit="1",
         setting="min_coherence",
         variants=OF_SUBJECT,
-        example={
-            "value": 0.31,
-            "limit": 0.5,
-            "percent": 31.0,
-            "signal": "torque",
-            **OF_SUBJECT_EXAMPLE,
-        },
+        example={"value": 0.31, "limit": 0.5},
     ),
     Kind(
         "residual_whiteness",
-        "1",
-        "note",
         "spectral flatness of the residual in the band, 1 for white",
         headline="What J, B and K leave is not white: flatness {value:.2f}",
         measured="The residual's spectral flatness in the band is {value:.2f} (at least {limit:g}; "
         "1 is white): something but the robot adds torque, or the model lacks something.",
         meaning="Standard errors for white noise would be too small.",
         remedy="Use the intervals, which allow for a residual of any colour.",
+        level="note",
+        unit="1",
         setting="min_residual_flatness",
         variants=OF_SUBJECT,
-        example={"value": 0.42, "limit": 0.7, **OF_SUBJECT_EXAMPLE},
+        example={"value": 0.42, "limit": 0.7},
     ),
     Kind(
         "residual_perturbation",
-        "%",
-        "caution",
         "largest correlation of residual and perturbation up to 1 s either way, times the "
         "residual's SD, in % of the torque's SD",
         headline="{value:.2g} % of the torque follows the perturbation and is not explained",
@@ -152,12 +129,10 @@ FIT_KINDS = (
                 "shows as much by chance; lack_of_fit tests all epochs together."
             }
         },
-        example={"value": 14.0, "limit": 10.0, "correlation": 0.21, "lag_s": 0.06, "chance": 0.14},
+        example={"value": 14.0, "limit": 10.0},
     ),
     Kind(
         "held_out_vaf",
-        "%",
-        "exclude",
         "variance of the second half's torque explained by J, B and K of the first half",
         headline="The first half's J, B, K explain {value:.1f} % of the second",
         measured="J, B and K of the epoch's first half explain {value:.1f} % of the second half's "
@@ -165,14 +140,13 @@ FIT_KINDS = (
         meaning="The fit does not predict torque that it has not seen, so its "
         "numbers mean nothing.",
         remedy="Look for torque from elsewhere than the robot, and for a change during the epoch.",
+        level="exclude",
         setting="min_held_out_vaf_percent",
         variants=OF_SUBJECT,
-        example={"value": -40.2, "limit": 0.0, **OF_SUBJECT_EXAMPLE},
+        example={"value": -40.2, "limit": 0.0},
     ),
     Kind(
         "r_squared",
-        "1",
-        "caution",
         "R² of the fit",
         headline="J, B and K explain little of the torque: R² {value:.2g}",
         measured="R² is {value:.2g} (at least {limit:g}).",
@@ -180,14 +154,13 @@ FIT_KINDS = (
         "them.",
         remedy="Look for torque from elsewhere than the robot, or record the perturbation and use "
         "iv.",
+        unit="1",
         setting="min_r_squared",
         variants={"instrument": OF_SUBJECT["instrument"]},
-        example={"value": 0.21, "limit": 0.3, **OF_SUBJECT_EXAMPLE},
+        example={"value": 0.21, "limit": 0.3},
     ),
     Kind(
         "gravity",
-        "N·m/rad",
-        "note",
         "K without the slope m g l cos θ of the limb's weight, in N·m/rad, beside K itself; m g l "
         "is `gravity_nm`, and θ the angle from hanging straight down, `gravity_angle_deg` where "
         "the recorded angle is 0. Not looked at while `gravity_nm` is 0",
@@ -196,19 +169,20 @@ FIT_KINDS = (
         "cos θ).",
         meaning="Without it K is {value:.4g} N·m/rad.",
         remedy="State which of the two is given.",
+        level="note",
+        unit="N·m/rad",
         setting="gravity_nm",
-        example={"value": 1.404, "stiffness": 1.75, "slope": 0.346},
+        example={"value": 1.404},
     ),
     Kind(
         "negative_parameters",
-        "1",
-        "caution",
         "number of J, B and K that are not positive",
         headline="{names}: not above zero",
         measured="{names}: not above zero.",
         meaning="No joint is like that: something but the robot may have pushed, or the channels "
         "are delayed relative to each other.",
         remedy="Check the time stamps of torque and motion, and see the torque beyond J, B and K.",
+        unit="1",
         variants={
             "noise": {
                 "meaning": "Not all of their intervals lie below zero, so the torque says little "
@@ -221,12 +195,10 @@ FIT_KINDS = (
                 "remedy": "Say --reaction.",
             },
         },
-        example={"value": 1.0, "limit": 0.0, "names": "J and B"},
+        example={"value": 1.0, "limit": 0.0},
     ),
     Kind(
         "implausible_parameters",
-        "1",
-        "caution",
         "largest factor by which J, B or K exceeds `min_inertia_kg_m2`, `max_inertia_kg_m2`, "
         "`max_damping_nm_s_rad` or `max_stiffness_nm_rad`",
         headline="{symbol} = {size:.3g} {size_unit} is too {side} for a joint",
@@ -235,13 +207,7 @@ FIT_KINDS = (
         meaning="No joint of a person or an animal is like that; a machine's axis may be.",
         remedy="Check the units of torque (N·m), angle (rad, not degrees) and time (s); for such "
         "an axis set the ranges in [diagnostics].",
-        example={
-            "value": 57.0,
-            "limit": 1.0,
-            "symbol": "K",
-            "size": 114000.0,
-            "size_unit": "N·m/rad",
-            "side": "large",
-        },
+        unit="1",
+        example={"value": 57.0, "limit": 1.0, "size": 114000.0, "side": "large"},
     ),
 )

@@ -3,20 +3,8 @@
 from __future__ import annotations
 
 from rigidimeter.core.findings.kind import Kind
-from rigidimeter.core.findings.kinds_of_fit import OF_SUBJECT, OF_SUBJECT_EXAMPLE
+from rigidimeter.core.findings.kinds_of_fit import OF_SUBJECT
 
-_VARYING = {
-    "value": 42.0,
-    "limit": 10.0,
-    "p": 4e-5,
-    "symbol": "K",
-    "size_unit": "N·m/rad",
-    "low": 1.34,
-    "low_half": 0.1,
-    "high": 2.05,
-    "high_half": 0.12,
-    "others": "",
-}
 _GOES = (
     "{symbol} goes from {low:.3g} ± {low_half:.2g} {size_unit} at {low_at} to {high:.3g} ± "
     "{high_half:.2g} {size_unit} at {high_at}, {value:.0f} % of its mean (at most {limit:g} %; {p})"
@@ -29,8 +17,6 @@ _ABOUT = "use a smaller perturbation about each angle of interest, and state the
 JOINT_KINDS = (
     Kind(
         "loop_bias",
-        "%",
-        "caution",
         "bias of least squares from torque of the subject that comes back as motion by the loop, "
         "computed from the recording; the largest of J, B and K, in % of half the interval. Above "
         "56 % an interval for 95 % holds the truth in less than 80 %",
@@ -54,8 +40,6 @@ JOINT_KINDS = (
     ),
     Kind(
         "voluntary_torque",
-        "%",
-        "caution",
         "power of M_sub = J θ″ + B θ′ + K θ − M between `voluntary_low_hz` and "
         "`voluntary_high_hz`, in % of the torque's variance",
         headline="Torque beyond J, B, K is {value:.2g} % of the torque's variance",
@@ -66,19 +50,10 @@ JOINT_KINDS = (
         remedy="Record the perturbation, use iv and pool epochs, or leave the epoch out.",
         setting="max_voluntary_share_percent",
         variants=OF_SUBJECT,
-        example={
-            "value": 23.0,
-            "limit": 15.0,
-            "sd_nm": 0.21,
-            "low_hz": 0.3,
-            "high_hz": 4.0,
-            **OF_SUBJECT_EXAMPLE,
-        },
+        example={"value": 23.0, "limit": 15.0, "low_hz": 0.3, "high_hz": 4.0},
     ),
     Kind(
         "active_movement",
-        "%",
-        "caution",
         "share of seconds in which the SD of M_sub passes `active_torque_nm` and "
         "`active_share_percent` of the torque's SD",
         headline="Something but the robot pushed in {value:.0f} % of the seconds",
@@ -88,18 +63,10 @@ JOINT_KINDS = (
         remedy="Repeat while the robot alone moves the joint, or leave these seconds out.",
         setting="max_active_percent",
         variants=OF_SUBJECT,
-        example={
-            "value": 44.0,
-            "limit": 20.0,
-            "above_nm": 0.1,
-            "first_s": 3.0,
-            **OF_SUBJECT_EXAMPLE,
-        },
+        example={"value": 44.0, "limit": 20.0},
     ),
     Kind(
         "emg_activity",
-        "%",
-        "caution",
         "share of the time in which the EMG's mean rectified value over `emg_window_s` passes "
         "`emg_baseline_factor` times its own quietest fifth",
         headline="The muscle was active in {value:.0f} % of the time",
@@ -109,18 +76,10 @@ JOINT_KINDS = (
         remedy="Ask the subject to relax and repeat, or leave the active part out.",
         setting="max_emg_active_percent",
         variants=OF_SUBJECT,
-        example={
-            "value": 38.0,
-            "limit": 20.0,
-            "factor": 3.0,
-            "baseline_uv": 12.0,
-            **OF_SUBJECT_EXAMPLE,
-        },
+        example={"value": 38.0, "limit": 20.0},
     ),
     Kind(
         "tremor",
-        "%",
-        "caution",
         "power of M_sub in the strongest 1 Hz between `tremor_low_hz` and `tremor_high_hz`, in % "
         "of the torque's variance, if it is three times that beside it; frequency and amplitude in "
         "N·m",
@@ -134,19 +93,10 @@ JOINT_KINDS = (
         remedy="Record the perturbation and use iv, or leave the epoch out.",
         setting="max_tremor_share_percent",
         variants=OF_SUBJECT,
-        example={
-            "value": 8.0,
-            "limit": 3.0,
-            "frequency_hz": 4.6,
-            "amplitude_nm": 0.3,
-            "stands_out": 12.0,
-            **OF_SUBJECT_EXAMPLE,
-        },
+        example={"value": 8.0, "limit": 3.0},
     ),
     Kind(
         "varying_with_time",
-        "%",
-        "caution",
         "range over the epoch of J, B or K as a smooth function of time, in % of its mean, for "
         "each that varies by more than chance (`varying_chance`, for all kinds of change together)",
         headline=_HEADLINE + "within the epoch",
@@ -155,12 +105,10 @@ JOINT_KINDS = (
         remedy="Cut the epoch into shorter ones, or fit the part in which the joint did not "
         "change.",
         setting="max_varying_percent",
-        example={**_VARYING, "low_at": "3.1 s", "high_at": "18.0 s"},
+        example={"value": 42.0, "limit": 10.0, "low_at": "3.1 s", "high_at": "18.0 s"},
     ),
     Kind(
         "varying_with_angle",
-        "%",
-        "caution",
         "the same as a function of the angle, where this covers at least 5°; without the "
         "perturbation, of the slow angle (below 0.5 Hz)",
         headline=_HEADLINE + "with the angle",
@@ -177,7 +125,8 @@ JOINT_KINDS = (
             }
         },
         example={
-            **_VARYING,
+            "value": 42.0,
+            "limit": 10.0,
             "low_at": "−6.2° from the mean",
             "high_at": "+5.9° from the mean",
             "terms": "cubic stiffness",
@@ -185,8 +134,6 @@ JOINT_KINDS = (
     ),
     Kind(
         "varying_with_phase",
-        "%",
-        "caution",
         "the same as a function of the phase of an imposed periodic movement, which is found in "
         "the angle",
         headline=_HEADLINE + "with the movement's phase",
@@ -194,12 +141,15 @@ JOINT_KINDS = (
         meaning=_MEAN + "holds for no phase in particular.",
         remedy="Estimate each phase by itself, from many cycles, or hold the joint still.",
         setting="max_varying_percent",
-        example={**_VARYING, "low_at": "90° of the 2 s cycle", "high_at": "270° of the 2 s cycle"},
+        example={
+            "value": 42.0,
+            "limit": 10.0,
+            "low_at": "90° of the 2 s cycle",
+            "high_at": "270° of the 2 s cycle",
+        },
     ),
     Kind(
         "varying_between_epochs",
-        "%",
-        "note",
         "range of J, B or K over the epochs of a condition, each drawn to the mean as far as its "
         "standard error says, in % of the mean, if they scatter by more than their errors "
         "(`varying_chance`); with the fit to all epochs, from three on",
@@ -209,13 +159,8 @@ JOINT_KINDS = (
         "errors{trend}{others}.",
         meaning="The estimate from all epochs is a mean over a joint that was not the same in all.",
         remedy="Compare the epochs in order, and state the scatter between them beside the mean.",
+        level="note",
         setting="max_varying_percent",
-        example={
-            **_VARYING,
-            "low_at": "epoch 2",
-            "high_at": "epoch 5",
-            "sd": 0.21,
-            "trend": ", rising by 40 % over the epochs",
-        },
+        example={"value": 42.0, "limit": 10.0},
     ),
 )

@@ -13,8 +13,6 @@ _INCLUDE = "Include it: rigidimeter model --terms {asked}."
 MODEL_KINDS = (
     Kind(
         "lack_of_fit",
-        "%",
-        "caution",
         "part of the torque's response to the perturbation not explained by J, B and K, in %, in "
         "one of three parts of the band, if significant with p < 1e-4 over all tests of a "
         "condition; see below",
@@ -26,21 +24,10 @@ MODEL_KINDS = (
         remedy="Lower the upper edge of the band (--band-hz) and see whether J and B change; "
         "`rigidimeter model --compare` tries terms.",
         setting="max_lack_of_fit_percent",
-        example={
-            "value": 6.4,
-            "limit": 2.0,
-            "p": 3e-9,
-            "low_hz": 10.0,
-            "high_hz": 30.0,
-            "half_J": 4.1,
-            "half_B": -2.0,
-            "half_K": 0.3,
-        },
+        example={"value": 6.4, "limit": 2.0, "p": 3e-9, "low_hz": 10.0, "high_hz": 30.0},
     ),
     Kind(
         "band_sensitivity",
-        "%",
-        "caution",
         "change of J, B or K of all epochs of a condition together in a neighbouring band, in % of "
         "it, if its probability by chance is below 0.01 over all bands and it is more than half of "
         "half the estimate's interval; see below",
@@ -52,24 +39,10 @@ MODEL_KINDS = (
         remedy="State the band, compare J, B and K in other bands, and try terms with `rigidimeter "
         "model --compare`.",
         setting="max_band_sensitivity_percent",
-        example={
-            "value": 6.0,
-            "limit": 3.0,
-            "p": 1e-5,
-            "symbol": "K",
-            "way": "less",
-            "low_hz": 0.1,
-            "high_hz": 21.0,
-            "error": 0.8,
-            "own_low_hz": 0.1,
-            "own_high_hz": 30.0,
-            "of_half": 1.2,
-        },
+        example={"value": 6.0, "limit": 3.0, "p": 1e-5, "low_hz": 0.1, "high_hz": 21.0},
     ),
     Kind(
         "between_samples",
-        "%",
-        "caution",
         "largest change of J, B or K, in %, with another drive that explains the velocity by the "
         "command as well ([why](../explanation/between-samples.md)); also found where the command "
         "was recorded but no drive explains the velocity, or where it was not and the drive of the "
@@ -114,19 +87,10 @@ MODEL_KINDS = (
                 "sample faster.",
             },
         },
-        example={
-            "value": 4.0,
-            "limit": 1.0,
-            "symbol": "J",
-            "little": 2.0,
-            "seen": 96.0,
-            "side": "small",
-        },
+        example={"value": 4.0, "limit": 1.0, "symbol": "J"},
     ),
     Kind(
         "missing_term",
-        "%",
-        "caution",
         "coupling compliance, friction, reflex, damping that differs between directions, cubic and "
         "quadratic stiffness: tested on the part of the torque that no linear filter of the motion "
         "explains ([why](../how-to/choose-model-terms.md#why-terms-are-compared-without-their-"
@@ -163,19 +127,12 @@ MODEL_KINDS = (
             "value": 340.0,
             "limit": 100.0,
             "p": 2e-8,
-            "terms": "friction",
-            "sizes": "friction of 0.1 ± 0.004 N·m",
-            "asked": "inertia,damping,stiffness,coulomb",
             "percent_of": (5.2, -3.1, 7.0),
-            "size": 60.0,
-            "late_ms": 48.0,
             "share": 96.0,
         },
     ),
     Kind(
         "controller_misfit",
-        "%",
-        "caution",
         "difference of the recorded velocity command from what the controller of the settings "
         "makes of perturbation and torque, 0.5 to 10 Hz but for the line at which they differ "
         "most, in % of the command",
@@ -208,20 +165,10 @@ MODEL_KINDS = (
                 "B and K by {share:.2g} % of half their intervals at most."
             },
         },
-        example={
-            "value": 50.0,
-            "limit": 20.0,
-            "factor": 0.5,
-            "method": "iv",
-            "share": 12.0,
-            "shown_inertia": 0.0458,
-            "shown_damping": 1.6,
-        },
+        example={"value": 50.0, "limit": 20.0, "factor": 0.5},
     ),
     Kind(
         "unstable_loop",
-        "1/s",
-        "caution",
         "growth of the slowest motion of the loop of the settings with the joint that was found, "
         "per second",
         headline="This controller would be unstable with this joint",
@@ -230,6 +177,7 @@ MODEL_KINDS = (
         meaning="The joint or the controller was another one.",
         remedy="Give the values that were used, per radian: --controller J_C B_C, or inertia_kg_m2 "
         "and damping_nm_s_rad in [controller].",
+        unit="1/s",
         variants={
             "instrument": {
                 "meaning": "{method} takes the motion that the perturbation would cause without "
@@ -240,6 +188,6 @@ MODEL_KINDS = (
                 "of half their intervals at most."
             },
         },
-        example={"value": 3.1, "limit": 0.0, "method": "iv", "share": 12.0},
+        example={"value": 3.1, "limit": 0.0},
     ),
 )

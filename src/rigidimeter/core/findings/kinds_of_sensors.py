@@ -4,19 +4,11 @@ from __future__ import annotations
 
 from rigidimeter.core.findings.kind import Kind
 
-_LEFT_OUT = {
-    "channel": "angle_rad",
-    "spans": "from 8 to 8.4 s and from 9.2 to 9.7 s",
-    "used_s": 18.2,
-    "length_s": 20.0,
-}
 _REST_USED = "That part is left out; J, B and K are from {used_s:.3g} of {length_s:.3g} s."
 
 SENSOR_KINDS = (
     Kind(
         "computed_torque",
-        "%",
-        "exclude",
         "RMS of what of the torque is no weighted sum of samples (from two before to two after) of "
         "the motion or of the perturbation, in % of the torque's SD; not for simulated sessions",
         headline="The torque was computed from {origin}, not measured",
@@ -26,13 +18,12 @@ SENSOR_KINDS = (
         "are those of the formula.",
         remedy="Record what the torque sensor measured; for a simulation set computed_torque to "
         "note in [diagnostics.levels].",
+        level="exclude",
         setting="min_computed_torque_percent",
-        example={"value": 2e-9, "limit": 0.001, "origin": "the motion"},
+        example={"value": 2e-9, "limit": 0.001},
     ),
     Kind(
         "saturation",
-        "%",
-        "exclude",
         "share of samples in which torque or motion repeats its extreme value, three times or more "
         "in a row",
         headline="{channel} repeats its extreme value in {value:.2g} % of samples",
@@ -41,6 +32,7 @@ SENSOR_KINDS = (
         meaning="The sensor or its amplifier was at the end of its range, so a part of the signal "
         "is missing and J, B and K are wrong.",
         remedy="Choose a larger range or a smaller perturbation, and repeat.",
+        level="exclude",
         setting="max_saturated_percent",
         variants={
             "left_out": {
@@ -50,12 +42,10 @@ SENSOR_KINDS = (
                 "meaning": _REST_USED,
             }
         },
-        example={"value": 2.3, "limit": 0.5, **_LEFT_OUT},
+        example={"value": 2.3, "limit": 0.5},
     ),
     Kind(
         "frozen",
-        "s",
-        "exclude",
         "longest time for which torque or motion repeats one value that the recorded command does "
         "not explain (rest, or for the velocity a constant one); at most `max_left_out_percent` of "
         "an epoch is left out for it or for saturation",
@@ -64,6 +54,8 @@ SENSOR_KINDS = (
         "{start_s:.4g} s on.",
         meaning="The sensor stopped, or the joint was held, so J, B and K are wrong.",
         remedy="Check the sensor's cable and its rate.",
+        level="exclude",
+        unit="s",
         setting="max_frozen_s",
         variants={
             "left_out": {
@@ -73,24 +65,22 @@ SENSOR_KINDS = (
                 "meaning": "J, B and K are from {used_s:.3g} of {length_s:.3g} s.",
             }
         },
-        example={"value": 0.4, "limit": 0.1, "start_s": 8.0, **_LEFT_OUT},
+        example={"value": 0.4, "limit": 0.1},
     ),
     Kind(
         "left_out",
-        "s",
-        "note",
         "time that was left out by hand (without the trimmed second on each side), in s; the "
         "details have the reason",
         headline="{value:.3g} s were left out by hand",
         measured="{value:.3g} s were left out by hand, {spans}: {reason}.",
         meaning="J, B and K are from {used_s:.3g} of {length_s:.3g} s.",
         remedy="Compare the estimate with that of the complete epoch.",
-        example={"value": 0.9, "limit": 0.0, "reason": "a cable was pulled", **_LEFT_OUT},
+        level="note",
+        unit="s",
+        example={"value": 0.9, "limit": 0.0, "reason": "a cable was pulled"},
     ),
     Kind(
         "lost_samples",
-        "%",
-        "exclude",
         "share of the epoch's time whose samples are lost because `samples.arrows` is damaged or "
         "cut off, in %",
         headline="{value:.2g} % of the epoch's samples are lost",
@@ -98,6 +88,7 @@ SENSOR_KINDS = (
         "{limit:g} %): {reason}.",
         meaning="What is left is another experiment than was planned.",
         remedy="Read an undamaged copy of the recording, and test the disk that it was on.",
+        level="exclude",
         setting="max_left_out_percent",
         variants={
             "left_out": {
@@ -105,18 +96,10 @@ SENSOR_KINDS = (
                 "{length_s:.3g} s."
             }
         },
-        example={
-            "value": 55.0,
-            "limit": 50.0,
-            "lost_s": 11.0,
-            "reason": "batch 7 of samples.arrows is damaged",
-            **_LEFT_OUT,
-        },
+        example={"value": 55.0, "limit": 50.0, "reason": "batch 7 of samples.arrows is damaged"},
     ),
     Kind(
         "missed_ticks",
-        "%",
-        "caution",
         "share of the ticks due at which the loop never ran, in %; the details have the late ticks "
         "as well",
         headline="{missed} of {ticks} ticks of the loop never ran",
@@ -133,12 +116,10 @@ SENSOR_KINDS = (
                 "B and K stay within their intervals."
             }
         },
-        example={"value": 0.65, "limit": 0.1, "missed": 13, "ticks": 2000, "late": 40},
+        example={"value": 0.65, "limit": 0.1},
     ),
     Kind(
         "velocity_scale",
-        "%",
-        "exclude",
         "ratio of the change of angle to the integrated velocity, minus 1, in %",
         headline="The angle changes {scale:.3g} times as much as the velocity says",
         measured="angle_rad changes {scale:.3g} times as much as velocity_rad_s says, {value:.2g} "
@@ -146,13 +127,12 @@ SENSOR_KINDS = (
         meaning="One of them has another unit or sign, or is another joint's, so J, B and K are "
         "wrong.",
         remedy="Check the units and signs of both channels.",
+        level="exclude",
         setting="max_velocity_scale_percent",
-        example={"value": 5630.0, "limit": 10.0, "scale": 57.3},
+        example={"value": 5630.0, "limit": 10.0},
     ),
     Kind(
         "velocity_delay",
-        "ms",
-        "caution",
         "delay of velocity relative to angle, in ms",
         headline="The velocity lags the angle by {value:.2g} ms",
         measured="velocity_rad_s lags angle_rad by {value:.2g} ms (at most {limit:g} ms either "
@@ -160,13 +140,12 @@ SENSOR_KINDS = (
         meaning="A filter or a buffer moved one of them, and B and K take each other's part.",
         remedy="Correct the time stamps, or leave velocity_rad_s out: it is then made from the "
         "angle.",
+        unit="ms",
         setting="max_velocity_delay_ms",
         example={"value": 12.0, "limit": 5.0},
     ),
     Kind(
         "velocity_shape",
-        "%",
-        "caution",
         "rms of what of the angle's derivative the velocity, with its scale and delay fitted, does "
         "not follow, up to 10 Hz, in % of the derivative's rms; the details have R² of the torque "
         "with either",
@@ -187,19 +166,10 @@ SENSOR_KINDS = (
                 "remedy": "Leave angle_rad out: it is then made from the velocity.",
             },
         },
-        example={
-            "value": 9.3,
-            "limit": 5.0,
-            "low_hz": 0.15,
-            "high_hz": 10.0,
-            "by_angle": 0.9971,
-            "by_velocity": 0.9314,
-        },
+        example={"value": 9.3, "limit": 5.0},
     ),
     Kind(
         "torque_delay",
-        "ms",
-        "caution",
         "delay of the torque against the motion that was found and not corrected, in ms, where the "
         "perturbation was not recorded and the delay would move J (by B τ) or B (by K τ) by more "
         "than half their intervals. Where no drive was identified either, not up to three standard "
@@ -212,12 +182,11 @@ SENSOR_KINDS = (
         "that something but the robot adds.",
         remedy="Record the perturbation, which tells the two apart, or take a known delay out of "
         "the recording.",
+        unit="ms",
         example={"value": 4.0, "limit": 1.2, "late_ms": 4.0, "percent_of": (-12.0, -5.1, 0.0)},
     ),
     Kind(
         "guard_limited",
-        "%",
-        "caution",
         "share of the commands that the guard changed",
         headline="The guard changed {value:.2g} % of the commands",
         measured="The guard changed {value:.2g} % of the commands (at most {limit:g} %).",
@@ -229,8 +198,6 @@ SENSOR_KINDS = (
     ),
     Kind(
         "position_limit",
-        "%",
-        "caution",
         "farthest angle, in % of the position limit",
         headline="The joint came to {value:.0f} % of the position limit",
         measured="The joint came to {value:.0f} % of the position limit of {limit_deg:.3g}° (at "
@@ -238,6 +205,6 @@ SENSOR_KINDS = (
         meaning="It was held back there, which the fit takes for stiffness: K may be too high.",
         remedy="Use a smaller perturbation, or begin nearer to the middle of the range.",
         setting="max_position_percent",
-        example={"value": 99.0, "limit": 98.0, "limit_deg": 40.0},
+        example={"value": 99.0, "limit": 98.0},
     ),
 )

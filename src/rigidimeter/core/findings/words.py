@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from string import Formatter
 from typing import Any, NamedTuple
 
-from rigidimeter.core.findings.kind import Kind
+from rigidimeter.core.findings.kind import EXAMPLE, Kind
 from rigidimeter.core.findings.kinds import KINDS
-from rigidimeter.core.findings.sentence_parts import Shown, p_text
+from rigidimeter.core.words import Shown, p_text
 
 NO_CHANGE = 0.05
 """In %: less is shown as 0."""
@@ -47,8 +47,9 @@ def words_of(name: str, facts: Mapping[str, Any]) -> Words:
 
 def explained(kind: Kind) -> list[tuple[str, Words]]:
     """Return the words of a kind with its example, for each variant by its name."""
+    shown = {**EXAMPLE, **kind.example, "unit": kind.unit}
     return [
-        (variant, words_of(kind.name, {**kind.example, "unit": kind.unit, "variant": variant}))
+        (variant, words_of(kind.name, {**shown, "variant": variant}))
         for variant in ("", *kind.variants)
     ]
 

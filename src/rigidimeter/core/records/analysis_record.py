@@ -9,7 +9,7 @@ from html import escape
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rigidimeter.core.findings import SERIOUS_FIRST, Finding, epochs_text
+from rigidimeter.core.findings import SERIOUS_FIRST, Finding
 from rigidimeter.core.records.estimates import (
     FIT_NUMBERS,
     PARAMETERS,
@@ -19,6 +19,7 @@ from rigidimeter.core.records.estimates import (
     Score,
 )
 from rigidimeter.core.words import (
+    epochs_text,
     html_table,
     interval_text,
     one_cell,
@@ -82,7 +83,9 @@ class FindingGroup(NamedTuple):
         return f"{one.level}  {one.name}  {one.headline}; {self.where}"
 
 
-def grouped(fits: Sequence[Fit], pooled: Sequence[Fit]) -> tuple[FindingGroup, ...]:
+def grouped(
+    fits: Sequence[Fit], pooled: Sequence[Fit], across: Sequence[Finding] = ()
+) -> tuple[FindingGroup, ...]:
     """Return what fits carry, once for each check and level, the most serious first.
 
     Parameters
@@ -91,6 +94,8 @@ def grouped(fits: Sequence[Fit], pooled: Sequence[Fit]) -> tuple[FindingGroup, .
         Of epochs.
     pooled : sequence of Fit
         To all epochs of a condition, and of all of them.
+    across : sequence of Finding
+        Of recordings, or of a subject, that no single fit carries.
     """
     carried: dict[tuple[str, str], list[tuple[Fit, Finding]]] = {}
     for fit in (*fits, *pooled):
@@ -101,6 +106,10 @@ def grouped(fits: Sequence[Fit], pooled: Sequence[Fit]) -> tuple[FindingGroup, .
         _, worst = max(members, key=lambda each: _beyond(each[1]))
         where = _where(members, worst, fits)
         groups.append(FindingGroup(worst, tuple(fit for fit, _ in members), where))
+    for finding in across:
+        of_one = f" in {finding.condition}" if finding.condition else ""
+        whose = f", subject {finding.facts['subject']}" if "subject" in finding.facts else ""
+        groups.append(FindingGroup(finding, (), f"all epochs together{of_one}{whose}"))
     return tuple(sorted(groups, key=lambda group: SERIOUS_FIRST.index(group.finding.level)))
 
 
@@ -146,7 +155,8 @@ class Analysis:
     epoch was included). `pooled` are the fits to all epochs of each condition together, and with
     several conditions to all epochs, whose condition is empty. `method_reason` says why a method
     was chosen where it was left open. `sensitivity` is what other bands give, where the
-    perturbation was recorded.
+    perturbation was recorded. `across` is what no fit of it carries: of recordings beside each
+    other, and of all epochs of a subject where there are several.
     """
 
     method: str
@@ -158,11 +168,17 @@ class Analysis:
     delays: tuple[Delay, ...] = ()
     method_reason: str = ""
     sensitivity: tuple[BandEstimate, ...] = ()
+    across: tuple[Finding, ...] = ()
+
+    @property
+    def results(self) -> tuple[Fit | Score, ...]:
+        """The fits, then the scores."""
+        return *self.fits, *self.scores
 
     @property
     def findings(self) -> tuple[FindingGroup, ...]:
         """What the checks found: for each check and level the epochs, the most serious first."""
-        return grouped(self.fits, self.pooled)
+        return grouped(self.fits, self.pooled, self.across)
 
     @property
     def weight_in_stiffness(self) -> str:
@@ -310,7 +326,7 @@ class Analysis:
     def _repr_html_(self) -> str:
         """Return J, B and K with their 95 % intervals, what the checks found, and the scores."""
         reason = f": {self.method_reason}" if self.method_reason else ""
-        results: tuple[Fit | Score, ...] = (*self.fits, *self.scores)
+        results = self.results
         names = short_names(one.source for one in results)
         parts = [f"<p>{escape(f'Method {self.method}{reason}.')}</p>"]
         if self.fits:

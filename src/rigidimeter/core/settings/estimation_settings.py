@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from pydantic import create_model
 
-from rigidimeter.core.findings import KINDS, Level, default_level
+from rigidimeter.core.findings import KINDS, STUDY_KINDS, Level, default_level
 from rigidimeter.core.settings.section import Section, quantity
 
 USABLE_FRACTION_OF_RATE = 0.4
@@ -65,7 +65,9 @@ class ScoreSettings(Section):
         return min(self.cycles, math.floor(length_s * frequency_hz + 1e-6))
 
 
-_LEVELS: Any = {kind.name: (Level, kind.level) for kind in KINDS.values()}
+_LEVELS: Any = {
+    kind.name: (Level, kind.level) for kind in KINDS.values() if kind not in STUDY_KINDS
+}
 
 
 class DiagnosticLevels(create_model("Levels", __base__=Section, **_LEVELS)):  # type: ignore[misc]

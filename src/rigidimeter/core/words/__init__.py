@@ -1,17 +1,22 @@
 """Numbers and tables as people read them."""
 
 from rigidimeter.core.words.numbers import (
+    Shown,
     amount,
     axis_unit,
     condition_name,
     decimals,
     fixed,
+    format_number,
     interval,
+    interval_text,
     number,
     p_and_r,
+    p_text,
     p_value,
     scaled,
     series,
+    with_error,
     within,
 )
 from rigidimeter.core.words.tables import (
@@ -25,11 +30,10 @@ from rigidimeter.core.words.tables import (
     shown_value,
 )
 from rigidimeter.core.words.text import (
+    epochs_text,
     html_table,
-    interval_text,
     one_cell,
     one_line,
     plural,
     short_names,
-    with_error,
 )

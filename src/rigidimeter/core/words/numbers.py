@@ -8,6 +8,9 @@ from collections.abc import Iterable, Sequence
 SMALLEST_P = 1e-300
 """Below this a p-value has run out of floating point."""
 
+_PLAIN = (0.01, 1e5)
+"""Numbers of this size with their errors are written without a power of ten."""
+
 
 def number(value: float, digits: int = 4) -> str:
     """Return a number with so many significant digits, a dash for NaN.
@@ -96,6 +99,17 @@ def p_value(p: float, digits: int = 3) -> str:
     return f"{p:.{digits}g}" if p >= 1e-4 else f"{p:.1e}"
 
 
+def p_text(p: float, least: float = 1e-6) -> str:
+    """Return a p-value in a sentence, a small one as a limit: no assumption is as good as that.
+
+    Examples
+    --------
+    >>> p_text(0.0213), p_text(1e-9), p_text(2e-5, 1e-4)
+    ('p = 0.021', 'p < 1e-06', 'p < 0.0001')
+    """
+    return f"p = {p:.2g}" if p >= least else f"p < {least:g}"
+
+
 def p_and_r(p: float, r: float) -> str:
     """Return p and effect size as sentences quote them, unbroken at the signs.
 
@@ -118,10 +132,10 @@ def within(title: str) -> str:
 
     Examples
     --------
-    >>> within("Stiffness K")
-    'stiffness K'
+    >>> within("Stiffness K"), within("K differs")
+    ('stiffness K', 'K differs')
     """
-    return title[:1].lower() + title[1:]
+    return title[:1].lower() + title[1:] if title[1:2].islower() else title
 
 
 def condition_name(condition: str) -> str:
@@ -157,3 +171,90 @@ def fixed(value: float, places: int, *, sign: bool = False) -> str:
     """
     text = f"{value:{'+' if sign else ''}.{places}f}"
     return (text if float(text) else text.lstrip("+-")).replace("-", "−")
+
+
+def with_error(value: float, standard_error: float) -> str:
+    """Return a number ± its standard error: two digits of the error, the number to the same place.
+
+    A number without an error has four digits, one that is NaN is a dash.
+
+    Examples
+    --------
+    >>> with_error(0.136801, 8.7e-05), with_error(-1.7031, 0.0996), with_error(12345.6, 234.0)
+    ('0.136801 ± 0.000087', '−1.70 ± 0.10', '12350 ± 230')
+    >>> with_error(0.004588, 8.1e-06), with_error(1.7, math.nan), with_error(math.nan, math.nan)
+    ('4.5880e-3 ± 0.0081e-3', '1.7', '–')
+    """
+    value, standard_error = float(value), float(standard_error)
+    if math.isnan(value):
+        return "–"
+    if not standard_error > 0:
+        power = _power_of_ten(value)
+        return _minus(f"{value / 10.0**power:.4g}{f'e{power}' * bool(power)}")
+    if not 1e-9 * abs(value) < standard_error < math.inf:
+        return _minus(f"{value:.4g} ± {standard_error:.2g}")
+    return " ± ".join(_to_the_error((value, standard_error), standard_error))
+
+
+def interval_text(low: float, high: float) -> str:
+    """Return a 95 % interval to the place of its standard error, a dash where there is none.
+
+    Examples
+    --------
+    >>> interval_text(1.6704, 1.7372), interval_text(-0.0005, 0.0041), interval_text(math.nan, 1.0)
+    ('1.670 to 1.737', '−0.5e-3 to 4.1e-3', '–')
+    """
+    if not -math.inf < low < high < math.inf:
+        return "–"
+    return " to ".join(_to_the_error((low, high), (high - low) / 4))
+
+
+def _to_the_error(numbers: Sequence[float], error: float) -> Iterable[str]:
+    """Return numbers with one power of ten, to the place of the second digit of an error."""
+    power = _power_of_ten(max(map(abs, numbers)))
+    place = int(f"{error / 10.0**power:.1e}".partition("e")[2]) - 1
+    times = f"e{power}" if power else ""
+    rounded = (round(one / 10.0**power, -place) + 0.0 for one in numbers)
+    return (_minus(f"{one:.{max(-place, 0)}f}{times}") for one in rounded)
+
+
+def _power_of_ten(number: float) -> int:
+    size = abs(number)
+    plain = not size or math.isinf(size) or _PLAIN[0] <= size < _PLAIN[1]
+    return 0 if plain else 3 * math.floor(math.log10(size) / 3)
+
+
+def _minus(text: str) -> str:
+    return text.replace("-", "−", 1) if text.startswith("-") else text
+
+
+def format_number(value: float, spec: str = ".2g", *, limit: float = math.nan) -> str:
+    """Return a number rounded as `spec` says, without a power of ten for a large one.
+
+    With more digits where it would read as the limit that is shown beside it, and is not.
+
+    Examples
+    --------
+    >>> [format_number(x, "+.2g") for x in (104.2, 7.36, -290.0, 2e-9)]
+    ['+104', '+7.4', '-290', '+2e-09']
+    >>> format_number(15.2, limit=15.0), format_number(99.98, ".0f", limit=100.0)
+    ('15.2', '99.98')
+    """
+    text = format(value, spec)
+    for digits in range(3, 18):  # 17 tell any two numbers apart
+        if value == limit or not math.isclose(float(text), limit, rel_tol=1e-14):
+            break
+        text = format(value, f".{digits}g")
+    whole = "e+" in text and abs(value) < 1e6
+    return format(value, f"{'+' if '+' in spec else ''}.0f") if whole else text
+
+
+class Shown(float):
+    """A number that a template rounds, by `format_number`."""
+
+    limit: float = math.nan
+
+    def __format__(self, spec: str) -> str:
+        """Return it rounded as `spec` says."""
+        text = format_number(float(self), spec or ".3g", limit=self.limit)
+        return text if "e" in text else text.replace("-", "−")

@@ -1,69 +1,38 @@
-"""How a number with its error, a line and a small table are written for people."""
+"""How names, a line and a small table are written for people."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import PurePath
 
-_PLAIN = (0.01, 1e5)
-"""Numbers of this size are written without a power of ten."""
+MAX_RANGES = 6
+"""At most so many ranges of epochs are named."""
 
 
-def with_error(value: float, standard_error: float) -> str:
-    """Return a number ± its standard error: two digits of the error, the number to the same place.
-
-    A number without an error has four digits, one that is NaN is a dash.
+def epochs_text(labels: Sequence[str]) -> str:
+    """Return labels of epochs as text, those that follow each other as a range.
 
     Examples
     --------
-    >>> with_error(0.136801, 8.7e-05), with_error(-1.7031, 0.0996), with_error(12345.6, 234.0)
-    ('0.136801 ± 0.000087', '−1.70 ± 0.10', '12350 ± 230')
-    >>> with_error(0.004588, 8.1e-06), with_error(1.7, math.nan), with_error(math.nan, math.nan)
-    ('4.5880e-3 ± 0.0081e-3', '1.7', '–')
+    >>> epochs_text(["1", "2", "3", "4", "7"]), epochs_text(["3"]), epochs_text(["a", "b"])
+    ('epochs 1–4, 7', 'epoch 3', 'epochs a, b')
     """
-    value, standard_error = float(value), float(standard_error)
-    if math.isnan(value):
-        return "–"
-    if not standard_error > 0:
-        power = _power_of_ten(value)
-        return _minus(f"{value / 10.0**power:.4g}{f'e{power}' * bool(power)}")
-    if not 1e-9 * abs(value) < standard_error < math.inf:
-        return _minus(f"{value:.4g} ± {standard_error:.2g}")
-    return " ± ".join(_to_the_error((value, standard_error), standard_error))
-
-
-def interval_text(low: float, high: float) -> str:
-    """Return a 95 % interval to the place of its standard error, a dash where there is none.
-
-    Examples
-    --------
-    >>> interval_text(1.6704, 1.7372), interval_text(-0.0005, 0.0041), interval_text(math.nan, 1.0)
-    ('1.670 to 1.737', '−0.5e-3 to 4.1e-3', '–')
-    """
-    if not -math.inf < low < high < math.inf:
-        return "–"
-    return " to ".join(_to_the_error((low, high), (high - low) / 4))
-
-
-def _to_the_error(numbers: Sequence[float], error: float) -> Iterable[str]:
-    """Return numbers with one power of ten, to the place of the second digit of an error."""
-    power = _power_of_ten(max(map(abs, numbers)))
-    place = int(f"{error / 10.0**power:.1e}".partition("e")[2]) - 1
-    times = f"e{power}" if power else ""
-    rounded = (round(one / 10.0**power, -place) + 0.0 for one in numbers)
-    return (_minus(f"{one:.{max(-place, 0)}f}{times}") for one in rounded)
-
-
-def _power_of_ten(number: float) -> int:
-    size = abs(number)
-    plain = not size or math.isinf(size) or _PLAIN[0] <= size < _PLAIN[1]
-    return 0 if plain else 3 * math.floor(math.log10(size) / 3)
-
-
-def _minus(text: str) -> str:
-    return f"−{text[1:]}" if text.startswith("-") else text
+    ranges: list[list[str]] = []
+    for label in labels:
+        last = ranges[-1][-1] if ranges else ""
+        if label.isdecimal() and last.isdecimal() and int(label) == int(last) + 1:
+            ranges[-1].append(label)
+        else:
+            ranges.append([label])
+    parts = [
+        f"{one[0]}–{one[-1]}" if len(one) > 2 else ", ".join(one) for one in ranges[:MAX_RANGES]
+    ]
+    more = sum(map(len, ranges[MAX_RANGES:]))
+    return (
+        f"epoch{'s' if len(labels) > 1 else ''} {', '.join(parts)}"
+        f"{f' and {more} more' if more else ''}"
+    )
 
 
 def plural(count: int, noun: str) -> str:

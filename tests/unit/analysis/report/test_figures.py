@@ -1,6 +1,7 @@
 """Figures from arrays: complete, labelled, alike each time, and without trace."""
 
 import dataclasses
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import matplotlib as mpl
@@ -9,13 +10,19 @@ import pytest
 from matplotlib.figure import Figure
 
 from rigidimeter.analysis.estimation import epoch_signals, scoring_cycles
-from rigidimeter.analysis.report.sections.distribution import distribution
-from rigidimeter.analysis.report.sections.other_bands import band_sensitivity
-from rigidimeter.analysis.report.sections.perturbation_figure import changes, perturbation, spectrum
-from rigidimeter.analysis.report.sections.recorded_signals import recorded
-from rigidimeter.analysis.report.sections.torque_angle_loop import loop, loop_limits, loops
-from rigidimeter.analysis.report.sections.torque_fit import torque_limit_nm, torque_parts
-from rigidimeter.analysis.report.style import condition_colours, svg_text
+from rigidimeter.analysis.report.curves import (
+    changes,
+    draw_loops,
+    draw_perturbation,
+    draw_recorded,
+    draw_spectrum,
+    draw_torque,
+    loop_limits,
+    torque_limit_nm,
+)
+from rigidimeter.analysis.report.interval_rows import draw_bands
+from rigidimeter.analysis.report.points import draw_distribution
+from rigidimeter.analysis.report.style import condition_colours, drawn, svg_text
 from rigidimeter.analysis.study import StudyResult
 from rigidimeter.core.records import BandEstimate, Channel
 
@@ -24,11 +31,18 @@ LEVELS = np.where(np.random.default_rng(5).random(400) < 0.5, -1.0, 1.0)
 PRBS = Channel("perturbation_nm", STAMPS, np.repeat(LEVELS, 13)[:5000])
 
 
+SIZE = (7.0, 5.0)
+
+
+def distribution(*arguments: Any) -> Figure:
+    return drawn(SIZE, draw_distribution, *arguments)
+
+
 def test_every_point_of_a_distribution_is_drawn_at_its_value() -> None:
     values = {"OFF": list(np.linspace(0.1, 0.3, 300)), "DBS": [0.2], "other": []}
     figure = distribution("Damping (N·m·s/rad)", values, condition_colours(values))
     (axes,) = figure.axes
-    strips = [line for line in axes.lines if line.get_marker() == "o"]
+    strips = [line for line in axes.lines if line.get_gid()]
     assert [list(line.get_ydata()) for line in strips] == [values["OFF"], values["DBS"]]
     for position, line in enumerate(strips):
         assert np.all(np.abs(np.asarray(line.get_xdata()) - position) < 0.45)
@@ -42,23 +56,25 @@ def test_every_point_of_a_distribution_is_drawn_at_its_value() -> None:
 
 def test_median_and_quartiles_are_marked() -> None:
     figure = distribution("x (1)", {"OFF": [8.0, 1.0, 4.0, 2.0]}, {"OFF": "black"})
-    _, bar, diamond = figure.axes[0].lines
-    assert list(bar.get_ydata()) == [1.75, 5.0]
+    _, diamond = figure.axes[0].lines
+    (quartiles,) = figure.axes[0].collections[0].get_segments()
+    assert list(quartiles[:, 1]) == [1.75, 5.0]
     assert list(diamond.get_ydata()) == [3.0]
+    assert quartiles[0, 0] == diamond.get_xdata()[0]
 
 
 def test_intervals_stand_at_their_points_and_the_pooled_estimate_beside_them() -> None:
-    ends = [(0.5, 1.5), (float("nan"), 3.0), (2.0, 6.0)]
+    nan = float("nan")
     figure = distribution(
         "x (1)",
-        {"OFF": [1.0, 2.0, 4.0], "DBS": []},
+        {"OFF": [(1.0, 0.5, 1.5), (2.0, nan, 3.0), (4.0, 2.0, 6.0)], "DBS": []},
         {"OFF": "black", "DBS": "red"},
-        ends={"OFF": ends},
-        pooled={"OFF": (2.2, 1.7, 2.7), "DBS": (5.0, float("nan"), float("nan"))},
+        "",
+        {"OFF": (2.2, 1.7, 2.7), "DBS": (5.0, nan, nan)},
     )
     (axes,) = figure.axes
-    bars, pooled = (lines.get_segments() for lines in axes.collections)
-    points = next(line for line in axes.lines if line.get_marker() == "o")
+    bars, _, pooled = (lines.get_segments() for lines in axes.collections)
+    points = next(line for line in axes.lines if line.get_gid())
     assert [list(bar[:, 1]) for bar in bars] == [[0.5, 1.5], [2.0, 6.0]]
     across = np.asarray(points.get_xdata())[[0, 2]]
     np.testing.assert_allclose([bar[0, 0] for bar in bars], across)
@@ -73,14 +89,21 @@ def test_intervals_stand_at_their_points_and_the_pooled_estimate_beside_them() -
 def test_other_bands_stand_at_their_change_in_percent_with_its_error() -> None:
     zero, value = (0.0, 0.0, 0.0), (0.004, 0.1, 2.0)
     own = BandEstimate("OFF", 0.1, 30.0, "all", value, zero, zero, (1.0, 1.0, 1.0))
-    changed = (0.0044, 0.1, 1.9)
     other = BandEstimate(
-        "OFF", 0.1, 15.0, "all", changed, (0.0004, 0.0, -0.1), (0.0004, 0.01, 0.2), (0.3, 1.0, 0.6)
+        "OFF",
+        0.1,
+        15.0,
+        "all",
+        (0.0044, 0.1, 1.9),
+        (0.0004, 0.0, -0.1),
+        (0.0004, 0.01, 0.2),
+        (0.3, 1.0, 0.6),
     )
-    figure = band_sensitivity([own, other], {"OFF": np.array([5.0, 5.0, 5.0])})
-    drawn = [axes.lines[1].get_xdata()[0] for axes in figure.axes]
-    assert drawn == pytest.approx([10.0, 0.0, -5.0])
-    (bar,) = figure.axes[0].containers[0].lines[2][0].get_segments()
+    half = {"OFF": np.array([5.0, 5.0, 5.0])}
+    figure = drawn(SIZE, draw_bands, [own, other], half, columns=3)
+    changed = [axes.lines[1].get_xdata()[0] for axes in figure.axes]
+    assert changed == pytest.approx([10.0, 0.0, -5.0])
+    (bar,) = figure.axes[0].collections[0].get_segments()
     assert bar[:, 0] == pytest.approx([10 - 19.6, 10 + 19.6], abs=0.01)
     assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == ["0.1 to 15 Hz"]
 
@@ -93,7 +116,7 @@ def test_changes_keep_the_course_of_a_held_signal() -> None:
 
 
 def test_perturbation_shows_its_beginning_and_the_whole() -> None:
-    above, below = perturbation(PRBS, -1.0).axes
+    above, below = drawn(SIZE, draw_perturbation, PRBS, -1.0, rows=2).axes
     assert above.get_xlim() == (1.0, 8.0)
     assert below.get_xlim() == (1.0, 1.0 + STAMPS[-1])
     assert below.get_xlabel() == "Time since the start of the epoch (s)"
@@ -101,7 +124,7 @@ def test_perturbation_shows_its_beginning_and_the_whole() -> None:
 
 def test_spectrum_of_a_line_peaks_at_the_line() -> None:
     line = Channel("perturbation_nm", 7.0 + STAMPS, np.sin(2 * np.pi * 3 * STAMPS))
-    (axes,) = spectrum(line, (0.15, 10.0)).axes
+    (axes,) = drawn(SIZE, draw_spectrum, line, (0.15, 10.0)).axes
     frequency_hz, density = (np.asarray(d) for d in axes.lines[0].get_data())
     assert frequency_hz[np.argmax(density)] == pytest.approx(3.0, abs=0.05)
     # The power of a sine of amplitude 1 is ½.
@@ -113,8 +136,8 @@ def test_parts_of_the_model_add_up_to_it(study: StudyResult) -> None:
     fit = study.analysis.fixed_inertia[1]
     epoch = study.epochs[1]
     signals = epoch_signals(epoch, fit.method, study.settings.estimation)
-    limit_nm = torque_limit_nm(signals, fit, 7.0)
-    figure = torque_parts(signals, fit, "black", origin_s=100.0, window_s=7.0, limit_nm=limit_nm)
+    limit_nm = torque_limit_nm(signals, fit)
+    figure = drawn(SIZE, draw_torque, signals, fit, "black", 100.0, limit_nm, rows=5)
     torque, left, *parts = figure.axes
     assert len(parts) == 3
     model = np.asarray(torque.lines[1].get_ydata())
@@ -133,7 +156,8 @@ def test_parts_of_the_model_add_up_to_it(study: StudyResult) -> None:
 
 def test_what_was_recorded_is_drawn_as_it_was() -> None:
     angle = Channel("angle_rad", STAMPS, np.radians(STAMPS))
-    held, turned = recorded({"perturbation_nm": PRBS, "angle_rad": angle}, -1.0).axes
+    channels = {"perturbation_nm": PRBS, "angle_rad": angle}
+    held, turned = drawn(SIZE, draw_recorded, channels, -1.0, rows=2).axes
     assert held.lines[0].get_drawstyle() == "steps-post"
     across, degrees = (np.asarray(d) for d in turned.lines[0].get_data())
     np.testing.assert_allclose(degrees, across - 1.0)
@@ -144,7 +168,8 @@ def test_what_was_recorded_is_drawn_as_it_was() -> None:
 def test_loops_of_the_conditions_share_a_panel(study: StudyResult) -> None:
     epoch = next(epoch for epoch in study.epochs if epoch.task == "sinusoid")
     cycles = scoring_cycles(epoch, study.settings.scores)
-    figure = loops([("OFF: 1 J", cycles, "black"), ("_DBS: 1 J", cycles, "red")])
+    shown = [("OFF: 1 J", cycles, "black"), ("_DBS: 1 J", cycles, "red")]
+    figure = drawn(SIZE, draw_loops, shown)
     (axes,) = figure.axes
     assert [line.get_color() for line in axes.lines] == ["black", "red"]
     assert len(figure.legends[0].get_texts()) == 2
@@ -154,7 +179,7 @@ def test_loop_is_in_degrees(study: StudyResult) -> None:
     epoch = next(epoch for epoch in study.epochs if epoch.task == "sinusoid")
     cycles = scoring_cycles(epoch, study.settings.scores)
     limits = loop_limits([cycles])
-    (axes,) = loop(cycles, "black", limits).axes
+    (axes,) = drawn(SIZE, draw_loops, [("", cycles, "black")]).axes
     assert np.max(np.asarray(axes.lines[0].get_xdata())) == pytest.approx(20.0, rel=0.05)
     assert axes.get_xlim() == (-limits[0], limits[0])
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("Angle (deg)", "Torque (N·m)")
@@ -204,5 +229,5 @@ def test_a_constant_sample_is_drawn_without_complaint() -> None:
 
 def test_a_channel_on_a_late_clock_is_drawn_from_its_origin() -> None:
     late = dataclasses.replace(PRBS, time_s=1.7e9 + STAMPS)
-    above, _ = perturbation(late, 1.7e9).axes
+    above, _ = drawn(SIZE, draw_perturbation, late, 1.7e9, rows=2).axes
     assert above.get_xlim() == (0.0, 7.0)

@@ -10,11 +10,16 @@ import pytest
 from tests.unit.analysis.report.cohorts import Design, made_study
 from tests.unit.analysis.report.parsed_page import ParsedPage
 
+from rigidimeter.analysis.report import SECTIONS
 from rigidimeter.analysis.report import page as page_module
-from rigidimeter.analysis.report.first_screen import light_words, main_finding, strips
-from rigidimeter.analysis.report.interval_plot import interval_plot, reach
+from rigidimeter.analysis.report.first_screen import (
+    interval_plot,
+    light_words,
+    main_finding,
+    reach,
+    strips,
+)
 from rigidimeter.analysis.report.page import contents, parts, render_page, write_report
-from rigidimeter.analysis.report.sections.study_overview import NUMBERS
 from rigidimeter.analysis.statistics import summarise
 from rigidimeter.analysis.study import (
     Difference,
@@ -78,7 +83,7 @@ def test_differences_are_signed_with_the_digits_of_their_interval(
 def test_table_and_document_are_one(
     study: StudyResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(page_module, "SECTIONS", [NUMBERS])
+    monkeypatch.setattr(page_module, "SECTIONS", [s for s in SECTIONS if s.name == "numbers"])
     page = ParsedPage(write_report(study, tmp_path).read_text(encoding="utf-8"))
     write_json(tmp_path / "c.json", comparison_document(study))
     document = read_json(tmp_path / "c.json")
@@ -130,15 +135,15 @@ def test_a_difference_that_is_unknown_has_no_picture(study: StudyResult) -> None
 
 
 def test_the_plot_has_its_text_as_text_and_arrows_beyond_its_axis() -> None:
-    svg = interval_plot(-15.0, (-40.0, 10.0), ("50 % lower", "0", "50 % higher"), 50.0)
-    assert re.findall(r">([^<>]+)</text>", svg) == ["50 % lower", "0", "50 % higher"]
+    svg = interval_plot((-15.0, -40.0, 10.0), 50.0, " %", middle="none")
+    assert re.findall(r">([^<>]+)</text>", svg) == ["−50 %", "none", "+50 %"]
     assert "arrow" not in svg
-    beyond = interval_plot(-15.0, (-400.0, 10.0), ("a", "0", "b"), 100.0)
+    beyond = interval_plot((-15.0, -400.0, 10.0), 100.0, " %")
     assert beyond.count("arrow") == 1
-    unknown = interval_plot(math.nan, (math.nan, math.nan), ("a", "0", "b"), 100.0)
+    unknown = interval_plot((math.nan,) * 3, 100.0, " %")
     assert "range" not in unknown
     assert "nan" not in unknown
-    assert "<script>" not in interval_plot(0.0, (0.0, 0.0), ("<script>",) * 3, 1.0)
+    assert "<script>" not in interval_plot((0.0, 0.0, 0.0), 1.0, "<script>", words="<script>")
 
 
 def test_the_axis_holds_what_is_drawn() -> None:

@@ -8,18 +8,16 @@ import pytest
 from rigidimeter.analysis.estimation.closedloop.observation import observe_periods
 from rigidimeter.analysis.estimation.closedloop.periodic_response import impedance as without_model
 from rigidimeter.analysis.estimation.prepared import prepare
-from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.sections import impedance as impedance_section
-from rigidimeter.analysis.report.sections import unexplained_torque
-from rigidimeter.analysis.report.sections.impedance import (
+from rigidimeter.analysis.report import SECTIONS, Figure
+from rigidimeter.analysis.report.curves import (
     COHERENT,
-    impedance,
+    draw_impedance,
+    draw_unexplained,
     model_nm_rad,
 )
-from rigidimeter.analysis.report.sections.unexplained_torque import voluntary_spectrum
-from rigidimeter.analysis.report.style import condition_colours, svg_text
+from rigidimeter.analysis.report.style import condition_colours, drawn, svg_text
 from rigidimeter.analysis.study import StudyResult
-from rigidimeter.analysis.study.drawn_signals import Response
+from rigidimeter.analysis.study.drawn_signals import Response, Spectrum
 from rigidimeter.analysis.study.examples import analysed_epoch
 from rigidimeter.analysis.study.over_frequency import same_lines
 from rigidimeter.core.records import Channel, Delay, Outcome
@@ -29,14 +27,17 @@ from rigidimeter.model import JointDynamics
 from .conftest import OFF, periodic_epoch
 
 
+def figures(result: StudyResult, name: str) -> list[Figure]:
+    (section,) = [section for section in SECTIONS if section.name == name]
+    return [block for block in section.blocks(result) if isinstance(block, Figure)]
+
+
 def impedance_figures(result: StudyResult) -> list[Figure]:
-    blocks = impedance_section.SECTION.blocks(result)
-    return [block for block in blocks if isinstance(block, Figure)]
+    return figures(result, "impedance")
 
 
 def voluntary_figures(result: StudyResult) -> list[Figure]:
-    blocks = unexplained_torque.SECTION.blocks(result)
-    return [block for block in blocks if isinstance(block, Figure)]
+    return figures(result, "voluntary")
 
 
 @pytest.fixture(scope="module")
@@ -100,13 +101,21 @@ def responses() -> dict[str, Response]:
     }
 
 
-JOINTS = {"OFF": OFF, "DBS": None}
+JOINTS = {"OFF": OFF}
+
+
+def impedance(measured: dict[str, Response], joints: dict[str, JointDynamics]):
+    return drawn((7.4, 6.4), draw_impedance, measured, condition_colours(measured), joints, rows=3)
+
+
+def unexplained(name: str, *densities: np.ndarray):
+    grid = np.linspace(0, 12, 61)
+    spectra = [Spectrum(name, grid, density, 0.1, (0.15, 10.0)) for density in densities]
+    return drawn((7.4, 3.0), draw_unexplained, spectra, {name: "red"}, {name: name}, (0.15, 10.0))
 
 
 def test_every_point_is_drawn_and_those_without_coherence_are_hollow() -> None:
-    magnitude, phase, coherence = impedance(
-        responses(), condition_colours(["OFF", "DBS"]), JOINTS
-    ).axes
+    magnitude, phase, coherence = impedance(responses(), JOINTS).axes
     expected = responses()["OFF"]
     sure, unsure = magnitude.lines[:2]
     np.testing.assert_allclose(
@@ -138,11 +147,7 @@ def test_the_figure_is_made_of_epochs_that_repeat(
 
 
 def test_each_epoch_is_a_line_of_the_spectrum_and_the_mean_is_thick() -> None:
-    grid = np.linspace(0, 12, 61)
-    spectra = [(grid, np.full(61, 1e-3)), (grid, np.full(61, 3e-3))]
-    (axes,) = voluntary_spectrum(
-        {"OFF": spectra}, {"OFF": "black"}, {"OFF": "OFF"}, (0.15, 10.0)
-    ).axes
+    (axes,) = unexplained("OFF", np.full(61, 1e-3), np.full(61, 3e-3)).axes
     one, two, mean = axes.lines
     np.testing.assert_allclose(mean.get_ydata(), 2e-3)
     assert mean.get_linewidth() > 2 * max(one.get_linewidth(), two.get_linewidth())
@@ -151,11 +156,9 @@ def test_each_epoch_is_a_line_of_the_spectrum_and_the_mean_is_thick() -> None:
 
 @pytest.mark.parametrize("name", ["_x", "$1^_$", "多巴胺", "<b>"])
 def test_any_condition_is_in_the_legends(name: str) -> None:
-    grid = np.linspace(0, 12, 61)
-    colours = {name: "red"}
     # A joint that explains all of the torque leaves nothing to draw but the foot of the axes.
-    below = voluntary_spectrum({name: [(grid, np.zeros(61))]}, colours, {name: name}, (0.15, 10.0))
-    over = impedance({name: responses()["OFF"]}, colours, {name: OFF})
+    below = unexplained(name, np.zeros(61))
+    over = impedance({name: responses()["OFF"]}, {name: OFF})
     for figure, entries in ((below, 1), (over, 2)):
         svg_text(figure)
         legend = figure.axes[0].get_legend() or figure.legends[0]
@@ -163,7 +166,7 @@ def test_any_condition_is_in_the_legends(name: str) -> None:
 
 
 def test_the_plateau_can_be_read_off() -> None:
-    figure = impedance(responses(), condition_colours(["OFF", "DBS"]), JOINTS)
+    figure = impedance(responses(), JOINTS)
     svg_text(figure)
     axes = figure.axes[0]
     low, high = axes.get_ylim()

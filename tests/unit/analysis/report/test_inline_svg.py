@@ -10,7 +10,8 @@ from markupsafe import escape
 
 from rigidimeter.analysis.report.epoch_traces import page_traces, traces_json
 from rigidimeter.analysis.report.inline_svg import inline_svg
-from rigidimeter.analysis.report.sections.distribution import distribution
+from rigidimeter.analysis.report.points import draw_distribution
+from rigidimeter.analysis.report.style import drawn as figure_of
 from rigidimeter.analysis.report.style import svg_text
 from rigidimeter.analysis.study import StudyResult
 from rigidimeter.analysis.study.drawing import MOST_POINTS, POINTS_PER_CYCLE, packed, thinned
@@ -21,7 +22,7 @@ NAME = '<b> 0.12345 #0072b2 id="x"'
 def drawn(
     values: list[float], marks: list[tuple[str, str]], places: dict[tuple[str, str], int]
 ) -> str:
-    figure = distribution("y (1)", {NAME: values}, {NAME: "#0072B2"})
+    figure = figure_of((3.0, 3.0), draw_distribution, "y (1)", {NAME: values}, {NAME: "#0072B2"})
     return inline_svg(svg_text(figure), "a/b", 'A "drawing"', {"epochs-0": marks}, places)
 
 

@@ -1,6 +1,5 @@
 """`report` takes a result, estimates, a recording or its path, and gives one page."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,12 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rigidimeter.analysis.reading import Recording, read
+from rigidimeter.analysis.reading import read
 from rigidimeter.analysis.report import report
-from rigidimeter.analysis.study import StudyResult, analysis_warnings, compare, recording_result
+from rigidimeter.analysis.study import StudyResult, compare
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.records import Epoch, Notice
-from rigidimeter.core.settings import Settings
+from rigidimeter.core.records import Epoch
 
 
 @pytest.fixture(scope="module")
@@ -57,15 +55,6 @@ def test_a_folder_that_cannot_be_written_says_so(study: StudyResult, tmp_path: P
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match="the report cannot be written"):
         report(study.analysis, tmp_path / "file")
-
-
-def test_what_the_terminal_warns_of_is_among_the_notices(make_analysis) -> None:
-    analysis = make_analysis({"OFF": 3})
-    turned = replace(analysis.fits[0], value=-analysis.fits[0].value)
-    analysis = replace(analysis, fits=(turned, *analysis.fits[1:]))
-    (warning,) = analysis_warnings(analysis)
-    read = Recording((), (Notice("warning", "a gap"),), Settings(), ())
-    assert recording_result(read, analysis).notices == (*read.notices, warning)
 
 
 def test_a_path_that_does_not_exist_says_so(tmp_path: Path) -> None:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.report.open_loop import bode
+from rigidimeter.analysis.report.design_folder import draw_bode
+from rigidimeter.analysis.report.style import drawn as figure_of
 from rigidimeter.analysis.report.style import svg_text
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.model import Loop, loop_stability
@@ -11,7 +12,8 @@ from rigidimeter.model import Loop, loop_stability
 
 def drawn(settings: Settings):
     found = loop_stability(settings)
-    return found, bode(settings, found.conditions, found.worst)
+    shown = settings, found.conditions, found.worst
+    return found, figure_of((7.4, 5.4), draw_bode, *shown, rows=2, sharex=True)
 
 
 def test_the_curves_are_those_of_the_open_loop() -> None:

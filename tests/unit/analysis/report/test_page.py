@@ -128,7 +128,6 @@ def test_every_figure_of_the_page_lies_beside_it(written: Path, page: Page) -> N
         "distribution_impulse_nm_s",
         "distribution_work_j",
         "perturbation",
-        "perturbation_spectrum",
         "voluntary_spectrum",
         "band_sensitivity",
         "torque_1_off",

@@ -5,38 +5,38 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from tests.unit.analysis.report.cohorts import Design, made_study, ratings_found
 
-from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.sections import (
-    day_points,
-    forest,
-    method_sensitivity,
-    rating_points,
+from rigidimeter.analysis.report import SECTIONS
+from rigidimeter.analysis.report import Figure as PageFigure
+from rigidimeter.analysis.report.interval_rows import draw_effects, draw_methods
+from rigidimeter.analysis.report.points import day_rows, draw_days, draw_ratings
+from rigidimeter.analysis.report.style import condition_colours, condition_markers, drawn, svg_text
+from rigidimeter.analysis.study import (
+    Comparison,
+    DayMedian,
+    Measure,
+    Observation,
+    SensitivityRow,
+    StudyResult,
 )
-from rigidimeter.analysis.report.sections.day_points import Day, days
-from rigidimeter.analysis.report.style import condition_colours, condition_markers, svg_text
-from rigidimeter.analysis.study import DayMedian, Measure, SensitivityRow, StudyResult
 
 NAMES = ("OFF", "DBS")
 COLOURS, MARKERS = condition_colours(NAMES), condition_markers(NAMES)
 SMALL = Design(days=(3, 2), epochs=(4, 4), scores=(3, 3))
 
 
-SECTIONS = (
-    forest.SECTION,
-    day_points.SECTION,
-    rating_points.SECTION,
-    method_sensitivity.SECTION,
-)
+SHOWN = ("effects", "days", "ratings", "sensitivity")
 
 
-def figures(result: StudyResult) -> list[Figure]:
+def figures(result: StudyResult) -> list[PageFigure]:
     return [
         block
         for section in SECTIONS
+        if section.name in SHOWN
         for block in section.blocks(result)
-        if isinstance(block, Figure)
+        if isinstance(block, PageFigure)
     ]
 
 
@@ -55,55 +55,67 @@ def test_conditions_differ_in_colour_and_in_shape() -> None:
     assert len(set(COLOURS.values())) == len(set(MARKERS.values())) == 2
 
 
-def strip(day: str, condition: str, *values: float, subject: str = "M") -> Day:
-    q1, median, q3 = np.quantile(values, [0.25, 0.5, 0.75])
-    return Day(DayMedian(subject, day, condition, len(values), median, q1, q3), values)
+def strip(day: str, condition: str, *values: float, subject: str = "M") -> list[Observation]:
+    return [Observation(value, condition, subject, day) for value in values]
+
+
+def days(*strips: list[Observation]) -> Figure:
+    """Draw what was measured on these days."""
+    medians = [
+        DayMedian(own[0].subject, own[0].day, own[0].condition, len(own), q2, q1, q3)
+        for own in strips
+        for q1, q2, q3 in [np.quantile([o.value for o in own], [0.25, 0.5, 0.75])]
+    ]
+    every = tuple(o for own in strips for o in own)
+    measure = Measure("b", "B", "N·m·s/rad", "fits")
+    c = Comparison(measure, *NAMES, every, {}, {}, day_medians=tuple(medians))
+    return drawn((7.4, 2.5), draw_days, c, NAMES, rows=len(day_rows(c)))
 
 
 def test_every_epoch_and_every_median_of_a_day_is_drawn() -> None:
-    figure = days(
-        "B (N·m·s/rad)",
-        [strip("1", "OFF", 1.0, 2.0, 4.0), strip("2", "DBS", 3.0), strip("3", "OFF", 5.0, 6.0)],
-        NAMES,
-    )
-    (axes,) = figure.axes
+    (axes,) = days(
+        strip("1", "OFF", 1.0, 2.0, 4.0), strip("2", "DBS", 3.0), strip("3", "OFF", 5.0, 6.0)
+    ).axes
     assert sorted(points(axes, MARKERS["OFF"])) == [1.0, 2.0, 2.0, 4.0, 5.0, 5.5, 6.0]
     assert sorted(points(axes, MARKERS["DBS"])) == [3.0, 3.0]
     assert [text.get_text() for text in axes.get_xticklabels()] == ["1", "2", "3"]
+    assert axes.get_ylabel() == "B\n(N·m·s/rad)"
     low, high = axes.get_ylim()
     assert low < 1.0
     assert high > 6.0
 
 
 def test_the_same_days_give_the_same_text() -> None:
-    one, two = (svg_text(days("B", [strip("1", "OFF", 1.0, 2.0)], NAMES)) for _ in range(2))
+    one, two = (svg_text(days(strip("1", "OFF", 1.0, 2.0))) for _ in range(2))
     assert one == two
 
 
 def test_both_conditions_of_one_day_share_its_place_side_by_side() -> None:
-    figure = days("B", [strip("1", "OFF", 1.0), strip("1", "DBS", 2.0)], NAMES)
-    (axes,) = figure.axes
+    (axes,) = days(strip("1", "OFF", 1.0), strip("1", "DBS", 2.0)).axes
     assert [text.get_text() for text in axes.get_xticklabels()] == ["1"]
     off, dbs = (
         [x for line in axes.lines if line.get_marker() == MARKERS[n] for x in line.get_xdata()]
         for n in NAMES
     )
     assert max(off) < min(dbs)
+    (joined,) = [line for line in axes.lines if line.get_marker() == "None"]
+    assert list(joined.get_ydata()) == [1.0, 2.0]
 
 
 def test_subjects_stand_apart_and_many_days_go_on_in_another_row() -> None:
     strips = [strip(str(k), "OFF", float(k), subject=s) for s in ("M", "N") for k in range(20)]
-    figure = days("B", strips, NAMES)
+    figure = days(*strips)
     assert len(figure.axes) == 2
     assert [axes.texts[0].get_text() for axes in figure.axes] == ["M", "N"]
-    long = days("B", [strip(str(k), "OFF", 1.0) for k in range(60)], NAMES)
+    long = days(*(strip(str(k), "OFF", 1.0) for k in range(60)))
     assert sum(len(axes.get_xticks()) for axes in long.axes) == 60
 
 
 def test_a_forest_has_a_row_for_each_effect_in_their_order(study: StudyResult) -> None:
     found = [(c, c.effects) for c in study.comparisons[:2] if c.effects is not None]
     turned = dataclasses.replace(found[1][1], r=-0.9, r_low=-0.95, r_high=float("nan"))
-    (axes,) = forest.forest([found[0], (found[1][0], turned)], "r").axes
+    shown = [found[0], (found[1][0], turned)]
+    (axes,) = drawn((7.4, 2.0), draw_effects, shown, "r").axes
     assert points(axes, "s") == [0, 1]
     labels = [text.get_text() for text in axes.get_yticklabels()]
     test = found[0][1].test
@@ -127,9 +139,14 @@ def test_equal_ratings_are_drawn_side_by_side_and_the_means_are_those_of_the_mod
         )
     )
     found = ratings_found(rows, NAMES)
-    raw, corrected = rating_points.ratings(found, NAMES).axes
-    across = [x for line in raw.lines if len(line.get_xdata()) == 3 for x in line.get_xdata()]
-    assert len(set(across)) == 3
+    raw, corrected = drawn((7.4, 3.3), draw_ratings, found, NAMES, columns=2).axes
+    equal = [
+        x
+        for line in raw.lines
+        for x, y in line.get_xydata()
+        if y == 2.0 and len(line.get_xdata()) == 3
+    ]
+    assert len(set(equal)) == 3
     assert points(corrected, "_") == [mean.mean for mean in found.means]
 
 
@@ -143,7 +160,7 @@ def test_sensitivity_keeps_methods_together_and_marks_the_chosen_one() -> None:
             ("published", "fixed", 0.25, 0.1, 0.4, False),
         )
     ]
-    (axes,) = method_sensitivity.sensitivity(rows, "Shift").axes
+    (axes,) = drawn((7.4, 2.0), draw_methods, rows, "Shift").axes
     assert axes.get_title(loc="left") == "B (N)"
     labels = [text.get_text() for text in axes.get_yticklabels()]
     assert labels == ["published, J fixed", "published, J free", "iv, J fixed"]
@@ -157,20 +174,20 @@ def test_sensitivity_keeps_methods_together_and_marks_the_chosen_one() -> None:
 def test_figures_of_a_study(study: StudyResult) -> None:
     shown = figures(study)
     assert [figure.name for figure in shown] == [
-        "effects",
         "days_stiffness_nm_rad",
         "days_damping_nm_s_rad",
         "days_inertia_kg_m2",
         "days_impulse_nm_s",
         "days_work_j",
-        "ratings",
         "sensitivity",
+        "effects",
+        "ratings",
     ]
     for figure in shown:
         ET.fromstring(svg_text(figure.draw()))
         assert figure.alt
         assert figure.caption
-    assert "17 included epochs of 5 days" in shown[1].caption
+    assert "17 included epochs of 5 days" in shown[0].caption
 
 
 def test_nothing_is_drawn_of_what_is_not_there(study: StudyResult) -> None:

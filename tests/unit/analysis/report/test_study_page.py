@@ -38,9 +38,9 @@ def test_ratings_are_compared_by_their_own_model(study: StudyResult, page: Parse
     assert found is not None
     assert found.contrast_days is not None
     (row,) = (r for r in page.table("OFF against DBS: days") if r[0].startswith("Examiners"))
-    assert row[1].startswith(number(found.contrast_days.estimate))
+    assert row[1].startswith(number(-found.contrast_days.estimate))  # OFF − DBS
     assert row[5].startswith(p_value(found.contrast_days.p_kenward_roger))
-    contrast = page.table("Contrast of the ratings, OFF − DBS")
+    contrast = page.table("Contrast of the ratings, DBS − OFF")
     assert [row[-1] for row in contrast[1:]] == [
         p_value(found.contrast.p_residual),
         p_value(found.contrast.p_satterthwaite),

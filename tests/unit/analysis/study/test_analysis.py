@@ -7,7 +7,6 @@ import pytest
 
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.analysis.study import (
-    analysis_warnings,
     compare,
     compare_analysis,
     conditions,
@@ -153,17 +152,16 @@ def test_one_condition_gives_its_summary():
     assert found[0].remark == "only one condition was recorded"
 
 
-def test_what_no_joint_can_be_is_doubted():
-    assert analysis_warnings(analysis([fit("OFF")])) == ()
-    (notice,) = analysis_warnings(analysis([fit("OFF", J=-0.001), fit("OFF")]))
-    assert "J is not greater than zero in 1 of 2" in notice.text
-    (notice,) = analysis_warnings(analysis([fit("OFF", J=-0.1, B=-0.1, K=-1.0)]))
-    assert "--reaction" in notice.text
-    by_noise = replace(fit("OFF", J=-0.1, B=-0.1, K=-1.0), high=np.array([0.1, 0.1, 1.0]))
-    (notice,) = analysis_warnings(analysis([by_noise]))
-    assert "--reaction" not in notice.text
-    bad = fit("OFF", J=-0.1, outcome=Outcome("excluded", "limit"))
-    assert analysis_warnings(analysis([bad])) == ()
+def test_recordings_of_another_joint_are_a_finding():
+    """J 20 % higher in one of two recordings."""
+    joints = [JointDynamics(0.0045 * factor, 0.1368, 1.751) for factor in (1.0, 1.0, 1.2, 1.2)]
+    batch = simulate_epochs(parse_settings({}), 4, joints=joints, conditions="OFF", seed=2)
+    epochs = [replace(batch.epoch(i), source=f"day{i // 2}.csv") for i in range(4)]
+    (found,) = estimate(epochs, "iv").across
+    assert (found.name, found.level) == ("inertia_of_recordings", "caution")
+    assert found.value == pytest.approx(20.0, abs=1.0)
+    assert found.headline == "J of day1.csv is 20 % above that of day0.csv"
+    assert estimate(epochs[:2], "iv").across == ()
 
 
 def test_epochs_whose_stiffness_differs_are_named_in_the_pooled_fit():
@@ -178,7 +176,3 @@ def test_epochs_whose_stiffness_differs_are_named_in_the_pooled_fit():
     assert finding.facts["high"] == pytest.approx(2.25, abs=0.05)
     # A joint is not the same twice: a number, and no warning unless the settings ask for one.
     assert finding.level == "note"
-    assert analysis_warnings(analysis) == ()
-    pooled = replace(analysis.pooled[0], findings=(replace(finding, level="caution"),))
-    (notice,) = analysis_warnings(replace(analysis, pooled=(pooled,)))
-    assert "K differs between epochs" in notice.text

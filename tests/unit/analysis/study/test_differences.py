@@ -29,7 +29,7 @@ from rigidimeter.analysis.study import (
     traffic_light,
 )
 from rigidimeter.analysis.study.comparison import day_test, no_days
-from rigidimeter.analysis.study.days_to_decide import days_to_decide
+from rigidimeter.analysis.study.conclusions import days_to_decide
 from rigidimeter.analysis.study.differences import by_units
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Epoch, Outcome
@@ -291,7 +291,9 @@ class TestTrafficLight:
 
     def test_scatter_between_epochs_is_no_caution_where_conditions_are_compared(self, study):
         finding = Finding("varying_between_epochs", "caution", 2.0, 1.0)
-        pooled = replace(study.analysis.fits[-1], condition="OFF", findings=(finding,))
+        pooled = replace(
+            study.analysis.fits[-1], epoch="pooled", condition="OFF", findings=(finding,)
+        )
         made = replace(study, analysis=replace(study.analysis, pooled=(pooled,)))
         light = traffic_light(made)
         assert (light.level, light.doubt, light.text) == ("good", "", "")

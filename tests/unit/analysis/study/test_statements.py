@@ -190,7 +190,8 @@ def test_a_clear_effect_is_shown_and_none_is_not(study: StudyResult) -> None:
         "Stiffness K was 18 % lower in DBS than in OFF (95 % interval 7 to 29 %, Welch's t-test of "
         "5 days of OFF and 4 days of DBS, p = 0.021), viscous damping B 16 % lower (95 % interval "
         "8 to 24 %, p = 0.015), angular impulse 19 % lower (95 % interval 13 to 25 %, p = 0.0014) "
-        "and work 19 % lower (95 % interval 13 to 25 %, p = 0.0014)."
+        "and work 19 % lower (95 % interval 13 to 25 %, p = 0.0014); p adjusted by Holm’s method "
+        "for 6 measures, intervals not."
     )
     assert concluded(study) == (
         "K, B, impulse and work are lower in DBS than in OFF.",
@@ -298,12 +299,12 @@ def test_reasons_that_measures_share_are_said_once(study: StudyResult) -> None:
 
 
 def test_that_few_days_show_only_large_differences_is_said_once() -> None:
+    """By Holm's method p of six is below 0.05/6 at first: tan(π/2 (1 − 0.05/6)) = 76.4."""
     few = made_study(dataclasses.replace(SMALL, days=(2, 2), both_on_a_day=True))
     (said,) = (each for each in concluded(few) if "no difference" in each.lower())
     assert said == (
-        "No difference between OFF and DBS is shown in K, B, J, impulse and work: with 1 degree of "
-        "freedom only a difference above 12.7 standard errors is shown; more days would show "
-        "smaller ones."
+        "No difference between OFF and DBS is shown in K, B, J, impulse and work: differences "
+        "below 76.4 standard errors may not show; more days show smaller ones."
     )
 
 
@@ -328,7 +329,7 @@ def test_what_was_withheld_is_not_in_the_sentence_to_quote(study: StudyResult) -
     first, second, *_ = concluded(shaken)
     assert first == "Impulse and work are lower in DBS than in OFF."
     assert second.startswith("A difference in K and B is not supported: tremor in ")
-    assert "0 of 23 epochs in OFF and 19 of 19 epochs in DBS" in second
+    assert "0 of 23 epochs in OFF, 19 of 19 in DBS" in second
 
 
 def test_one_condition_has_its_values_and_no_statements(study: StudyResult) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from rigidimeter.cli.commission import commission as command
-from rigidimeter.cli.commission import table
+from rigidimeter.cli.rig_checks import table
 from rigidimeter.cli.terminal_tables import text_lines
 from rigidimeter.core.errors import UserError
 from rigidimeter.rig.commissioning import above, below, check_record, untried
@@ -47,7 +47,7 @@ def test_a_rig_of_hardware_is_not_tried_without_a_name(tmp_path: Path) -> None:
     rig = tmp_path / "RIG.toml"
     rig.write_text(RIG.format(address="192.168.1.1", interface="socketcan"))
     with pytest.raises(UserError, match="is real hardware; name the person responsible for it"):
-        command(rig, None, " ", True, None, None, None)
+        command(rig, None, " ", True, None, None, None, None)
     assert not list(tmp_path.glob("*.json"))
 
 

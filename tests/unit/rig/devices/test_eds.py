@@ -66,7 +66,7 @@ def wrong(path, settings=None):
 def test_a_drive_with_all_objects_fits(tmp_path, capsys):
     path = eds(tmp_path, without=(0x607F, (0x1400, 5), 0x1401, 0x1803))
     assert wrong(path) == {}
-    commission(eds=path)
+    commission(None, eds=path)
     shown = capsys.readouterr().out
     assert "max profile velocity (0x607F:00)" in shown
     assert "optional" in shown
@@ -92,7 +92,7 @@ def test_what_does_not_fit_is_named(tmp_path, without, changes, label, found):
     said = wrong(eds(tmp_path, without=without, **changes))
     assert any(label in name and found in text for name, text in said.items()), said
     with pytest.raises(UserError, match=r"drive\.eds: does not fit: "):
-        commission(eds=tmp_path / "drive.eds")
+        commission(None, eds=tmp_path / "drive.eds")
 
 
 def test_a_fixed_mapping_fits_if_it_is_what_is_needed(tmp_path):
@@ -127,7 +127,7 @@ def test_a_file_that_is_no_eds_is_refused_in_one_sentence(tmp_path, text):
     path = tmp_path / "other.txt"
     path.write_text(text)
     with pytest.raises(UserError, match=r"other\.txt: (is no EDS|cannot be read as an EDS)"):
-        commission(eds=path)
+        commission(None, eds=path)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252"])
@@ -148,7 +148,7 @@ def test_an_eds_that_is_not_there_is_no_damaged_one(tmp_path):
 
 def test_a_rig_file_or_an_eds_is_needed():
     with pytest.raises(UserError, match=r"--rig RIG\.toml, or a drive's EDS with --eds FILE"):
-        commission()
+        commission(None, eds=None)
 
 
 class Drive:

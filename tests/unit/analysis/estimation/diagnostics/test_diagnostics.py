@@ -84,13 +84,13 @@ def test_sizes_that_no_joint_has_are_told(parameters, size, side, factor):
 
 LOUD = Kind(
     "loud",
-    "N·m",
-    "exclude",
     "peak",
     "Peak {value:.1f} N·m",
     "A peak.",
     "That is much.",
     "Push less.",
+    "N·m",
+    "exclude",
 )
 
 

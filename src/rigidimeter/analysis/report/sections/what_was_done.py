@@ -1,23 +1,49 @@
-"""How the study was made: what was measured, epochs, settings, and where the files come from."""
+"""What was done: what was measured, how, and with which perturbation."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 from pydantic import BaseModel
 
-from rigidimeter.analysis.report.contents import Block, Section, paragraph
-from rigidimeter.analysis.study import StudyResult, result_table
+from rigidimeter.analysis.report.contents import (
+    Block,
+    Figure,
+    Section,
+    from_result,
+    from_study_folder,
+    named,
+    paragraph,
+    part,
+)
+from rigidimeter.analysis.report.curves import (
+    EXCITATION_HEIGHTS,
+    EXCITATION_SIZE,
+    draw_excitation,
+    origin_s,
+)
+from rigidimeter.analysis.report.methods_prose import methods_prose
+from rigidimeter.analysis.report.style import drawn
+from rigidimeter.analysis.study import StudyResult
 from rigidimeter.analysis.study.drawing import channel_facts
 from rigidimeter.analysis.study.drawn_signals import ChannelFacts
+from rigidimeter.analysis.study.examples import perturbed_epoch
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.units import rad_from_deg
-from rigidimeter.core.words import SESSION, Column, Table, number, plural
+from rigidimeter.core.words import (
+    SESSION,
+    Column,
+    Table,
+    condition_name,
+    number,
+    plural,
+)
 
 _TASKS = {"prbs": "torque perturbation", "sinusoid": "imposed sinusoid", None: "not stated"}
 
@@ -28,6 +54,22 @@ _OF_THE_RIG = ("Controller", "PRBS", "Sinusoid", "Limits")
 def longest_s(channels: Iterable[ChannelFacts]) -> float:
     """Return how long the longest channel of an epoch lasts; NaN without samples."""
     return max((c.span_s for c in channels if math.isfinite(c.span_s)), default=math.nan)
+
+
+def _methods(result: StudyResult) -> Iterator[Block]:
+    prose = methods_prose(result)
+    yield paragraph(
+        Markup(
+            "Made from the recordings, settings and tests of this study; also in "
+            "<code>methods.txt</code>. One click selects all of it."
+        ),
+        "remark",
+    )
+    lines = [paragraph(text) for text in prose.paragraphs]
+    if prose.references:
+        lines.append(paragraph("References"))
+        lines += [Markup('<p class="reference">{}</p>').format(r) for r in prose.references]
+    yield Markup('<div class="copy">\n{}\n</div>').format(Markup("\n").join(lines))
 
 
 def _about(result: StudyResult) -> Iterator[Block]:
@@ -57,19 +99,14 @@ def _about(result: StudyResult) -> Iterator[Block]:
 
 def _design(result: StudyResult) -> Iterator[Block]:
     if result.sessions:
-        yield Table(
+        coded = any(s.code != s.condition for s in result.sessions)
+        yield from_result(
+            result,
             "sessions",
             "Sessions, in the order of the study’s table",
-            (
-                *SESSION,
-                *(
-                    [Column("code", "Code", "label")]
-                    if any(s.code != s.condition for s in result.sessions)
-                    else []
-                ),
-                Column("path", "Path", "text"),
-            ),
-            result_table(result, "sessions"),
+            *SESSION,
+            *([Column("code", "Code", "label")] if coded else []),
+            Column("path", "Path", "text"),
             folding=True,
         )
     elif result.epochs:
@@ -210,27 +247,34 @@ def _flat(prefix: str, value: object, unit: str = "") -> Iterator[dict[str, str]
         yield {"key": prefix, "value": text, "unit": unit}
 
 
-def _notices(result: StudyResult) -> Iterator[Block]:
-    yield Table(
-        "notices",
-        "Messages while reading and analysing",
-        (Column("level", "Level", "outcome"), Column("text", "Message", "reason")),
-        [{"level": notice.level, "text": notice.text} for notice in result.notices],
-        empty="None.",
+def _perturbation(result: StudyResult) -> Iterator[Block]:
+    epoch = perturbed_epoch(result)
+    if epoch is None:
+        return
+    channel = epoch.channels["perturbation_nm"]
+    prbs = result.settings.prbs
+    low, high = epoch.excitation_hz or (prbs.wanted_low_hz, prbs.wanted_high_hz)
+    whose = f"of {named(result, epoch)} ({condition_name(epoch.condition)})"
+    size_nm = float(np.max(np.abs(channel.values)))
+    shown = channel, origin_s(epoch), (low, high)
+    heights = EXCITATION_HEIGHTS
+    yield Figure(
+        "perturbation",
+        f"The commanded torque perturbation {whose}, and its power spectral density "
+        "(Hann-windowed periodogram of the complete perturbation), with the intended band of "
+        f"{low:g} to {high:g} Hz.",
+        f"Torque perturbation {whose}: it switches between levels up to {number(size_nm)} N·m "
+        f"for {number(channel.time_s[-1] - channel.time_s[0])} s. Below, its power spectral "
+        f"density, with the intended band, {low:g} to {high:g} Hz, marked.",
+        partial(drawn, EXCITATION_SIZE, draw_excitation, *shown, rows=3, height_ratios=heights),
     )
 
 
-def _provenance(result: StudyResult) -> Iterator[Block]:
-    yield Table(
-        "provenance",
-        "Software, settings and files",
-        (Column("key", "What", "text"), Column("value", "Value", "reason")),
-        [{"key": key, "value": value} for key, value in result.provenance.items()],
-        empty="Not recorded.",
-    )
-
-
-ABOUT = Section("about", "What this is", _about)
-DESIGN = Section("design", "Study design", _design)
-NOTICES = Section("notices", "Notices", _notices)
-PROVENANCE = Section("provenance", "Provenance", _provenance)
+SECTIONS = part(
+    "What was done",
+    Section("methods", "Methods, for a paper", _methods, from_study_folder),
+    Section("about", "What this is", _about),
+    Section("design", "Study design", _design),
+    Section("perturbation", "Perturbation", _perturbation),
+    printed=1,
+)

@@ -1,19 +1,19 @@
-"""What was estimated: the method, delays, each epoch, and all epochs of a condition together."""
+"""Every epoch: what was estimated, what was scored, and what was recorded."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from markupsafe import Markup
 
-from rigidimeter.analysis.report.contents import Block, Section, paragraph
-from rigidimeter.analysis.report.method_words import interval_basis, method_title
-from rigidimeter.analysis.report.sections.recordings import longest_s
-from rigidimeter.analysis.study import StudyResult, result_table, split_pooled
+from rigidimeter.analysis.report.contents import Block, Section, from_result, paragraph, part
+from rigidimeter.analysis.report.methods_prose import method_of
+from rigidimeter.analysis.report.sections.what_was_done import longest_s
+from rigidimeter.analysis.study import StudyResult, split_pooled
 from rigidimeter.analysis.study.drawing import channel_facts
-from rigidimeter.core.records import PARAMETER_VECTORS, PARAMETERS, Delay, Fit
+from rigidimeter.core.records import PARAMETER_VECTORS, PARAMETERS, Fit
 from rigidimeter.core.words import INTERVAL, Column, Table, number
 
 ALL_CONDITIONS = "(all)"
@@ -86,52 +86,6 @@ def _pooled_row(fit: Fit) -> dict[str, Any]:
     )
 
 
-def _estimation(result: StudyResult) -> Iterator[Block]:
-    analysis = result.analysis
-    chosen = (
-        f"Chosen automatically: {analysis.method_reason}."
-        if analysis.method_reason
-        else "It was requested by name."
-    )
-    yield paragraph(
-        Markup("Method: <strong>{}</strong> ({}). {}").format(
-            analysis.method, method_title(analysis.method), chosen
-        )
-    )
-    yield Table(
-        "delays",
-        "Delay of the torque relative to the motion",
-        (
-            WHO[0],
-            Column("delay_s", "Torque late by (ms)", page_factor=1e3),
-            Column("delay_s_se", "SE (ms)", page_factor=1e3),
-            Column("corrected", "Corrected", "label"),
-            Column("done", "What was done", "reason"),
-        ),
-        [
-            {
-                "source": d.source,
-                "delay_s": d.delay_s,
-                "delay_s_se": d.delay_s_se,
-                "corrected": d.corrected,
-                "done": _done(d),
-            }
-            for d in analysis.delays
-        ],
-        note="A delay is positive where the time stamps of the torque are later than the motion "
-        "that they belong to. SE is its standard error.",
-        empty="The delay between torque and motion was not estimated.",
-    )
-
-
-def _done(delay: Delay) -> str:
-    if not delay.corrected:
-        return delay.remark
-    way = "earlier" if delay.delay_s > 0 else "later"
-    moved = f"the torque was moved {way} by this delay before anything was fitted or scored"
-    return f"{moved}; {delay.remark}" if delay.remark else moved
-
-
 def _epochs(result: StudyResult) -> Iterator[Block]:
     analysis = result.analysis
     yield paragraph(
@@ -140,55 +94,46 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
             "not include the error of the median J. The files also have standard errors and, in "
             "columns that end with <code>_bound</code>, the smallest standard error that an "
             "unbiased estimate from the same excitation and noise could have (Cramér–Rao)."
-        ).format(interval_basis(analysis.method))
+        ).format(method_of(analysis.method).intervals_text)
     )
     band, in_which = _band(analysis.fits)
-    found: tuple[Column, ...] = ()
-    cautions: tuple[Column, ...] = ()
-    if any(fit.findings for fit in analysis.fits):
-        found = (Column("n_findings", "Findings", "count"),)
-    if any(fit.cautions for fit in analysis.fits):
-        cautions = (Column("cautions", "Caution", "reason"),)
-    estimates = result_table(result, "estimates")
-    yield Table(
+    found = any(fit.findings for fit in analysis.fits)
+    counts = [Column("n_findings", "Findings", "count")] if found else []
+    cautions = Column("cautions", "Caution", "reason")
+    yield from_result(
+        result,
         "estimates",
         f"Inertia, damping and stiffness, epoch by epoch{in_which}",
-        (*WHO, *HOW, *_parameters(), *_quality(), *band, *found, *cautions),
-        estimates,
+        *(*WHO, *HOW, *_parameters(), *_quality(), *band, *counts, cautions),
         empty="No epoch was fitted.",
         folding=True,
     )
     prefix = "fixed_inertia_"
-    held = f"{number(analysis.inertia_kg_m2)} kg·m²"
-    if result.several_subjects:
-        held = "of the subject"
-    yield Table(
+    several, value = result.several_subjects, number(analysis.inertia_kg_m2)
+    held = "of the subject" if several else f"{value} kg·m²"
+    yield from_result(
+        result,
         "estimates",
         f"Damping and stiffness with the inertia fixed at its median ({held}), epoch by epoch",
-        (
-            *WHO,
-            Column(f"{prefix}outcome", "Outcome", "outcome"),
-            Column(f"{prefix}reason", "Reason", "reason"),
-            *_parameters(prefix),
-            *_quality(prefix),
-            *cautions,
-        ),
-        estimates,
+        *WHO,
+        Column(f"{prefix}outcome", "Outcome", "outcome"),
+        Column(f"{prefix}reason", "Reason", "reason"),
+        *_parameters(prefix),
+        *_quality(prefix),
+        cautions,
         empty="No epoch was fitted with the inertia fixed.",
         folding=True,
     )
-    yield Table(
+    yield from_result(
+        result,
         "scores",
         "Scores of the epochs with an imposed sinusoid",
-        (
-            *WHO,
-            *HOW,
-            Column("impulse_nm_s", "Angular impulse per cycle (N·m·s)"),
-            Column("work_j", "Work per cycle (J)"),
-            Column("n_cycles", "Cycles", "count"),
-            Column("frequency_hz", "Frequency (Hz)"),
-        ),
-        result_table(result, "scores"),
+        *WHO,
+        *HOW,
+        Column("impulse_nm_s", "Angular impulse per cycle (N·m·s)"),
+        Column("work_j", "Work per cycle (J)"),
+        Column("n_cycles", "Cycles", "count"),
+        Column("frequency_hz", "Frequency (Hz)"),
         empty="No epoch was scored.",
         folding=True,
     )
@@ -210,7 +155,7 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
     )
 
 
-def _recorded(result: StudyResult) -> list[Mapping[str, Any]]:
+def _recorded(result: StudyResult) -> list[dict[str, Any]]:
     return [
         {
             "source": epoch.source,
@@ -227,5 +172,4 @@ def _recorded(result: StudyResult) -> list[Mapping[str, Any]]:
     ]
 
 
-ESTIMATION = Section("estimation", "Estimation", _estimation)
-EPOCHS = Section("tables", "Epoch by epoch", _epochs)
+SECTIONS = part("Tables", Section("tables", "Epoch by epoch", _epochs))

@@ -1,0 +1,204 @@
+"""The methods of a study as paragraphs for a paper, made from the facts of this study alone.
+
+The words are in ``methods.txt``, a template. What the recordings and settings do not say is left
+out: controller, perturbation and limits where an epoch was not recorded by this program's own loop,
+and tests that were not made.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from importlib import resources
+from typing import Any
+
+import jinja2
+import numpy as np
+
+from rigidimeter.analysis.estimation import METHODS, Method
+from rigidimeter.analysis.report.references import Cited, Prose
+from rigidimeter.analysis.study import RATING, Condition, StudyResult
+from rigidimeter.analysis.study.drawing import channel_facts
+from rigidimeter.core.records import WEIGHT_IN_STIFFNESS, Epoch, Fit
+from rigidimeter.core.version import __version__
+from rigidimeter.core.words import condition_name, number, plural, series
+
+_WORDS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
+
+OFFSETS = {"condition in day": "condition within a day", "subject/day": "day within a subject"}
+"""How sentences call what has an offset of its own in a mixed model, where not by its name."""
+
+_STIMULATION = {
+    "title": "{title}",
+    "frequency_hz": "{frequency_hz:g} Hz",
+    "amplitude": "{amplitude:g} {amplitude_unit}",
+    "pulse_width_us": "pulse width {pulse_width_us:g} µs",
+    "electrodes": "electrodes {electrodes}",
+    "wash_in_min": "wash-in {wash_in_min:g} min",
+}
+_BY = {
+    "protocol": "that did not end with success",
+    "check": "rejected by a check",
+    "estimate": "without a valid estimate",
+    "operator": "excluded by the operator",
+}
+
+
+def methods_prose(result: StudyResult) -> Prose:
+    """Return the paragraphs of methods with their references."""
+    cite = Cited()
+    text = _template().render(_facts(result), result=result, cite=cite)
+    paragraphs = (re.sub(r" *\n *", " ", each).strip() for each in re.split(r"\n{2,}", text))
+    return Prose(tuple(each for each in paragraphs if each), tuple(cite.found.values()))
+
+
+@functools.cache
+def _template() -> jinja2.Template:
+    environment = jinja2.Environment(
+        autoescape=False,  # plain text, which the page escapes
+        undefined=jinja2.StrictUndefined,
+        finalize=lambda value: value.replace("\n", " ") if isinstance(value, str) else value,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.globals |= {
+        "counted": lambda n, noun: plural(n, noun).replace(str(n), _word(n), 1),
+        "g": lambda value, digits=6: f"{value:.{digits}g}",
+        "name": condition_name,
+        "number": number,
+        "own": _own,
+        "plural": plural,
+        "version": __version__,
+        "weight": WEIGHT_IN_STIFFNESS,
+        "were": lambda n: "was" if n == 1 else "were",
+    }
+    place = resources.files("rigidimeter.analysis.report") / "methods.txt"
+    return environment.from_string(place.read_text(encoding="utf-8"))
+
+
+def _word(count: int) -> str:
+    return _WORDS[count] if count < len(_WORDS) else str(count)
+
+
+def _facts(result: StudyResult) -> dict[str, Any]:
+    """Return what the template names, besides the result."""
+    analysis, settings, found = result.analysis, result.settings, result.ratings
+    scored = {(score.source, score.epoch) for score in analysis.scores}
+    days = {(s.subject, s.day) for s in result.sessions}
+    tested = [c.days for c in result.comparisons if c.days and not math.isnan(c.days.p)]
+    day_tests = day_tests_in_words(result)
+    out = {(e.source, e.epoch): e.by for e in result.exclusions}
+    counts = Counter[str](out.values())
+    held = ""
+    if result.several_subjects:
+        held = "of the same subject in all conditions"
+    elif math.isfinite(analysis.inertia_kg_m2):
+        held = f"of all conditions ({number(analysis.inertia_kg_m2)} kg·m²)"
+    fit = None if found is None else found.fit
+    estimated = [name for name in fit.offsets if name not in fit.inseparable] if fit else []
+    methods = dict.fromkeys(row.method for row in result.sensitivity)
+    return {
+        **{name: getattr(settings, name) for name in ("controller", "guard", "prbs", "scores")},
+        "sinusoid": settings.sinusoid,
+        "analysis": analysis,
+        "subjects": len({s.subject for s in result.sessions}),
+        "days": len(days),
+        "split": _split(result, len(days)),
+        "perturbed": [e for e in result.epochs if (e.source, e.label) not in scored],
+        "imposed": [e for e in result.epochs if (e.source, e.label) in scored],
+        "conditions": [text for c in result.conditions if (text := _stimulation(c))],
+        "rates": ", ".join(_rates(result)),
+        "method": method_of(analysis.method),
+        "band": _band(analysis.fits),
+        "corrected": sum(delay.corrected for delay in analysis.delays),
+        "held": held,
+        "cycles": sorted({s.n_cycles for s in analysis.scores if s.outcome.included}),
+        "excluded": out,
+        "excluded_by": [f"{counts[by]} {text}" for by, text in _BY.items() if counts[by]],
+        "ratings": found,
+        "examiners": 0 if found is None else len({row.examiner for row in found.rows}),
+        "offsets": series([f"each {OFFSETS.get(name, name)}" for name in estimated]),
+        "by_epochs": any(c.test is not None for c in result.comparisons),
+        "by_days": tested,
+        "day_tests": day_tests,
+        "all_paired": all(words.startswith("paired") for words in day_tests),
+        "day_medians": any(not math.isnan(one.p_days) for one in tested),
+        "effects": [c.effects.method for c in result.comparisons if c.effects is not None],
+        "other_methods": [f"{name}, {method_of(name).title}" for name in methods],
+        "both_inertias": len({row.inertia for row in result.sensitivity}) > 1,
+        "libraries": result.provenance.get("libraries", ""),
+    }
+
+
+def _split(result: StudyResult, n_days: int) -> str:
+    """Return in brackets how many days each condition has, where there are several."""
+    by_condition = {
+        c.name: {(s.subject, s.day) for s in result.sessions if s.condition == c.name}
+        for c in result.conditions
+    }
+    each = [
+        f"{plural(len(own), 'day')} in {condition_name(name)}"
+        for name, own in by_condition.items()
+        if own
+    ]
+    both = len({(s.subject, s.day, s.condition) for s in result.sessions}) - n_days
+    if len(each) > 1 and both > 0:
+        each.append(f"{both} of them in more than one condition")
+    return f" ({', '.join(each)})" if len(each) > 1 else ""
+
+
+def _stimulation(c: Condition) -> str:
+    about = vars(c)
+    parts = [
+        text.format(**about).rstrip()
+        for name, text in _STIMULATION.items()
+        if about[name] not in ("", None)
+    ]
+    return f"{condition_name(c.name)}, {', '.join(parts)}" if parts else ""
+
+
+def _own(epochs: Sequence[Epoch]) -> bool:
+    """Return whether this program's loop recorded them, so that its settings say how."""
+    return bool(epochs) and all(e.excitation_hz is not None or e.motion is not None for e in epochs)
+
+
+def _rates(result: StudyResult) -> Iterator[str]:
+    names = {"torque_nm": "torque", "angle_rad": "angle", "velocity_rad_s": "velocity"}
+    rates: dict[str, list[str]] = {}
+    facts = [channel for channels in channel_facts(result) for channel in channels]
+    for key, name in names.items():
+        found = [c.mean_rate_hz for c in facts if c.name == key and math.isfinite(c.mean_rate_hz)]
+        if found:
+            rates.setdefault(number(float(np.median(found)), 3), []).append(name)
+    return (f"{series(group)} at {rate} samples/s" for rate, group in rates.items())
+
+
+def _band(fits: Iterable[Fit]) -> tuple[float, float] | None:
+    """Return the band of all fits, None where it differs."""
+    bands = {fit.band_hz for fit in fits if all(map(math.isfinite, fit.band_hz))}
+    return bands.pop() if len(bands) == 1 else None
+
+
+def day_tests_in_words(result: StudyResult) -> list[str]:
+    """Return the test by days of each measure; that of the ratings is told with their model."""
+    return [
+        c.days.test for c in result.comparisons if c.days and c.days.test and c.measure != RATING
+    ]
+
+
+def method_of(name: str) -> Method:
+    """Return the estimator of that name; of one that is not known here no more than its name."""
+    found = (method for method in METHODS if method.name == name)
+    unknown = Method(
+        name,
+        title=name,
+        needs=("perturbation_nm",),
+        methods_text=f"by the method “{name}”",
+        fit=METHODS[0].fit,
+        intervals_text="",
+        pooled_text="",
+    )
+    return next(found, unknown)

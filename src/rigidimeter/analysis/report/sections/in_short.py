@@ -1,0 +1,198 @@
+"""The summary below the first screen: the days, findings, subjects and conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+from markupsafe import Markup
+
+from rigidimeter.analysis.report.contents import (
+    Block,
+    Figure,
+    Section,
+    bullets,
+    from_result,
+    from_study_folder,
+    paragraph,
+    part,
+)
+from rigidimeter.analysis.report.points import day_groups, day_rows, draw_days, longest_day
+from rigidimeter.analysis.report.style import drawn
+from rigidimeter.analysis.study import StudyResult, result_table, traffic_light
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import Fit
+from rigidimeter.core.words import (
+    Column,
+    Kind,
+    Table,
+    condition_name,
+    number,
+    plural,
+    series,
+)
+
+UNFOLDING = Markup(
+    '<details class="finding">\n<summary><span class="outcome is-{level}">{level}</span> '
+    "<strong>{name}</strong> {headline}; {where}</summary>\n"
+    "<p>{details}</p>\n<p>{remedy}</p>\n</details>"
+)
+
+_STIMULATION: tuple[tuple[str, str, Kind], ...] = (
+    ("title", "Description", "text"),
+    ("frequency_hz", "Frequency (Hz)", "setting"),
+    ("amplitude", "Amplitude", "setting"),
+    ("amplitude_unit", "in", "label"),
+    ("pulse_width_us", "Pulse width (µs)", "setting"),
+    ("electrodes", "Electrodes", "text"),
+    ("wash_in_min", "Wash-in (min)", "setting"),
+)
+
+
+def _numbers(result: StudyResult) -> Iterator[Block]:
+    """Yield the numbers of the first screen as files."""
+    for name, title in (
+        ("conclusion", "What is concluded of each measure"),
+        ("precision", "Precision of each measure"),
+    ):
+        if rows := result_table(result, name):
+            yield Table(name, title, (), rows)
+    light = traffic_light(result)
+    if light is not None:
+        yield Table("quality", "Quality of the data", (), [light.row()])
+
+
+def _days(result: StudyResult) -> Iterator[Block]:
+    yield from_result(result, "days", "Medians of the days")
+    shown = sorted((c for c in result.comparisons if c.day_medians), key=lambda c: c.measure.place)
+    if not shown:
+        return
+    yield paragraph(
+        "Each small point is an included epoch. Beside the points of a day are their median and, "
+        "as a bar, their quartiles; a line joins the medians of a day that has both conditions."
+    )
+    order = [condition_name(name) for name in result.condition_names]
+    for c in shown:
+        words = "; ".join(
+            f"{m.subject} day {m.day} {condition_name(m.condition)}: median {number(m.median)}, "
+            f"n = {m.n}"
+            for m in c.day_medians
+        )
+        groups = day_groups(c)
+        count = sum(map(len, groups.values()))
+        n_days = len({(m.subject, m.day) for m in c.day_medians})
+        rows = len(day_rows(c))
+        size = 7.4, 0.35 + (2.1 + 0.5 * (longest_day(c) > 3)) * rows
+        yield Figure(
+            f"days_{c.measure.name}",
+            f"{c.measure.title}: {plural(count, 'included epoch')} of {plural(n_days, 'day')}.",
+            f"{c.measure.title} by day. {words} ({c.measure.unit}).",
+            partial(drawn, size, draw_days, c, order, rows=rows, sharey=True),
+            marks=groups,
+        )
+
+
+def _findings(result: StudyResult) -> Iterator[Block]:
+    groups, n_fitted = result.analysis.findings, len(result.analysis.fits)
+    if groups:
+        yield paragraph(
+            Markup(
+                "Every epoch was checked. <em>note</em>: the estimate is not affected. "
+                "<em>caution</em>: check the epoch. <em>exclude</em>: its numbers mean nothing. "
+                "Every finding with its value and limit is in "
+                "<code>tables/findings.csv</code>."
+            )
+        )
+    else:
+        yield paragraph("The checks found nothing." if n_fitted else "No epoch was fitted.")
+    for one, _, where in result.findings:
+        yield UNFOLDING.format(level=one.level, name=one.name, where=where, **one.words._asdict())
+    kinds = [
+        {
+            "check": one.name,
+            "level": one.level,
+            "epochs": sum(fit.epoch != "pooled" for fit in fits),
+            "fitted": n_fitted,
+            "where": where,
+            **one.words._asdict(),
+        }
+        for one, fits, where in groups
+    ]
+    yield Table("finding_kinds", "Findings by kind", (), kinds)
+    of_whom, of_finding = ("source", "epoch", "condition"), ("level", "value", "unit", "limit", "p")
+    rows = [
+        {name: getattr(fit, name) for name in of_whom}
+        | {"check": finding.name}
+        | {name: getattr(finding, name) for name in of_finding}
+        | {
+            f"effect_{name}_{of}": getattr(finding.effect, of)[i]
+            for of in finding.effect._fields
+            for i, name in enumerate("JBK")
+        }
+        | finding.words._asdict()
+        for fit, finding in _of_fits(result)
+    ]
+    yield Table("findings", "Findings, epoch by epoch", (), rows)
+
+
+def _of_fits(result: StudyResult) -> list[tuple[Fit, Finding]]:
+    """Return every finding of an epoch, and of epochs together what no epoch carries."""
+    fits, pooled = result.analysis.fits, result.analysis.pooled
+    found = [(fit, finding) for fit in fits for finding in fit.findings]
+    carried = {finding for _, finding in found}
+    together = [(fit, finding) for fit in pooled for finding in fit.findings]
+    return found + [(fit, finding) for fit, finding in together if finding not in carried]
+
+
+def _overview(result: StudyResult) -> Iterator[Block]:
+    items = Markup("\n").join(
+        Markup("<dt>{}</dt><dd>{}</dd>").format(name, value) for name, value in _facts(result)
+    )
+    yield Markup('<dl class="facts">\n{}\n</dl>').format(items)
+    rows = result_table(result, "conditions")
+    known = [row for row in _STIMULATION if any(cells[row[0]] not in (None, "") for cells in rows)]
+    yield Table(
+        "conditions",
+        "Conditions",
+        (
+            Column("name", "Condition", "condition"),
+            *(Column(*row) for row in known),
+            Column("days", "Days", "count"),
+            Column("sessions", "Sessions", "count"),
+        ),
+        rows,
+    )
+
+
+def _facts(result: StudyResult) -> Iterator[tuple[str, str]]:
+    subjects = list(dict.fromkeys(s.subject for s in result.sessions))
+    days = {(s.subject, s.day) for s in result.sessions}
+    counts = {row["name"]: row["days"] for row in result_table(result, "conditions")}
+    both = sum(counts.values()) - len(days)
+    split = series([f"{count} in {condition_name(name)}" for name, count in counts.items()])
+    named = f": {', '.join(subjects)}" if any(subjects) and len(subjects) <= 24 else ""
+    partly = ", some of it virtual" if any(e.virtual for e in result.epochs) else ""
+    blinded = "blinded: conditions are codes, and no key was given"
+    virtual = "virtual: every session was recorded on the virtual rig"
+    yield "Subjects", f"{len(subjects)}{named}"
+    yield "Days", f"{len(days)}: {split}" + (f", {both} in both" if both > 0 else "")
+    yield "Sessions", f"{len(result.sessions)}, with {plural(len(result.epochs), 'epoch')}"
+    yield "Blinding", blinded if result.blinded else "not blinded"
+    yield "Data", virtual if result.virtual else f"recorded{partly}"
+
+
+def _changes(result: StudyResult) -> Iterator[Block]:
+    yield Table("changes", "Changes", (), [{"change": text} for text in result.changes])
+    if result.changes:
+        yield bullets(result.changes)
+
+
+SECTIONS = part(
+    "Summary",
+    Section("numbers", "Numbers of the first screen", _numbers),
+    Section("days", "Day by day", _days, from_study_folder),
+    Section("findings", "Findings", _findings),
+    Section("study", "The study", _overview, from_study_folder),
+    Section("changes", "Since the last analysis", _changes, from_study_folder),
+    printed=4,
+)

@@ -1,0 +1,135 @@
+"""Does the method matter: every method, with J fixed and with J free, and other bands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+
+from rigidimeter.analysis.report.contents import (
+    Block,
+    Figure,
+    Section,
+    bullets,
+    from_result,
+    from_study_folder,
+    paragraph,
+    part,
+)
+from rigidimeter.analysis.report.interval_rows import (
+    band_label,
+    band_percent,
+    by_measure,
+    draw_bands,
+    draw_methods,
+    methods_in,
+)
+from rigidimeter.analysis.report.style import drawn
+from rigidimeter.analysis.study import StudyResult, method_caveats, split_pooled
+from rigidimeter.core.records import PARAMETERS
+from rigidimeter.core.words import INTERVAL, Column, Table, condition_name, interval, number
+
+MOST_BESIDE = 3
+
+
+def _methods(result: StudyResult) -> Iterator[Block]:
+    found = result.sensitivity
+    if not found:
+        return
+    reference, other = condition_name(result.reference), condition_name(result.other)
+    words = "; ".join(
+        f"{row.measure.title}, {row.method}, J {row.inertia}: {number(row.shift, 3)} "
+        f"{interval(row.shift_low, row.shift_high, 3)} {row.measure.unit}"
+        for row in found
+    )
+    columns = min(len(by_measure(found)), MOST_BESIDE)
+    rows = math.ceil(len(by_measure(found)) / columns)
+    size = 7.4, 0.5 + (1.0 + 0.26 * len(methods_in(found))) * rows
+    shown = found, f"Shift, {reference} − {other}"
+    yield Figure(
+        "sensitivity",
+        "The Hodges–Lehmann shift with its interval by each method, in the unit above the "
+        "panel. Filled squares: J held at its median; open circles: J estimated in each epoch. "
+        "Black: the method of this report.",
+        f"Shifts by method. {words}.",
+        partial(drawn, size, draw_methods, *shown, rows=rows, columns=columns, sharey=True),
+        "tall",
+    )
+    titles = {row.measure.name: row.measure.title for row in found}
+    caveats = [f"{titles[name]}: {text}." for name, text in method_caveats(found).items() if text]
+    if caveats:
+        yield bullets(caveats)
+        yield paragraph(
+            "A difference counts as shown if p of the test by days is below 0.05, not adjusted; "
+            "where days could not be tested, if p over epochs is.",
+            "remark",
+        )
+    yield from_result(
+        result,
+        "sensitivity",
+        "The shift by each method",
+        Column("title", "Measure", "text", below="unit"),
+        Column("method", "Method", "check"),
+        Column("inertia", "J", "label"),
+        Column("n_reference", f"n {reference}", "count"),
+        Column("n_other", f"n {other}", "count"),
+        Column("shift", f"Shift {INTERVAL}", ends=("shift_low", "shift_high")),
+        Column("r", "r"),
+        Column("p", "p, epochs", "p"),
+        Column("p_day", "p, days", "p"),
+        Column("chosen", "Used here", "label"),
+    )
+
+
+def _bands(result: StudyResult) -> Iterator[Block]:
+    found = result.analysis.sensitivity
+    of_conditions, _ = split_pooled(result.analysis)
+    half = {
+        name: 50 * (fit.high - fit.low) / np.abs(fit.value) for name, fit in of_conditions.items()
+    }
+    words = "; ".join(
+        f"{condition_name(one.condition)}, {band_label(one)}: "
+        + ", ".join(
+            f"{parameter.symbol} {number(change, 2)} ± {number(high - change, 2)} %"
+            for parameter, (change, _, high) in zip(PARAMETERS, band_percent(one), strict=True)
+        )
+        for one in found
+        if not one.of_fit
+    )
+    own = found[0]
+    yield paragraph(
+        "The estimates change with the band by no more than chance where the joint is inertia, "
+        "damping and stiffness alone. Where they change by more, they carry a "
+        "finding (band_sensitivity)."
+    )
+    conditions = {one.condition for one in found}
+    bands = {band_label(one) for one in found if not one.of_fit}
+    size = 7.4, 1.1 + (0.2 + 0.12 * len(conditions)) * len(bands)
+    yield Figure(
+        "band_sensitivity",
+        f"Change of J, B and K of all epochs together from those of the band of the fit, "
+        f"{own.low_hz:.3g} to {own.high_hz:.3g} Hz, if another band or one half of "
+        "each epoch is used. Bars: 95 % interval of the change. Bands of colour: 95 % interval of "
+        "the estimate.",
+        f"How J, B and K depend on the band. {words}.",
+        partial(drawn, size, draw_bands, found, half, columns=3, sharey=True),
+        "tall",
+    )
+    yield Table(
+        "band_sensitivity",
+        "J, B and K of other bands and parts of the epochs",
+        (),
+        [one.row() for one in found],
+    )
+
+
+SECTIONS = part(
+    "Does the method matter",
+    Section("sensitivity", "Other methods", _methods, from_study_folder),
+    Section(
+        "band_sensitivity", "Other bands", _bands, lambda result: bool(result.analysis.sensitivity)
+    ),
+    printed=1,
+)

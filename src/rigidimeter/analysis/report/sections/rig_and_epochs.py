@@ -1,0 +1,228 @@
+"""Was the rig right, and were the epochs good: messages, delays, exclusions, one epoch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Any
+
+from markupsafe import Markup
+
+from rigidimeter.analysis.report.contents import (
+    Block,
+    Figure,
+    Section,
+    from_result,
+    from_study_folder,
+    named,
+    paragraph,
+    part,
+)
+from rigidimeter.analysis.report.curves import (
+    CHANNELS,
+    WINDOW_S,
+    draw_recorded,
+    origin_s,
+    recorded_size,
+    shown_channels,
+)
+from rigidimeter.analysis.report.methods_prose import method_of
+from rigidimeter.analysis.report.sections.every_epoch import HOW, WHO
+from rigidimeter.analysis.report.style import drawn
+from rigidimeter.analysis.study import StudyResult, result_table
+from rigidimeter.analysis.study.examples import analysed_epoch, representative_fits
+from rigidimeter.core.records import Delay, Fit, Score
+from rigidimeter.core.words import SESSION, Column, Table, condition_name, plural, series
+
+BY = ("protocol", "check", "estimate", "operator")
+
+
+def _notices(result: StudyResult) -> Iterator[Block]:
+    yield Table(
+        "notices",
+        "Messages while reading and analysing",
+        (Column("level", "Level", "outcome"), Column("text", "Message", "reason")),
+        [{"level": notice.level, "text": notice.text} for notice in result.notices],
+        empty="None.",
+    )
+
+
+def _estimation(result: StudyResult) -> Iterator[Block]:
+    analysis = result.analysis
+    chosen = (
+        f"Chosen automatically: {analysis.method_reason}."
+        if analysis.method_reason
+        else "It was requested by name."
+    )
+    yield paragraph(
+        Markup("Method: <strong>{}</strong> ({}). {}").format(
+            analysis.method, method_of(analysis.method).title, chosen
+        )
+    )
+    yield Table(
+        "delays",
+        "Delay of the torque relative to the motion",
+        (
+            WHO[0],
+            Column("delay_s", "Torque late by (ms)", page_factor=1e3),
+            Column("delay_s_se", "SE (ms)", page_factor=1e3),
+            Column("corrected", "Corrected", "label"),
+            Column("done", "What was done", "reason"),
+        ),
+        [
+            {name: getattr(d, name) for name in ("source", "delay_s", "delay_s_se", "corrected")}
+            | {"done": _done(d)}
+            for d in analysis.delays
+        ],
+        note="A delay is positive where the time stamps of the torque are later than the motion "
+        "that they belong to. SE is its standard error.",
+        empty="The delay between torque and motion was not estimated.",
+    )
+
+
+def _done(delay: Delay) -> str:
+    if not delay.corrected:
+        return delay.remark
+    way = "earlier" if delay.delay_s > 0 else "later"
+    moved = f"the torque was moved {way} by this delay before anything was fitted or scored"
+    return f"{moved}; {delay.remark}" if delay.remark else moved
+
+
+def _exclusions(result: StudyResult) -> Iterator[Block]:
+    """Yield whatever is excluded or failed, once for each reason; of a study as a file only."""
+    columns = (*WHO, Column("stage", "Stage", "text"), *HOW)
+    yield Table(
+        "exclusions",
+        "Excluded epochs by stage of the analysis",
+        () if from_study_folder(result) else columns,
+        _by_stage(result),
+        empty="" if from_study_folder(result) else "No epoch was excluded.",
+        folding=True,
+    )
+
+
+def _by_stage(result: StudyResult) -> list[dict[str, Any]]:
+    """Return what each stage excluded, and the epochs from which nothing was estimated."""
+    analysis = result.analysis
+    stages: dict[str, Sequence[Fit | Score]] = {
+        "fit": analysis.fits,
+        "fit at fixed inertia": analysis.fixed_inertia,
+        "score": analysis.scores,
+    }
+    analysed: set[tuple[str, ...]] = set()
+    first: dict[tuple[tuple[str, ...], str, str], str] = {}
+    for stage, results in stages.items():
+        for one in results:
+            who = (one.source, one.epoch, one.condition)
+            analysed.add(who[:2])
+            if not one.outcome.included:
+                first.setdefault((who, one.outcome.kind, one.outcome.reason), stage)
+    for epoch in result.epochs:
+        who = (epoch.source, epoch.label, epoch.condition)
+        if who[:2] not in analysed:
+            reason = epoch.closed.reason or "nothing was estimated from it"
+            first[who, "failed", reason] = "none"
+    keys = ("source", "epoch", "condition", "stage", "outcome", "reason")
+    return [
+        dict(zip(keys, (*who, stage, kind, reason), strict=True))
+        for (who, kind, reason), stage in first.items()
+    ]
+
+
+def _study_exclusions(result: StudyResult) -> Iterator[Block]:
+    yield from_result(
+        result,
+        "account",
+        "All recorded epochs",
+        Column("task", "Task", "check"),
+        Column("condition", "Condition", "condition"),
+        Column("recorded", "Recorded", "count"),
+        Column("included", "Included", "count"),
+        *(Column(f"by_{by}", f"Excluded by {by}", "count") for by in BY),
+        Column("unlisted", "Not accounted for", "count"),
+    )
+    unlisted = sum(row["unlisted"] for row in result_table(result, "account"))
+    if unlisted:
+        yield paragraph(
+            Markup(
+                "<strong>{} {} neither included nor listed as excluded</strong>; "
+                "<code>tables/exclusions.csv</code> says what the analysis made of each."
+            ).format(plural(unlisted, "recorded epoch"), "is" if unlisted == 1 else "are"),
+            "banner",
+        )
+    named = any(e.who for e in result.exclusions)
+    yield from_result(
+        result,
+        "excluded_epochs",
+        "Excluded epochs: by whom and why",
+        *SESSION,
+        Column("source", "Session", "source"),
+        Column("epoch", "Epoch", "label"),
+        Column("task", "Task", "check"),
+        Column("by", "Excluded by", "label"),
+        *([Column("who", "Name", "label")] if named else []),
+        Column("reason", "Reason", "reason"),
+        empty="No epoch was excluded.",
+        folding=True,
+    )
+    yield from_result(
+        result,
+        "left_out",
+        "Recordings left out completely",
+        Column("path", "Path", "text"),
+        *SESSION,
+        Column("reason", "Reason", "reason"),
+    )
+    yield from _exclusions(result)
+
+
+def _recorded(result: StudyResult) -> Iterator[Block]:
+    for fit in representative_fits(result):
+        epoch = analysed_epoch(result, fit)
+        if epoch is None:
+            continue
+        shown = shown_channels(epoch)
+        names = series([CHANNELS[name][0] for name in shown])
+        names = names[:1].upper() + names[1:]
+        which = f"{condition_name(fit.condition)}, {named(result, fit)}"
+        yield Figure(
+            "recorded",
+            f"{names} as recorded, not filtered; the first {WINDOW_S:g} s of {which}.",
+            f"{names} over the first {WINDOW_S:g} s of {which}.",
+            partial(
+                drawn,
+                recorded_size(len(shown)),
+                draw_recorded,
+                shown,
+                origin_s(epoch),
+                rows=len(shown),
+                sharex=True,
+            ),
+        )
+        return
+
+
+def _provenance(result: StudyResult) -> Iterator[Block]:
+    yield Table(
+        "provenance",
+        "Software, settings and files",
+        (Column("key", "What", "text"), Column("value", "Value", "reason")),
+        [{"key": key, "value": value} for key, value in result.provenance.items()],
+        empty="Not recorded.",
+    )
+
+
+RIG = part(
+    "Was the rig right",
+    Section("notices", "Notices", _notices),
+    Section("estimation", "Estimation", _estimation),
+    printed=1,
+)
+EPOCHS = part(
+    "Were the epochs good",
+    Section("exclusions", "Exclusions", _study_exclusions, from_study_folder),
+    Section("exclusions", "Exclusions", _exclusions, lambda result: not from_study_folder(result)),
+    Section("recorded", "As recorded", _recorded),
+    printed=1,
+)
+PROVENANCE = part("Provenance", Section("provenance", "Provenance", _provenance))

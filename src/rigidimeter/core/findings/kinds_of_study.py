@@ -1,0 +1,165 @@
+"""Findings of recordings beside each other: what else than the condition may make a difference.
+
+Their levels cannot be set, for a verdict follows from them.
+"""
+
+from __future__ import annotations
+
+from rigidimeter.core.findings.kind import Kind
+
+STUDY_KINDS = (
+    Kind(
+        "inertia_of_recordings",
+        "by how much the largest median J of a recording exceeds the smallest",
+        headline="J of {high} is {value:.0f} % above that of {low}",
+        measured="The median J of {high} is {high_j:.4g} kg·m², that of {low} {low_j:.4g}, "
+        "{value:.0f} % less (at most {limit:g} %).",
+        meaning="B and K with J held at one median are wrong for both.",
+        remedy="Analyse different joints separately.",
+        example={"value": 31.0, "limit": 15.0, "high": "b.csv", "low": "a.csv"},
+    ),
+    Kind(
+        "inertia_of_conditions",
+        "difference of the median J of two conditions, in % of the larger, where the test finds it",
+        headline="Inertia differs by {value:.2g} %, and no treatment changes it",
+        measured="The median J is {first:.4g} kg·m² in {reference} and {second:.4g} in {other}.",
+        meaning="The posture, the contact with the robot, a unit, or torque from elsewhere was "
+        "different, which changes B and K as well.",
+        remedy="Compare how the arm was fixed, the units, and the torque beyond J, B and K.",
+        variants={
+            "flagged": {
+                "headline": "Inertia differs by {value:.2g} %, and no treatment changes it: "
+                "{cause} may",
+                "meaning": "There is {cause}{others} in {counts}, which changes J, B and K.",
+            },
+            "degrees": {
+                "headline": "Inertia differs by {value:.2g} %, as where degrees are read as "
+                "radians",
+                "meaning": "One is about 57 times the other, and so are B and K.",
+                "remedy": "Check the unit of the angle in both.",
+            },
+        },
+        example={
+            "value": 17.0,
+            "first": 4.5e-3,
+            "second": 5.4e-3,
+            "others": " (or 1 other finding)",
+        },
+    ),
+    Kind(
+        "flagged_epochs",
+        "largest share of a condition's epochs that carry a caution, where the difference is not "
+        "found without them; where none is found, from 10 % on",
+        headline="{cause} in {counts}",
+        measured="There is {cause}{others} in {counts}; without these epochs {without}.",
+        meaning="What is in the epochs of one condition alone can make a difference.",
+        remedy="Repeat these epochs, or use a method that the finding does not bias.",
+        variants={
+            "hides": {
+                "headline": "{cause} can hide one: {counts}",
+                "measured": "There is {cause}{others} in {counts}.",
+                "meaning": "What it does to J, B and K can hide a difference.",
+            },
+            "together": {
+                "headline": "{cause} in all epochs of a condition together",
+                "measured": "The fit to all epochs of {where} has the finding {cause}{counts}.",
+                "meaning": "Its bias can be as large as the difference.",
+            },
+        },
+        example={"value": 83.0, "limit": 10.0, "others": " (or 1 other finding)"},
+    ),
+    Kind(
+        "examiners_of_one_condition",
+        "number of examiners who rated one of the conditions alone, where the difference is not "
+        "found without them",
+        headline="{who} rated one of the conditions alone",
+        measured="{who} rated one of the conditions alone; without these ratings {without}.",
+        meaning="The effects of examiner and condition cannot be separated.",
+        remedy="Have every examiner rate both conditions.",
+        unit="1",
+        variants={
+            "hides": {
+                "headline": "{who} rated one of the conditions alone, which can hide one",
+                "measured": "{who} rated one of the conditions alone.",
+                "meaning": "The offsets of these examiners can hide a difference.",
+            }
+        },
+        example={"value": 2.0, "without": "p = 0.4"},
+    ),
+    Kind(
+        "unknown_days",
+        "number of recordings that stand for days, since none is stated",
+        headline="Which recordings are of one day is not known",
+        measured="{value:g} recordings were compared as if each were of a day of its own.",
+        meaning="A day may move all of its recordings alike, by its cuff, posture and arm.",
+        remedy="State their days in a study folder.",
+        unit="1",
+        example={"value": 8.0},
+    ),
+    Kind(
+        "order_of_conditions",
+        "number of days of a condition that all come after those of the other",
+        headline="All days in {later} came after all days in {earlier}",
+        measured="All {value:g} days in {later} came after all days in {earlier}.",
+        meaning="A change with time would have the same effect as the condition.",
+        remedy="Alternate the days, or record days with both conditions.",
+        unit="1",
+        example={"value": 4.0},
+    ),
+    Kind(
+        "within_accuracy",
+        "difference of the medians of J, B or K, in % of the larger",
+        headline="{value:.2g} % is within the {limit:g} % that motion between samples may cause",
+        measured="The medians differ by {value:.2g} % (at most {limit:g} %).",
+        meaning="How the joint moves between the samples is known no better, whatever p.",
+        remedy="Use a drive and a rate that show the motion between the samples.",
+        level="note",
+        setting="max_between_samples_percent",
+        example={"value": 0.5, "limit": 1.0},
+    ),
+    Kind(
+        "few_units",
+        "standard errors above which p adjusted by Holm's method is below 0.05 in any case, where "
+        "the test by days has fewer than 3 degrees of freedom",
+        headline="Differences below {value:.3g} standard errors may not show; more {units} show "
+        "smaller ones",
+        measured="The test has {df:.2g} degrees of freedom, and p is adjusted for {tests}: below "
+        "0.05 in any case it is above {value:.3g} standard errors.",
+        meaning="A smaller difference may be there.",
+        remedy="Record more {units}.",
+        level="note",
+        unit="1",
+        example={"value": 63.7},
+    ),
+    Kind(
+        "too_few_values",
+        "the least p that so many values can have, after Holm's method",
+        headline="{first} values against {second} cannot reach p < {limit:g}{of}",
+        measured="Even where no value of one group is within the other, p of {first} against "
+        "{second} is {value:.2g}{of}, and {exact:.2g} by the exact test of one.",
+        meaning="Whether the groups differ cannot be seen, whatever the values.",
+        remedy="Measure more, or compare fewer columns at once.",
+        unit="1",
+        example={"value": 0.16, "limit": 0.05, "first": 3, "second": 3, "exact": 0.1},
+    ),
+    Kind(
+        "unused_recordings",
+        "number of recordings of a condition that were left out, where none is left",
+        headline="{which} in {condition} could not be used: {reason}",
+        measured="{which} in {condition} could not be used: {reason}.",
+        meaning="So there is nothing to compare.",
+        remedy="See why each recording was left out.",
+        unit="1",
+        example={"value": 1.0},
+    ),
+    Kind(
+        "no_test",
+        "whether there are values, days or recordings enough in both conditions",
+        headline="{remark}",
+        measured="There is no test: {remark}.",
+        meaning="So p and the interval of the difference are unknown.",
+        remedy="Record more of what is lacking.",
+        unit="",
+        example={"value": float("nan")},
+    ),
+)
