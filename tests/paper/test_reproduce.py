@@ -305,7 +305,7 @@ def test_highpass_on_the_position_alone() -> None:
 
 def test_voluntary_torque_biases_least_squares_and_not_instruments() -> None:
     found = voluntary_errors_percent(Context())
-    assert found["bandlimited"][:2] == pytest.approx([-40.0, -64.0], abs=10.0)  # SD 6 over seeds
+    assert found["least squares"][:2] == pytest.approx([-40.0, -64.0], abs=10.0)  # SD 6 over seeds
     assert found["expected"][:2] == pytest.approx([-43.4, -68.7], abs=1.0)
     assert max(map(abs, found["iv"])) < 5.0
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimation.closedloop.observation import loop_of
+from rigidimeter.analysis.estimation.closedloop.controller_used import loop_of
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.model import DriveModel, Loop
 

@@ -5,7 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimation import fit_epochs
+from rigidimeter.analysis.estimation import (
+    epoch_signals,
+    fit_epochs,
+    fit_inertia_damping_stiffness,
+)
 from rigidimeter.analysis.statistics import day_difference
 from rigidimeter.core.records import Epoch, Fit
 from rigidimeter.core.settings import Settings, parse_settings
@@ -83,9 +87,9 @@ def test_iv_scatters_as_predicted(voluntary_sd_nm: float, rig: dict) -> None:
 def test_least_squares_is_off_as_predicted() -> None:
     settings, found = plan(0.2, {})
     fits = [
-        fit
+        fit_inertia_damping_stiffness(epoch_signals(epoch, "bandlimited", settings.estimation))
         for epochs in sessions(settings, 100, seed=20)
-        for fit in fit_epochs(epochs, "bandlimited", settings)[0]
+        for epoch in epochs
     ]
     assert fits[0].band_hz == found.least_squares_band_hz
     off = np.mean(table(fits), axis=0) / found.values - 1.0

@@ -201,7 +201,7 @@ def _all_errors(design: Design) -> Iterator[Block]:
                 )
                 if value
             )
-            yield f"  the subject's own torque would bias least squares: {off}"
+            yield f"  the subject's own torque would bias least squares without weights: {off}"
 
 
 def _band(band_hz: tuple[float, float]) -> str:

@@ -67,7 +67,7 @@ def highpass_errors_percent(reading: str, way: str, *, alike: bool) -> Triple:
         velocity_rad_s=treated(raw.velocity_rad_s, filtered=alike),
         angle_rad=treated(raw.angle_rad, filtered=True),
     )
-    return errors_percent(fit_inertia_damping_stiffness(cut, white=True).value)
+    return errors_percent(fit_inertia_damping_stiffness(cut).value)
 
 
 def _ideal_signals(reading: str, settings: Settings) -> Signals:
@@ -111,7 +111,7 @@ def equation_7(context: Context) -> Claim:
     signals = _ideal_signals("per degree", context.settings)
 
     def held(inertia_kg_m2: float) -> Triple:
-        fit = fit_inertia_damping_stiffness(signals, inertia_kg_m2, white=True)
+        fit = fit_inertia_damping_stiffness(signals, inertia_kg_m2)
         return errors_percent(fit.value)
 
     true, other = held(printed.SEC_34.inertia_kg_m2), held(printed.FIG_4.inertia_kg_m2)

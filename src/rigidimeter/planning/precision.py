@@ -13,7 +13,7 @@ closed loop, S the density of ν, and T the length of the epoch.
   subject's own torque causes. `bound` leaves that out.)
 - `iv`: that motion as the instrument, the lines of a window weighed by their noise; see
   `predicted_record`.
-- least squares, of signals that all went through a band of gain g (`bandlimited`): A⁻¹ Q A⁻¹ with
+- least squares without weights, of signals that all went through a band of gain g: A⁻¹ Q A⁻¹ with
   A = ∫ g² ZZᴴ df and Q = ∫ g⁴ ZZᴴ S df, S that of the sensor: the standard error of a passive arm.
 
 The motion in answer to M_sub does not enter the standard error of `iv` to first order, since M_sub
@@ -220,7 +220,7 @@ def _errors(A: Array, Q: Array) -> Errors:
 def _least_squares(
     motion: ClosedLoopMotion, settings: Settings, subject: SubjectSettings, joint: JointDynamics
 ) -> tuple[tuple[float, float], Errors, tuple[float, float, float]]:
-    """Return band, errors of a passive arm, and bias of `bandlimited`."""
+    """Return band, errors of a passive arm, and bias of least squares without weights."""
     estimation, rig = settings.estimation, settings.rig
     slowest_hz = min(rig.torque.rate_hz, rig.motion.rate_hz)
     low_hz = estimation.band_low_hz

@@ -139,7 +139,7 @@ def test_the_subjects_own_torque_biases_least_squares(tmp_path: Path) -> None:
     settings = tmp_path / "rig.toml"
     settings.write_text("[subject.OFF]\nvoluntary_sd_nm = 0.2\n")
     words = " ".join(run("--full", "--settings", str(settings)).split())
-    assert "would bias least squares: J by -43 %, B by -69 %, K by +3 %" in words
+    assert "would bias least squares without weights: J by -43 %, B by -69 %, K by +3 %" in words
 
 
 def test_searches_and_compares(tmp_path: Path) -> None:

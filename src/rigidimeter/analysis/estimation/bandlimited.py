@@ -1,4 +1,4 @@
-"""Least squares on signals that all went through the same zero-phase band.
+"""Signals of an epoch that all went through the same zero-phase band.
 
 A linear time-invariant filter F commutes with Eq. 3:
 
@@ -13,28 +13,17 @@ of what is left out (`analysis.estimation.stretches`).
 from __future__ import annotations
 
 import math
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 from scipy import signal
 
-from rigidimeter.analysis.estimation.closedloop.as_sampled import (
-    InertiaUncertainty,
-    inertia_uncertainty,
-)
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
     driven_behind,
     torque_filter_of,
     without_driven,
 )
 from rigidimeter.analysis.estimation.closedloop.drive_motion import DrivenAt
-from rigidimeter.analysis.estimation.least_squares import (
-    INTERVALS_TEXT,
-    POOLED_TEXT,
-    fit_least_squares,
-)
-from rigidimeter.analysis.estimation.method_record import Method
-from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import (
     Array,
     Signals,
@@ -45,9 +34,8 @@ from rigidimeter.analysis.estimation.signals import (
     uniform_grid,
     values_at,
 )
-from rigidimeter.analysis.estimation.steps import moved_by_steps
 from rigidimeter.analysis.estimation.stretches import sound
-from rigidimeter.core.records import Channel, Epoch
+from rigidimeter.core.records import Epoch
 from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE, EstimationSettings
 from rigidimeter.model import DriveModel
 
@@ -195,30 +183,3 @@ def _motion(
     # One spline of the three, at the stamps that they share.
     angle, velocity, acceleration = np.stack(rest) + columns_at(torque, caused[::-1], time_s)
     return angle, velocity, acceleration
-
-
-def _uncertainty(prepared: PreparedEpoch, signals: Signals) -> InertiaUncertainty:
-    """Return how far a fit hangs on the drive between the samples and on steps of the motion."""
-    uncertainty, settings = inertia_uncertainty(prepared, signals), prepared.settings.estimation
-
-    def smooth(channel: Channel) -> Array:
-        lowpass, _ = _filters(*signals.band_hz, _to_stamps(channel.mean_rate_hz))
-        return _both_ways(lowpass, channel.values, SHORT_MEMORY)
-
-    moved = moved_by_steps(
-        prepared.epoch, signals, lambda epoch: bandlimited_signals(epoch, settings), smooth
-    )
-    return uncertainty._replace(away=uncertainty.away + moved / abs(signals.solution.values[0]))
-
-
-BANDLIMITED = Method(
-    name="bandlimited",
-    title="least squares, all signals through one zero-phase band",
-    needs=(),
-    methods_text="by least squares of signals that passed one zero-phase filter",
-    fit=partial(fit_least_squares, "bandlimited", bandlimited_signals, _uncertainty),
-    signals=bandlimited_signals,
-    intervals_text=INTERVALS_TEXT,
-    pooled_text=POOLED_TEXT,
-    in_sensitivity=True,
-)

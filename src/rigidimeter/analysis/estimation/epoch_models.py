@@ -140,7 +140,7 @@ def _estimate(prepared: PreparedEpoch) -> Fit:
     models that are.
     """
     (fit,), _ = method_named("bandlimited").fit([prepared], None, lambda _: None, False)
-    return checked(prepared, fit)
+    return checked(prepared, fit, by_noise=False)
 
 
 def _refused(fit: Fit) -> str:

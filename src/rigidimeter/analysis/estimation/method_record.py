@@ -71,6 +71,9 @@ class Method:
         What the intervals hold for.
     pooled_text : str
         What the intervals of the pooled estimates hold for.
+    by_noise : bool
+        Whether each frequency counts by its noise, and what torque of the subject does to least
+        squares by the loop is in the intervals.
     as_recorded : bool
         Fit the channels as they are, without correcting the delay of the torque.
     in_sensitivity : bool
@@ -86,6 +89,7 @@ class Method:
     signals: SignalsOf | None = None
     intervals_text: str = "Intervals are those that the method gives"
     pooled_text: str = "Those of all epochs together are its own too"
+    by_noise: bool = False
     as_recorded: bool = False
     in_sensitivity: bool = False
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Sequence
 
-from rigidimeter.analysis.estimation.bandlimited import BANDLIMITED, bandlimited_signals
+from rigidimeter.analysis.estimation.bandlimited import bandlimited_signals
 from rigidimeter.analysis.estimation.closedloop.observation import closed_loop_obstacle, observe
 from rigidimeter.analysis.estimation.closedloop.periodic_response import follows_perturbation
-from rigidimeter.analysis.estimation.closedloop.perturbation_methods import IV, SPECTRAL
+from rigidimeter.analysis.estimation.closedloop.perturbation_methods import (
+    BANDLIMITED,
+    IV,
+    SPECTRAL,
+)
 from rigidimeter.analysis.estimation.method_record import Method
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch, prepare
 from rigidimeter.analysis.estimation.published_method import PUBLISHED

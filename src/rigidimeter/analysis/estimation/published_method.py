@@ -17,14 +17,22 @@ The paper gives neither order nor direction of the filter: here second order and
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy import signal
 
-from rigidimeter.analysis.estimation.closedloop.as_sampled import as_they_are
-from rigidimeter.analysis.estimation.least_squares import POOLED_TEXT, fit_least_squares
-from rigidimeter.analysis.estimation.method_record import Method
+from rigidimeter.analysis.estimation.closedloop.between_finding import NAME
+from rigidimeter.analysis.estimation.closedloop.between_samples import (
+    acceleration_seen,
+    phases_s,
+)
+from rigidimeter.analysis.estimation.found import found
+from rigidimeter.analysis.estimation.least_squares import fit_inertia_damping_stiffness
+from rigidimeter.analysis.estimation.method_record import Method, Progress
+from rigidimeter.analysis.estimation.prepared import PreparedEpoch
+from rigidimeter.analysis.estimation.screening import after_fit, unusable
 from rigidimeter.analysis.estimation.signals import (
     Array,
     Signals,
@@ -33,7 +41,8 @@ from rigidimeter.analysis.estimation.signals import (
     velocity_at,
 )
 from rigidimeter.analysis.estimation.stretches import sound
-from rigidimeter.core.records import Channel, Epoch
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.records import Channel, Epoch, Fit
 from rigidimeter.core.settings import EstimationSettings
 from rigidimeter.model import DriveModel
 
@@ -93,16 +102,107 @@ def _held(command: Channel, time_s: Array) -> Array:
     return command.values[np.maximum(index, 0)]
 
 
+def fit_published(
+    epochs: Sequence[PreparedEpoch],
+    inertia_kg_m2: float | None = None,
+    progress: Progress = lambda _: None,
+    pooled: bool = True,
+) -> tuple[list[Fit], list[Fit]]:
+    """Fit every epoch, and all epochs of a condition put one after the other.
+
+    Parameters and values are those of `method_record.FitEpochs`.
+    """
+    fits: list[Fit] = []
+    groups: dict[str, list[tuple[Fit, Signals]]] = {}
+    for prepared in epochs:
+        epoch = prepared.epoch
+        try:
+            signals = prepared.signals(published_signals)
+            fitted = fit_inertia_damping_stiffness(signals, inertia_kg_m2)
+        except ValueError as error:
+            outcome = unusable(epoch, str(error))
+            fits.append(Fit(epoch.source, epoch.label, epoch.condition, "published", outcome))
+        else:
+            outcome = after_fit(epoch, fitted.r_squared, fitted.condition_number)
+            seen = as_they_are(prepared) if inertia_kg_m2 is None else ()
+            fit = replace(
+                fitted,
+                source=epoch.source,
+                epoch=epoch.label,
+                condition=epoch.condition,
+                method="published",
+                outcome=outcome,
+                findings=seen,
+            )
+            fits.append(fit)
+            if outcome.included:
+                groups.setdefault(epoch.condition, []).append((fit, signals))
+        progress(1.0)
+    if not pooled:
+        return fits, []
+    everything = dict(groups)
+    if len(groups) > 1:
+        everything[""] = [member for members in groups.values() for member in members]
+    return fits, [_pooled(name, own, inertia_kg_m2) for name, own in everything.items()]
+
+
+def as_they_are(prepared: PreparedEpoch) -> tuple[Finding, ...]:
+    """Return the finding if the drive shows that J comes out wrong from the samples as they are."""
+    drive, epoch = prepared.source.drive, prepared.epoch
+    command = epoch.channels.get("velocity_command_rad_s")
+    if drive is None or command is None:
+        return ()
+    settings = prepared.settings.diagnostics
+    times_s = phases_s(command, epoch.channels["torque_nm"].time_s)
+    seen = acceleration_seen(drive.model, 1.0 / command.mean_rate_hz, times_s)
+    percent, most = 100.0 * abs(1.0 - seen), settings.max_between_samples_percent
+    if not percent > most:
+        return ()
+    facts = {"seen": 100.0 * seen, "side": "small" if seen < 1 else "large"}
+    finding = found(
+        NAME,
+        settings,
+        percent,
+        most,
+        condition=epoch.condition,
+        facts=facts,
+        variant="as_sampled",
+    )
+    return (finding,)
+
+
+def _pooled(
+    condition: str, members: Sequence[tuple[Fit, Signals]], inertia_kg_m2: float | None
+) -> Fit:
+    fits, parts = zip(*members, strict=True)
+    columns = ("time_s", "torque_nm", "acceleration_rad_s2", "velocity_rad_s", "angle_rad")
+    together = replace(
+        parts[0],
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in columns},
+    )
+    return replace(
+        fit_inertia_damping_stiffness(together, inertia_kg_m2),
+        source=", ".join(dict.fromkeys(fit.source for fit in fits)),
+        epoch="pooled",
+        condition=condition,
+        method="published",
+        findings=fits[0].findings,
+    )
+
+
 PUBLISHED = Method(
     name="published",
     title="least squares as the paper prints it",
     needs=(),
     methods_text="by ordinary least squares in the time domain, as published",
-    fit=partial(fit_least_squares, "published", published_signals, as_they_are, white=True),
+    fit=fit_published,
     references=("paper",),
     signals=published_signals,
     intervals_text="Intervals take the residual for white and do not include bias",
-    pooled_text=POOLED_TEXT,
+    pooled_text=(
+        "The joint is taken for one that does not change, and where epochs differ by more than "
+        "their own intervals these are too narrow"
+    ),
     as_recorded=True,
     in_sensitivity=True,
 )

@@ -13,6 +13,10 @@ OF_SUBJECT = {
         "meaning": "In this loop it biases J, B and K by {share:.2g} % of half their intervals at "
         "most."
     },
+    "in_interval": {
+        "meaning": "Each frequency counts by its noise: it biases {changes}, which the intervals "
+        "include."
+    },
     "negligible": {"meaning": "It biases {changes}: below 1 % of each and half their intervals."},
 }
 """Why torque that something but the robot adds does not matter to an estimate."""
@@ -156,7 +160,7 @@ FIT_KINDS = (
         "iv.",
         unit="1",
         setting="min_r_squared",
-        variants={"instrument": OF_SUBJECT["instrument"]},
+        variants=OF_SUBJECT,
         example={"value": 0.21, "limit": 0.3},
     ),
     Kind(

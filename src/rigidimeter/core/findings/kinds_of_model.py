@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rigidimeter.core.findings.kind import Kind
+from rigidimeter.core.findings.kinds_of_fit import OF_SUBJECT
 
 _SAMPLE_FASTER = (
     "sample the torque faster, filter it before it is sampled (estimation.torque_lowpass_hz), use "
@@ -160,6 +161,7 @@ MODEL_KINDS = (
                 "multiplied by 57.3."
             },
             "instrument": {"meaning": "{method} is less precise with it, not biased."},
+            "in_interval": OF_SUBJECT["in_interval"],
             "small_bias": {
                 "meaning": "By the loop that the recording shows, torque from elsewhere biases J, "
                 "B and K by {share:.2g} % of half their intervals at most."
@@ -183,6 +185,7 @@ MODEL_KINDS = (
                 "meaning": "{method} takes the motion that the perturbation would cause without "
                 "feedback, so it is less precise, not biased."
             },
+            "in_interval": OF_SUBJECT["in_interval"],
             "small_bias": {
                 "meaning": "By the loop, torque from elsewhere biases J, B and K by {share:.2g} % "
                 "of half their intervals at most."

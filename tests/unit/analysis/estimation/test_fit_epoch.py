@@ -100,7 +100,7 @@ def test_r_squared_below_zero_excludes():
     fit = fit_epoch(moving_epoch(), "bandlimited", SETTINGS, inertia_kg_m2=3.0)
     assert fit.r_squared < 0
     assert fit.outcome.kind == "excluded"
-    assert "below zero" in fit.outcome.reason
+    assert "R² is" in fit.outcome.reason
 
 
 def test_a_single_frequency_is_excluded_with_the_reason():

@@ -38,7 +38,7 @@ def test_standard_errors_are_the_scatter_over_noise():
 
 
 def test_textbook_errors_take_the_residual_for_white():
-    found = fit_inertia_damping_stiffness(noisy := signals(0.02), white=True)
+    found = fit_inertia_damping_stiffness(noisy := signals(0.02))
     residual = noisy.torque_nm - noisy.motion @ found.value
     variance = residual @ residual / (residual.size - 3)
     expected = variance * np.linalg.inv(noisy.motion.T @ noisy.motion)

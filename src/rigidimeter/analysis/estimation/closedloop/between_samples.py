@@ -14,7 +14,6 @@ keep step with the ticks, and its samples are taken as they are.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -116,38 +115,23 @@ def driven_behind(
     return driven(behind(driven_at.drive, torque_filter), driven_at.command, torque.time_s)
 
 
-def accelerations_seen(
-    drives: Sequence[DriveModel],
-    torque_filter: TorqueFilter | None,
-    interval_s: float,
-    times_s: Array,
-) -> Array:
+def acceleration_seen(drive: DriveModel, interval_s: float, times_s: Array) -> float:
     """Return the acceleration at the torque's samples as a share of its mean, at low frequency.
 
     Parameters
     ----------
-    drives : sequence of DriveModel
-    torque_filter : TorqueFilter or None
+    drive : DriveModel
     interval_s : float
         Of the ticks.
     times_s : array
         After the ticks, at which the torque was sampled; the mean over them is returned.
-
-    Returns
-    -------
-    array
-        For each drive.
     """
     omega = np.array([LOW / interval_s])
     z = np.exp(1j * omega * interval_s)
-    turn = np.exp(-1j * omega * np.mean(times_s)) / filtered(torque_filter, omega)[:, 0]
-    found = []
-    for drive in drives:
-        _, velocity, _ = drive.transfer(z, interval_s)
-        sensed = behind(drive, torque_filter)
-        seen = np.mean([sensed.transfer(z, interval_s, s)[0] for s in times_s.tolist()], axis=0)
-        found.append((seen * turn / (1j * omega * velocity)).real.item())
-    return np.array(found)
+    turn = np.exp(-1j * omega * np.mean(times_s))
+    velocity = drive.transfer(z, interval_s)[1]
+    seen = np.mean([drive.transfer(z, interval_s, s)[0] for s in times_s.tolist()], axis=0)
+    return float((seen * turn / (1j * omega * velocity)).real.item())
 
 
 def acceleration_late_s(drive: DriveModel, interval_s: float) -> float:
@@ -162,11 +146,20 @@ def acceleration_late_s(drive: DriveModel, interval_s: float) -> float:
     return float(-np.angle(acceleration / (1j * omega * velocity)).item() / omega.item())
 
 
-def acceleration_by_settings(rig: RigSettings, torque_filter: TorqueFilter | None) -> float:
-    """Return that share for the drive and the ticks that the settings name, at the ticks."""
+def acceleration_beyond_slope(
+    rig: RigSettings, torque_filter: TorqueFilter | None, omega_rad_s: Array
+) -> Complex:
+    """Return A/V − jω for drive and ticks of the settings, shape (m,).
+
+    That is what the torque at the ticks holds of the acceleration beyond the slope of the velocity
+    at the ticks, for each unit of the velocity.
+    """
+    interval_s = 1.0 / rig.tick_rate_hz
     drive = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
-    seen = accelerations_seen([drive], torque_filter, 1.0 / rig.tick_rate_hz, np.zeros(1))
-    return float(seen[0])
+    z = np.exp(1j * omega_rad_s * interval_s)
+    velocity = drive.transfer(z, interval_s)[1] * filtered(torque_filter, omega_rad_s)[:, 0]
+    seen = behind(drive, torque_filter).transfer(z, interval_s)[0]
+    return np.asarray(seen / velocity - 1j * omega_rad_s)
 
 
 def phases_s(command: Channel, time_s: Array) -> Array:

@@ -82,5 +82,6 @@ def between_samples(
     """
     share = 100.0 * between / np.abs(values)
     percent = np.concatenate([np.zeros(3 - values.size), share])  # J that was held is not moved
-    about = int(np.argmax(percent))
+    # Of a drive that is not known J says most: it is what the torque does not see between samples.
+    about = int(np.argmax(percent)) if observation.drive_known else 0
     return between_finding(epoch, percent, about, observation.drive_known, settings)

@@ -186,7 +186,8 @@ def _start(members: Sequence[_Member], inertia_kg_m2: float | None) -> Array:
 def _estimate(fit: LineFit, inertia_kg_m2: float | None) -> Estimate:
     """Return J, B and K with their uncertainty, as a `Fit` holds them."""
     bound = np.sqrt(np.diag(fit.bound))
-    half = special.stdtrit(fit.degrees, 0.975) * fit.standard_errors + fit.between
+    away = fit.between + np.nan_to_num(np.abs(fit.pulled))
+    half = special.stdtrit(fit.degrees, 0.975) * fit.standard_errors + away
     low, high = fit.values - half, fit.values + half
     found = Estimate(fit.values, fit.standard_errors, low, high, bound, fit.covariance)
     return found if inertia_kg_m2 is None else found.with_inertia(inertia_kg_m2)

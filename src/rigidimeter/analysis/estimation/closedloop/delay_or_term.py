@@ -130,7 +130,7 @@ def _pair(grid: Grid, simulated: Array, measured: Array) -> tuple[Complex, Compl
 
     def lines(windowed: Array) -> Complex:
         mean = float(np.add.reduce(windowed * grid.window)) / grid.energy
-        return np.asarray(fft.rfft(windowed)[grid.line] - mean * grid.window_lines)
+        return np.asarray(fft.rfft(windowed - mean * grid.window)[grid.line])
 
     return lines(simulated), lines(measured)
 

@@ -61,8 +61,8 @@ def half_of_friction(
         return values_at(Channel(like.name, like.time_s, values), grid.time_s, SAME_TIME)
 
     seen = [at_lines(torque, part) for part in driven_behind(driven_at, torque_filter, torque)]
-    beside = spectra(
+    beside, _ = filtered(torque_filter, grid.omega_rad_s) * spectra(
         grid, at_lines(velocity, sampled.angle_rad), at_lines(velocity, sampled.velocity_rad_s)
     )
-    beside *= filtered(torque_filter, grid.omega_rad_s)
-    return 0.5 * (np.stack([grid.transform(part) for part in seen], axis=1) - beside)
+    there = np.stack([grid.transform(part) for part in seen], axis=1)
+    return np.asarray(0.5 * (there - beside))

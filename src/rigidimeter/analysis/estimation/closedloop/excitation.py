@@ -89,9 +89,9 @@ class Excitation:
     def _lines(self, spectra: Complex) -> Complex:
         """Return the lines of signals whose spectra on the damped circle are given."""
         windowed = self._windowed(spectra)
-        lines = fft.rfft(windowed, axis=1)[:, self.grid.line]
         mean = np.add.reduce(windowed * self.grid.window, axis=1) / self.grid.energy
-        return np.asarray((lines - mean[:, None] * self.grid.window_lines).T)
+        windowed -= mean[:, None] * self.grid.window
+        return np.asarray(fft.rfft(windowed, axis=1)[:, self.grid.line].T)
 
     def _windowed(self, spectra: Complex) -> Array:
         # The inverse FFT gives only the samples that are wanted, where their number allows it.

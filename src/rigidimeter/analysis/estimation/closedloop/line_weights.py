@@ -77,8 +77,14 @@ def variance_bound(
 def condition_number(
     problems: Sequence[Problem], everything: Sequence[Lines], shape: Shape
 ) -> float:
-    """Return that of the whitened instruments, each scaled to unit length."""
-    rows = problems[0].instruments / np.sqrt(shape.at(everything[0]))[:, None]
+    """Return that of the whitened instruments, each scaled to unit length.
+
+    Of least squares that of the motion itself: lines that hold noise alone tell J, B and K apart
+    where they are whitened, and show nothing of the joint.
+    """
+    rows = problems[0].instruments
+    if problems[0].observation is None or problems[0].observation.excitation is not None:
+        rows = rows / np.sqrt(shape.at(everything[0]))[:, None]
     stacked = np.concatenate([rows.real, rows.imag])
     singular = np.linalg.svd(stacked / np.linalg.norm(stacked, axis=0), compute_uv=False)
     return float(singular[0] / singular[-1])

@@ -6,6 +6,14 @@ With instruments Z, regressors Φ and target Y at the lines of an epoch, the est
 
 with S the power of the noise (`refine`). The methods differ in Z alone.
 
+Least squares (``bandlimited``). Z is the measured motion. Torque u of the subject comes back by the
+loop as motion H u, and pulls the estimate by
+
+    b = (Σ Re(Φ^H Φ) / S)⁻¹ Σ Re(H^*) |u|² / S
+
+Where S is that of u, |u|² / S is 1 whatever the size of u: b is then of the order of H times the
+square of the standard error, while without weights it is of the order of |u|² over |Φ|².
+
 Instrumental variables (``iv``). A subject who pushes moves the joint through the loop, so the
 motion carries the push that is also in the torque, and least squares takes it for the joint's own:
 it drifts toward −(J_c, B_c, 0). The perturbation carries nothing of the subject. Z is the motion
@@ -37,6 +45,10 @@ Complex = NDArray[np.complex128]
 LEAST = np.array([1e-5, 1e-3, 1e-2])
 """Smallest J, B and K that a response is simulated with, so that the simulated loop is stable."""
 
+DENSE = 16.0
+"""Samples a cycle of the highest line from which half of them show the motion as well as all: an
+acceleration near half the rate is then an angle 49 times smaller than at that line, or less."""
+
 T = TypeVar("T")
 
 
@@ -58,10 +70,21 @@ Linearise = Callable[[Sequence[Observation], Array], list[Problem]]
 
 
 def direct(observations: Sequence[Observation], values: Array) -> list[Problem]:
-    """Return the problems of least squares: the measured motion is its own instrument."""
+    """Return the problems of least squares: the measured motion is its own instrument.
+
+    Noise of the motion sensor must not be: on every second line the motion is that of the even
+    samples and the instrument that of the odd ones, and on the others the reverse.
+    """
     del values  # they do not depend on the parameters
-    everything = [observation.lines for observation in observations]
-    return [Problem(lines.motion, lines.motion, lines.torque_nm) for lines in everything]
+    problems = []
+    for observation in observations:
+        lines = observation.lines
+        motion = instruments = lines.motion
+        if lines.noise is not None and lines.grid.rate_hz > DENSE * lines.grid.band_hz[1]:
+            apart = lines.noise * np.where(lines.grid.line % 2, 1.0, -1.0)[:, None]
+            motion, instruments = lines.motion + apart, lines.motion - apart
+        problems.append(Problem(instruments, motion, lines.torque_nm, observation))
+    return problems
 
 
 def instrumental(observations: Sequence[Observation], values: Array) -> list[Problem]:

@@ -11,14 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from rigidimeter.analysis.estimation.bandlimited import band_hz
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
     INEXACT,
-    acceleration_by_settings,
+    acceleration_beyond_slope,
     phases_s,
     seen_beyond_samples,
     step_kept_s,
     torque_filter_of,
+)
+from rigidimeter.analysis.estimation.closedloop.controller_used import (
+    controller_used,
+    loop_shown,
 )
 from rigidimeter.analysis.estimation.closedloop.drive_fit import FoundDrive
 from rigidimeter.analysis.estimation.closedloop.drive_friction import half_of_friction
@@ -54,10 +57,13 @@ class Observation:
     Attributes
     ----------
     lines : Lines
-    perturbation : Channel
-        At every tick.
+    perturbation : Channel or None
+        At every tick; None where it is not used.
     excitation : Excitation or None
-        The loop that the epoch ran in; None where the perturbation is not known.
+        What the perturbation does in the loop; None where it is not used.
+    loop : Loop
+        That the epoch ran in, by the settings and the drive that the recording shows; where the
+        perturbation is not used also with the controller that it shows.
     excited : array of bool, shape (m,)
         The lines at which a periodic perturbation has power; all where it is not periodic.
     drive_known : bool
@@ -68,8 +74,9 @@ class Observation:
     """
 
     lines: Lines
-    perturbation: Channel
+    perturbation: Channel | None
     excitation: Excitation | None
+    loop: Loop
     excited: NDArray[np.bool_]
     drive_known: bool = False
     wider: Lines | None = None
@@ -146,17 +153,15 @@ def observe_periods(prepared: PreparedEpoch) -> Observation:
 
 
 def observe_motion(prepared: PreparedEpoch, motion: EpochMotion | None = None) -> Observation:
-    """Return an epoch whose perturbation is not known, in the band of least squares.
+    """Return an epoch at all lines of the band, whatever perturbed it.
 
-    `motion` is as for `observe`.
+    `motion` and errors are as for `observe`.
     """
-    epoch, estimation = prepared.epoch, prepared.settings.estimation
-    grid = epoch_grid(epoch, band_hz(epoch, estimation), estimation.trim_s)
+    if prepared.obstacle:
+        raise ValueError(prepared.obstacle)
+    grid = _grid(prepared, None)
     everywhere = np.ones(grid.line.size, dtype=np.bool_)
-    # The drive is followed as least squares follows it, or what it does looks like a delay.
-    motion = motion_of(prepared) if motion is None else motion
-    lines = epoch_lines(epoch, grid, motion, torque_filter_of(estimation))
-    return Observation(lines, epoch.channels["torque_nm"], None, everywhere)
+    return _observed(prepared, None, grid, everywhere, None, motion)
 
 
 def motion_of(prepared: PreparedEpoch) -> EpochMotion:
@@ -258,7 +263,7 @@ def _grid(
 
 def _observed(
     prepared: PreparedEpoch,
-    perturbation: Channel,
+    perturbation: Channel | None,
     grid: Grid,
     excited: NDArray[np.bool_],
     wider: Grid | None = None,
@@ -267,18 +272,22 @@ def _observed(
     epoch = prepared.epoch
     found = prepared.source.drive
     drive = found.model if found is not None else None
-    loop = loop_of(prepared.settings, epoch.channels["torque_nm"].rate_hz, drive)
-    key = (
-        hashlib.sha256(perturbation.values.tobytes()).digest(),
-        loop,
-        round((grid.time_s[0] - perturbation.time_s[0]) * 1e9),
-        grid.time_s.size,
-        round(1e6 * grid.rate_hz),
-        int(grid.line[0]),
-        int(grid.line[-1]),
-        prepared.epoch.left_out,
-    )
-    made = prepared.source.once(key, lambda: excitation(perturbation, loop, grid))
+    if perturbation is None:
+        made, loop = None, controller_used(prepared)
+    else:
+        loop = loop_shown(prepared)
+        key = (
+            hashlib.sha256(perturbation.values.tobytes()).digest(),
+            loop,
+            round((grid.time_s[0] - perturbation.time_s[0]) * 1e9),
+            grid.time_s.size,
+            round(1e6 * grid.rate_hz),
+            int(grid.line[0]),
+            int(grid.line[-1]),
+            prepared.epoch.left_out,
+        )
+        cause = perturbation
+        made = prepared.source.once(key, lambda: excitation(cause, loop, grid))
     torque_filter = torque_filter_of(prepared.settings.estimation)
     motion = motion_of(prepared) if motion is None else motion
     everything = epoch_lines(epoch, wider or grid, motion, torque_filter)
@@ -290,6 +299,7 @@ def _observed(
         lines,
         perturbation,
         made,
+        loop,
         excited,
         drive is not None,
         everything if wider is not None else None,
@@ -312,8 +322,9 @@ def _otherwise(
     grid, command = lines.grid, epoch.channels.get("velocity_command_rad_s")
     torque_filter = torque_filter_of(settings.estimation)
     if found is None or command is None:
-        seen_share = acceleration_by_settings(settings.rig, torque_filter)
-        change = lines.motion * np.array([seen_share - 1.0, 0.0, 0.0])
+        beyond = acceleration_beyond_slope(settings.rig, torque_filter, grid.omega_rad_s)
+        change = np.zeros_like(lines.motion)
+        change[:, 0] = beyond * lines.motion[:, 1]
         return [np.zeros_like(change), change]
     stamps_s, interval_s = epoch.channels["torque_nm"].time_s, 1.0 / command.mean_rate_hz
     tick, after = since_ticks(command, grid.time_s, 0.0)
@@ -331,21 +342,3 @@ def _otherwise(
     sent = grid.transform(command.values[tick])[:, None]
     moved = [np.asarray(change * sent) for change in changes]
     return [*moved, by_friction] if found.fitted.rubbing else moved
-
-
-def loop_of(settings: Settings, torque_rate_hz: float, drive: DriveModel | None) -> Loop:
-    """Return the loop that settings describe, with the drive that a recording shows.
-
-    Instruments made from a wrong loop are weaker, not wrong: whatever they are, they follow from
-    the perturbation alone.
-    """
-    rig, estimation = settings.rig, settings.estimation
-    # To the digits that stamps are good for, so that epochs of one rig have equal loops.
-    torque = rig.torque.model_copy(update={"rate_hz": float(f"{torque_rate_hz:.4g}")})
-    return Loop(
-        settings.controller,
-        rig.model_copy(update={"torque": torque}),
-        drive,
-        estimation.torque_lowpass_hz,
-        estimation.torque_lowpass_order,
-    )

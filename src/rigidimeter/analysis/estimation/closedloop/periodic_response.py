@@ -68,6 +68,7 @@ def impedance(observations: Sequence[Observation]) -> Impedance:
 def perturbation_lines(observation: Observation) -> Complex:
     """Return the perturbation at the lines, held from tick to tick, shape (m,)."""
     grid, cause = observation.lines.grid, observation.perturbation
+    assert cause is not None  # without one an epoch has no lines of it
     # A hundredth of a tick of rounding must not hold the level before.
     stamps = cause.time_s - 0.01 / cause.mean_rate_hz
     level = cause.values[np.maximum(np.searchsorted(stamps, grid.time_s, side="right") - 1, 0)]

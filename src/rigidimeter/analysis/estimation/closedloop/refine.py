@@ -31,6 +31,7 @@ from rigidimeter.analysis.estimation.closedloop.line_weights import (
     weighted_instruments,
 )
 from rigidimeter.analysis.estimation.closedloop.linear_problems import Complex, Linearise, Problem
+from rigidimeter.analysis.estimation.closedloop.loop_pull import loop_pull
 from rigidimeter.analysis.estimation.closedloop.observation import Observation
 from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines
 from rigidimeter.analysis.estimation.signals import Array
@@ -73,6 +74,8 @@ class LineFit:
     shape : Shape
     between : array, shape (p,)
         How far each parameter may be elsewhere for what is not known of the drive.
+    pulled : array, shape (p,)
+        How far the loop pulls each parameter (`loop_pull`).
     """
 
     values: Array
@@ -82,6 +85,7 @@ class LineFit:
     condition_number: float
     shape: Shape
     between: Array
+    pulled: Array
 
     @property
     def standard_errors(self) -> Array:
@@ -181,7 +185,8 @@ def fit_single(
         variance_bound([problem], [lines], [problem.instruments / own[:, None]]),
         condition_number([problem], [lines], weight_from),
         weight_from,
-        moved_elsewhere([problem], [weight_from.at(lines)], values),
+        moved_elsewhere([problem], [common], values),
+        loop_pull([problem], [common], values),
     )
 
 
@@ -239,6 +244,7 @@ def solve_pooled(
 def with_uncertainty(solution: PooledSolution) -> LineFit:
     """Return a solution with its covariance."""
     everything, shape, values = solution.everything, solution.shape, solution.values
+    powers = [shape.at(lines) for lines in everything]
     covariance, degrees = _pooled_covariance(solution)
     return LineFit(
         values,
@@ -247,7 +253,8 @@ def with_uncertainty(solution: PooledSolution) -> LineFit:
         solution.bound,
         condition_number(solution.problems, everything, shape),
         shape,
-        moved_elsewhere(solution.problems, [shape.at(lines) for lines in everything], values),
+        moved_elsewhere(solution.problems, powers, values),
+        loop_pull(solution.problems, powers, values),
     )
 
 

@@ -5,6 +5,10 @@ w(t) e^(−i ω_k t) and integrate. The derivative of the velocity moves to the 
 
     ∫ w e^(−iωt) θ'' dt = iω ∫ w e^(−iωt) θ' dt − ∫ w' e^(−iωt) θ' dt
 
+and once more for the acceleration where the angle alone was measured,
+
+    ∫ w e^(−iωt) θ'' dt = −ω² ∫ w e^(−iωt) θ dt − 2iω ∫ w' e^(−iωt) θ dt + ∫ w'' e^(−iωt) θ dt
+
 so nothing is differentiated. What is left is linear in J, B and K at every line, all signals are
 treated alike, and drift and noise outside the band simply are other lines (the modulating
 functions of Shinbrot 1957; Pearson and Lee 1985).
@@ -61,15 +65,16 @@ class Grid:
     time_s : array, shape (n,)
         Uniform, the stamps of the torque where those are uniform.
     rate_hz : float
-    window, window_slope_per_s : array, shape (n,)
-        w and w'.
+    window : array, shape (n,)
+    window_slope_per_s, window_curvature_per_s2 : array, shape (n,)
+        w' and w''.
     line : array of int, shape (m,)
         Which lines of the FFT are used.
     omega_rad_s : array, shape (m,)
     energy : float
         Σ w²: white noise of unit variance puts this much power into every line.
-    window_spectrum : complex array
-        Σ w e^(−iωt) at every line of the FFT up to the last that is used.
+    window_lines : complex array, shape (m,)
+        What a constant would leave at the lines.
     spread : float
         What is left out makes neighbouring lines alike. By this factor the variance of an estimate
         is then larger than independent lines would have it (`window.repetition`).
@@ -79,16 +84,12 @@ class Grid:
     rate_hz: float
     window: Array
     window_slope_per_s: Array
+    window_curvature_per_s2: Array
     line: NDArray[np.intp]
     omega_rad_s: Array
     energy: float
-    window_spectrum: Complex
+    window_lines: Complex
     spread: float = 1.0
-
-    @property
-    def window_lines(self) -> Complex:
-        """What a constant would leave at the lines, shape (m,)."""
-        return self.window_spectrum[int(self.line[0]) :]
 
     @property
     def band_hz(self) -> tuple[float, float]:
@@ -97,20 +98,54 @@ class Grid:
 
     def transform(self, values: Array) -> Complex:
         """Return Σ w x e^(−iωt) at the lines, free of the mean of x."""
-        windowed = self.window * values
-        spectrum = fft.rfft(windowed)[self.line]
-        return np.asarray(spectrum - self._mean(windowed) * self.window_lines)
+        return np.asarray(self.transforms(values, 0)[0, 0])
 
-    def transform_slope(self, values: Array) -> Complex:
-        """Return Σ w' x e^(−iωt) at the lines, free of the mean of x."""
-        # ∫ w' e^(−iωt) dt = iω ∫ w e^(−iωt) dt, since w is zero at both ends.
-        mean = self._mean(self.window * values)
-        slope = fft.rfft(self.window_slope_per_s * values)[self.line]
-        return np.asarray(slope - mean * 1j * self.omega_rad_s * self.window_lines)
+    def transforms(self, values: Array, derivatives: int) -> Complex:
+        """Return `transform` of x and of its derivatives, without differentiating it.
 
-    def _mean(self, windowed: Array) -> float:
-        """Return Σ w² x / Σ w², without a dot product, which would wake threads for so little."""
-        return float(np.add.reduce(self.window * windowed)) / self.energy
+        The mean of a derivative goes too, as of x: ∫ w² x' dt = −∫ (w²)' x dt. Each stands beside
+        half the difference of what the even samples and the odd ones alone give: that
+        is the spectrum as far below half the rate as the line is above zero, which holds noise
+        alone where the motion is slow against the samples.
+
+        Parameters
+        ----------
+        values : array, shape (n,)
+        derivatives : int
+            How many, up to 2.
+
+        Returns
+        -------
+        complex array, shape (derivatives + 1, 2, m)
+            x, x', x''; the line, and half the difference.
+        """
+        w, slope, curvature = self.window, self.window_slope_per_s, self.window_curvature_per_s2
+        centred = values - float(np.add.reduce(w**2 * values)) / self.energy
+        half, turn = values.size // 2, 1j * self.omega_rad_s
+
+        def lines(window: Array) -> Complex:
+            windowed = window * centred
+            spectrum = fft.rfft(windowed)
+            if values.size % 2 == 0:
+                apart = spectrum[half - self.line].conj()
+            else:
+                windowed[1::2] *= -1
+                apart = fft.rfft(windowed)[self.line]
+            return np.stack([spectrum[self.line], apart])
+
+        def without_mean(derivative: Complex, by_parts: Array) -> Complex:
+            mean = float(np.add.reduce(by_parts * centred)) / self.energy
+            return np.stack([derivative[0] - mean * self.window_lines, derivative[1]])
+
+        through = lines(w)
+        found = [through]
+        if derivatives > 0:
+            through_slope = lines(slope)
+            found.append(without_mean(turn * through - through_slope, -2 * w * slope))
+        if derivatives > 1:
+            twice = turn**2 * through - 2 * turn * through_slope + lines(curvature)
+            found.append(without_mean(twice, 2 * (slope**2 + w * curvature)))
+        return np.stack(found)
 
 
 @dataclass(frozen=True)
@@ -123,11 +158,15 @@ class Lines:
     torque_nm : complex array, shape (m,)
     motion : complex array, shape (m, 3)
         Acceleration, velocity and angle.
+    noise : complex array, shape (m, 3), or None
+        Half the difference of what the even and the odd samples of the motion give, whose noise is
+        independent; None where the motion lies between its samples.
     """
 
     grid: Grid
     torque_nm: Complex
     motion: Complex
+    noise: Complex | None = None
 
     def on(self, grid: Grid) -> Lines:
         """Return the lines of a grid of the same samples within this one."""
@@ -135,7 +174,8 @@ class Lines:
             return self
         first = int(grid.line[0] - self.grid.line[0])
         part = slice(first, first + grid.line.size)
-        return Lines(grid, self.torque_nm[part], self.motion[part])
+        noise = None if self.noise is None else self.noise[part]
+        return Lines(grid, self.torque_nm[part], self.motion[part], noise)
 
 
 def epoch_grid(
@@ -190,7 +230,7 @@ def _layout(
     band_hz: tuple[float, float],
     taper_s: float,
     holes_s: tuple[tuple[float, float], ...],
-) -> tuple[Array, Array, NDArray[np.intp], Array, float, Complex, float]:
+) -> tuple[Array, Array, Array, NDArray[np.intp], Array, float, Complex, float]:
     """Return what does not depend on where an epoch begins; epochs of a session share it."""
     low, high = band_hz
     duration_s = n / rate_hz
@@ -201,17 +241,16 @@ def _layout(
             f"{duration_s:.3g} s hold {line.size} spectral lines from {low:g} to {high:g} Hz; "
             f"at least {FEWEST_LINES} are needed"
         )
-    whole, slope = tapered_ends(n, rate_hz, taper_s)
-    window = whole
+    whole = window = tapered_ends(n, rate_hz, taper_s)
     for hole_s in holes_s:
-        window, slope = with_hole(window, slope, rate_hz, taper_s, hole_s)
-    spectrum = np.asarray(fft.rfft(window)[: line[-1] + 1], dtype=np.complex128)
-    energy = float(np.sum(window * window))
+        window = with_hole(window, rate_hz, taper_s, hole_s)
+    energy = float(np.sum(window.value**2))
+    constant = np.asarray(fft.rfft(window.value)[line], dtype=np.complex128)
     omega = np.asarray(2 * np.pi * line / duration_s, dtype=np.float64)
-    for part in (window, slope, line, omega, spectrum):
+    for part in (*window, line, omega, constant):
         part.setflags(write=False)
-    spread = repetition(window) / repetition(whole) if holes_s else 1.0
-    return window, slope, line, omega, energy, spectrum, spread
+    spread = repetition(window.value) / repetition(whole.value) if holes_s else 1.0
+    return *window, line, omega, energy, constant, spread
 
 
 def epoch_lines(
@@ -234,44 +273,60 @@ def epoch_lines(
         That the torque went through; the motion is sent through it too.
     """
     torque = grid.transform(values_at(epoch.channels["torque_nm"], grid.time_s, SAME_TIME))
-    if motion.driven_at is not None:
-        return Lines(grid, torque, _between_samples(epoch, grid, motion, torque_filter))
-    lines = spectra(grid, *motion.beyond_at(grid.time_s, SAME_TIME))
-    return Lines(grid, torque, lines * filtered(torque_filter, grid.omega_rad_s))
-
-
-def _between_samples(
-    epoch: Epoch, grid: Grid, motion: EpochMotion, torque_filter: TorqueFilter | None
-) -> Complex:
-    """Return the motion that the torque saw, for commands that were held from tick to tick."""
-    assert motion.driven_at is not None
-    drive, command = motion.driven_at.drive, motion.driven_at.command
     angle, velocity = (
         _sampled(epoch.channels.get(name), grid.time_s) for name in ("angle_rad", "velocity_rad_s")
     )
+    through = filtered(torque_filter, grid.omega_rad_s)
+    at_stamps = [_sampled(one, grid.time_s) is not None for one in motion_channels(epoch)]
+    if motion.driven_at is None:
+        if angle is not None and all(at_stamps):
+            return Lines(grid, torque, *(through * spectra(grid, angle, velocity)))
+        between = spectra(grid, *motion.beyond_at(grid.time_s, SAME_TIME))
+        return Lines(grid, torque, through * between[0])
+    command = motion.driven_at.command
     tick, after_s = since_ticks(command, grid.time_s, 0.0)
     interval_s = 1.0 / command.mean_rate_hz
     if angle is not None and velocity is not None and in_step(tick, after_s, interval_s):
-        omega, mean_s = grid.omega_rad_s, float(np.mean(after_s))
-        beyond = seen_beyond_samples(drive, torque_filter, omega, interval_s, mean_s)
+        beyond = seen_beyond_samples(
+            motion.driven_at.drive,
+            torque_filter,
+            grid.omega_rad_s,
+            interval_s,
+            float(np.mean(after_s)),
+        )
+        lines, noise = through * spectra(grid, angle, velocity)
         sent = grid.transform(command.values[tick])
-        sampled = spectra(grid, angle, velocity) * filtered(torque_filter, omega)
-        return np.asarray(sampled + beyond * sent[:, None])
-    lines = spectra(grid, *motion.beyond_at(grid.time_s, SAME_TIME))
-    lines *= filtered(torque_filter, grid.omega_rad_s)
+        return Lines(grid, torque, lines + beyond * sent[:, None], noise)
+    lines = through * spectra(grid, *motion.beyond_at(grid.time_s, SAME_TIME))[0]
     # At the stamps of the torque, and from there like the torque.
-    torque = epoch.channels["torque_nm"]
-    for column, part in enumerate(driven_behind(motion.driven_at, torque_filter, torque)):
-        there = Channel(torque.name, torque.time_s, part)
+    stamped = epoch.channels["torque_nm"]
+    for column, part in enumerate(driven_behind(motion.driven_at, torque_filter, stamped)):
+        there = Channel(stamped.name, stamped.time_s, part)
         lines[:, column] += grid.transform(values_at(there, grid.time_s, SAME_TIME))
-    return lines
+    return Lines(grid, torque, lines)
 
 
-def spectra(grid: Grid, angle_rad: Array, velocity_rad_s: Array) -> Complex:
-    """Return acceleration, velocity and angle at the lines; nothing is differentiated."""
-    velocity = grid.transform(velocity_rad_s)
-    acceleration = 1j * grid.omega_rad_s * velocity - grid.transform_slope(velocity_rad_s)
-    return np.stack([acceleration, velocity, grid.transform(angle_rad)], axis=1)
+def spectra(grid: Grid, angle_rad: Array, velocity_rad_s: Array | None) -> Complex:
+    """Return acceleration, velocity and angle at the lines, and their noise.
+
+    Parameters
+    ----------
+    grid : Grid
+    angle_rad, velocity_rad_s : array, shape (n,)
+        Without a velocity it is that of the angle.
+
+    Returns
+    -------
+    complex array, shape (2, m, 3)
+        Motion, and half the difference of even and odd samples.
+    """
+    if velocity_rad_s is None:
+        columns = grid.transforms(angle_rad, 2)[::-1]
+    else:
+        columns = np.concatenate(
+            [grid.transforms(velocity_rad_s, 1)[::-1], grid.transforms(angle_rad, 0)]
+        )
+    return np.moveaxis(columns, 0, -1)
 
 
 def _sampled(channel: Channel | None, time_s: Array) -> Array | None:

@@ -27,15 +27,34 @@ Harmless = tuple[str, Mapping[str, Fact]]
 HARMFUL: Harmless = ("", {})
 
 
+HELD = 0.05
+"""Of a parameter: a bias that the interval holds is known to the first order, so that the square of
+this share of it is not."""
+
+
+def too_biased(
+    bias: Array, values: Array, half_widths: Array, most_percent: float, in_interval: bool
+) -> bool:
+    """Return whether the bias of J, B or K is more than so many % of half its interval.
+
+    One that the interval holds must also be more than `HELD` of the parameter.
+    """
+    small = np.abs(bias) <= most_percent / 100.0 * half_widths
+    if in_interval:
+        small |= np.abs(bias) <= HELD * np.abs(values)
+    return not np.all(small)
+
+
 def push_harmless(case: Case, look: Look) -> Harmless:
     """Return why torque of the subject's own does not bias the estimate; `HARMFUL` if it does."""
     del look
     if case.uses_perturbation:
         return "instrument", {}
-    share = case.loop_bias_percent
-    if share is not None and share <= case.settings.max_loop_bias_percent:
-        return "small_bias", {"share": share}
-    return HARMFUL
+    if not case.loop_bias_is_small:
+        return HARMFUL
+    if case.bias_in_interval:
+        return "in_interval", {}
+    return "small_bias", {"share": case.loop_bias_percent or 0.0}
 
 
 def push_effect(case: Case) -> Effect:
@@ -82,6 +101,8 @@ class Case:
     unbiased : array, shape (3,), optional
         For least squares: J, B and K without the bias that torque of the subject causes by the
         loop, NaN where it is too much to be told.
+    bias_in_interval : bool
+        Whether the intervals of the fit hold that bias.
     prepared : PreparedEpoch, optional
         The epoch with what was made of it; without it nothing is said of a joint that varies,
         of terms that are missing, nor of the controller.
@@ -96,6 +117,7 @@ class Case:
     method: Method | None = None
     loop: Loop | None = None
     unbiased: Array | None = None
+    bias_in_interval: bool = False
     prepared: PreparedEpoch | None = None
     _made: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
 
@@ -124,6 +146,17 @@ class Case:
         """`loop_bias` in % of `half_widths`, the largest of the three."""
         bias = self.loop_bias
         return None if bias is None else 100.0 * float(np.max(np.abs(bias) / self.half_widths))
+
+    @property
+    def loop_bias_is_small(self) -> bool:
+        """Whether J, B and K can be used as they are, whatever the loop does to least squares."""
+        if self.loop_bias is None:
+            return False
+        most = self.settings.max_loop_bias_percent
+        large = too_biased(
+            self.loop_bias, self.parameters, self.half_widths, most, self.bias_in_interval
+        )
+        return not large
 
     def once(self, make: Callable[[Case], T]) -> T:
         """Return ``make(self)``, made when the first check asks for it."""

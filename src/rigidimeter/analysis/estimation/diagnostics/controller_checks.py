@@ -11,10 +11,12 @@ bias that `loop_bias` tells is computed with the controller that the recording s
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
+from rigidimeter.analysis.estimation.closedloop.controller_used import (
+    controller_shown,
+    misfit_of_settings,
+)
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
     HARMFUL,
     Case,
@@ -23,11 +25,6 @@ from rigidimeter.analysis.estimation.diagnostics.check_record import (
     Look,
     at_most,
     push_harmless,
-)
-from rigidimeter.analysis.estimation.diagnostics.controller_used import (
-    command_made,
-    loop_shown,
-    misfit_of_settings,
 )
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array
@@ -47,7 +44,7 @@ def controller_misfit(prepared: PreparedEpoch, loop: Loop) -> Look | None:
     value, factor = misfit
     most = prepared.settings.diagnostics.max_controller_misfit_percent
     look = at_most(value, most, factor=factor)
-    shown = _controller_shown(prepared, loop) if look.failed else None
+    shown = controller_shown(prepared, loop) if look.failed else None
     if shown is None:
         return look
     facts = {
@@ -56,28 +53,6 @@ def controller_misfit(prepared: PreparedEpoch, loop: Loop) -> Look | None:
         **look.facts,
     }
     return look._replace(facts=facts, variant=_how_shown(loop.controller, shown))
-
-
-def controller_used(prepared: PreparedEpoch) -> Loop:
-    """Return the loop with the controller that the recording shows.
-
-    That is the one of the settings unless another makes the recorded command and it does not.
-    """
-    loop, channels = loop_shown(prepared), prepared.epoch.channels
-    if not all(name in channels for name in ("velocity_command_rad_s", "perturbation_nm")):
-        return loop
-    misfit = prepared.once(misfit_of_settings)
-    most = prepared.settings.diagnostics.max_controller_misfit_percent
-    shown = _controller_shown(prepared, loop) if misfit and misfit[0] > most else None
-    return loop if shown is None else replace(loop, controller=shown)
-
-
-def _controller_shown(prepared: PreparedEpoch, loop: Loop) -> ControllerSettings | None:
-    """Return the controller that makes the recorded command, if there is one."""
-    made = command_made(prepared.epoch, loop)
-    shown = made.shown(loop.controller) if made is not None else None
-    most = prepared.settings.diagnostics.max_controller_misfit_percent
-    return None if made is None or shown is None or made.misfit(shown)[0] > most else shown
 
 
 def unstable_loop(parameters: Array, loop: Loop) -> Look | None:

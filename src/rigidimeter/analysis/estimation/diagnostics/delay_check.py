@@ -6,8 +6,8 @@ Torque that is stamped τ late makes of J s² + B s + K, to the first order in �
 
 Where the perturbation was recorded, a delay is told from a reflex, friction and a soft cuff, and is
 corrected or named as one of them. Without it a delay is known and its cause is not. Where the drive
-is not known either, a delay as short as that of the acceleration at the ticks (`as_sampled`) may be
-the drive's, which is in the interval of J.
+is not known either, a delay as short as that of the acceleration at the ticks may be the drive's,
+which is in the interval of J.
 """
 
 from __future__ import annotations
@@ -16,13 +16,29 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rigidimeter.analysis.estimation.closedloop.between_samples import acceleration_late_s
 from rigidimeter.analysis.estimation.found import found, half_widths
+from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.core.findings import Effect, Finding
 from rigidimeter.core.records import Delay, Fit
 from rigidimeter.core.settings import DiagnosticsSettings
+from rigidimeter.model import DriveModel
 
 SIGNIFICANT = 3.0
 """In standard errors."""
+
+
+def delay_of_drive_s(prepared: PreparedEpoch) -> float:
+    """Return which delay of the torque may be the drive's, where it was not followed; else 0.
+
+    Inertia is most of the torque where a delay shows, so an acceleration that is late at the ticks
+    looks like a late torque. Which drive it was is not known: that of the settings tells the size.
+    """
+    if prepared.source.drive is not None and "velocity_command_rad_s" in prepared.epoch.channels:
+        return 0.0
+    rig = prepared.settings.rig
+    drive = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
+    return abs(acceleration_late_s(drive, 1.0 / rig.tick_rate_hz))
 
 
 def torque_delay(

@@ -8,6 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from rigidimeter.analysis.estimation.bandlimited import bandlimited_signals
+from rigidimeter.analysis.estimation.closedloop.controller_used import loop_shown
+from rigidimeter.analysis.estimation.closedloop.line_weights import (
+    shared_density,
+    smoother_for,
+)
+from rigidimeter.analysis.estimation.closedloop.linear_problems import direct
+from rigidimeter.analysis.estimation.closedloop.loop_pull import loop_pull
+from rigidimeter.analysis.estimation.closedloop.observation import observe_motion
 from rigidimeter.analysis.estimation.diagnostics.channel_checks import CHANNEL_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look
 from rigidimeter.analysis.estimation.diagnostics.computed_torque_checks import (
@@ -16,9 +24,7 @@ from rigidimeter.analysis.estimation.diagnostics.computed_torque_checks import (
 )
 from rigidimeter.analysis.estimation.diagnostics.controller_checks import (
     CONTROLLER_CHECKS,
-    controller_used,
 )
-from rigidimeter.analysis.estimation.diagnostics.controller_used import loop_shown
 from rigidimeter.analysis.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.missing_term import MISSING_TERM_CHECKS
@@ -27,7 +33,6 @@ from rigidimeter.analysis.estimation.diagnostics.movement_checks import MOVEMENT
 from rigidimeter.analysis.estimation.diagnostics.tremor_check import TREMOR_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.varying_checks import VARYING_CHECKS
 from rigidimeter.analysis.estimation.found import in_half_intervals
-from rigidimeter.analysis.estimation.least_squares_bias import compensated
 from rigidimeter.analysis.estimation.methods import method_named
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array
@@ -72,7 +77,9 @@ def diagnose(
     return tuple(one.finding(look, case) for one, look in looks if look is not None and look.failed)
 
 
-def checked(prepared: PreparedEpoch, fit: Fit, *, exclusions_alone: bool = False) -> Fit:
+def checked(
+    prepared: PreparedEpoch, fit: Fit, *, exclusions_alone: bool = False, by_noise: bool = True
+) -> Fit:
     """Return the fit with what the checks found, excluded if one of them says so.
 
     Parameters
@@ -81,12 +88,20 @@ def checked(prepared: PreparedEpoch, fit: Fit, *, exclusions_alone: bool = False
     fit : Fit
     exclusions_alone : bool
         Run those checks alone that may exclude the epoch.
+    by_noise : bool
+        False where J, B and K are used with others by least squares without weights.
     """
     if fit.n_samples == 0 or prepared.obstacle:
         return fit  # the fit has said why
     method = method_named(fit.method)
-    by_loop = None if method.uses_perturbation else prepared.once(unbiased)
-    case = replace(_case(prepared, fit.value), fit=fit, method=method, unbiased=by_loop)
+    by_noise = by_noise and method.by_noise
+    case = replace(
+        _case(prepared, fit.value),
+        fit=fit,
+        method=method,
+        unbiased=None if method.uses_perturbation else unbiased(prepared, fit, by_noise),
+        bias_in_interval=by_noise,
+    )
     levels = case.settings.levels
     checks = [c for c in CHECKS if not exclusions_alone or levels.of(c.name) == "exclude"]
     findings = diagnose(case, prepared.once(_seen_without_fit), checks)
@@ -113,14 +128,17 @@ def _case(prepared: PreparedEpoch, parameters: Array) -> Case:
     )
 
 
-def unbiased(prepared: PreparedEpoch) -> Array:
-    """Return J, B and K by least squares without the bias of the loop; NaN where it is too large.
+def unbiased(prepared: PreparedEpoch, fit: Fit, by_noise: bool) -> Array:
+    """Return J, B and K by least squares without the pull of the loop; NaN where it is too large.
 
-    The loop is the one that the settings describe, with drive and controller that the recording
-    shows.
+    By that of least squares in which each line counts by its noise, or alike.
     """
-    found = compensated(prepared.signals(bandlimited_signals), controller_used(prepared))
-    return np.full(3, np.nan) if found is None else found
+    observation = prepared.once(observe_motion)
+    problems, lines = direct([observation], fit.value), [observation.lines]
+    power = np.ones(lines[0].torque_nm.size)
+    if by_noise:
+        power = shared_density(lines, problems, fit.value, smoother_for(lines)).at(lines[0])
+    return fit.value - loop_pull(problems, [power], fit.value)
 
 
 def _seen_without_fit(prepared: PreparedEpoch) -> dict[str, Look | None]:

@@ -175,9 +175,10 @@ def gravity(
     return Look(stiffness_nm_rad - slope, math.nan, True, facts)
 
 
-def _of_least_squares(case: Case, look: Look) -> Harmless:
-    """Return why little of the torque does not bias an instrument; least squares it may."""
-    return push_harmless(case, look) if case.uses_perturbation else HARMFUL
+def _by_noise(case: Case, look: Look) -> Harmless:
+    """Return why torque beyond the model does not matter to a method that weights it away."""
+    weighted = case.method is not None and case.method.by_noise
+    return push_harmless(case, look) if weighted else HARMFUL
 
 
 def _by_chance(case: Case, look: Look) -> Harmless:
@@ -223,7 +224,7 @@ PARAMETER_CHECKS = (
         "r_squared",
         (),
         lambda c: r_squared(c.fit.r_squared, c.settings) if c.fit is not None else None,
-        harmless=_of_least_squares,
+        harmless=_by_noise,
     ),
     Check(
         "negative_parameters",

@@ -21,6 +21,7 @@ from rigidimeter.analysis.estimation.diagnostics.check_record import (
     at_most,
     push_effect,
     push_harmless,
+    too_biased,
 )
 from rigidimeter.analysis.estimation.found import half_widths
 from rigidimeter.analysis.estimation.power_lines import lines_inside, power_lines
@@ -82,21 +83,22 @@ def active_movement(voluntary_nm: Array, signals: Signals, settings: Diagnostics
     return at_most(value, settings.max_active_percent, above_nm=above_nm, first_s=first_s)
 
 
-def loop_bias(fit: Fit, unbiased: Array, settings: DiagnosticsSettings) -> Look:
+def loop_bias(fit: Fit, unbiased: Array, in_interval: bool, settings: DiagnosticsSettings) -> Look:
     """Return how far the loop pulls least squares from the joint, in % of half the intervals."""
     bias = fit.value - unbiased
     value = 100.0 * float(np.max(np.abs(bias) / half_widths(fit)))
     most = settings.max_loop_bias_percent
+    large = too_biased(bias, fit.value, half_widths(fit), most, in_interval)
     if not np.isfinite(value):
         return Look(value, most, True, variant="unknown")
     effect = Effect.of(bias, fit.value, half_widths(fit))
-    return Look(value, most, not value <= most, effect=effect)
+    return Look(value, most, large, effect=effect)
 
 
 def _loop_bias(case: Case) -> Look | None:
     if case.fit is None or case.unbiased is None:
         return None
-    return loop_bias(case.fit, case.unbiased, case.settings)
+    return loop_bias(case.fit, case.unbiased, case.bias_in_interval, case.settings)
 
 
 def emg_envelope_v(emg: Channel, window_s: float) -> Array:

@@ -267,9 +267,9 @@ def _pooled_bias(
     own = [(p, f) for p, f in counting if fit.condition in ("", f.condition)]
     if not own:
         return []
-    bias = np.mean([one.value - p.once(unbiased) for p, one in own], axis=0)
-    settings = own[0][0].settings.diagnostics
-    look = loop_bias(fit, fit.value - bias, settings)
+    by_noise, settings = estimator.by_noise, own[0][0].settings.diagnostics
+    bias = np.mean([one.value - unbiased(p, one, by_noise) for p, one in own], axis=0)
+    look = loop_bias(fit, fit.value - bias, by_noise, settings)
     if not look.failed:
         return []
     return [

@@ -153,6 +153,7 @@ def _from_first_line(grid: Grid) -> Grid:
         grid,
         line=line,
         omega_rad_s=np.asarray(step_rad_s * line, dtype=np.float64),
+        window_lines=np.asarray(fft.rfft(grid.window)[line]),
     )
 
 

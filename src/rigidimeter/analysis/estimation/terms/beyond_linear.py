@@ -272,7 +272,7 @@ def beyond_linear(
         )
     each = count // stretches
     used = each * stretches
-    window, _ = tapered_ends(n, rate_hz, taper_s)
+    window = tapered_ends(n, rate_hz, taper_s).value
     linear = [
         _lines(values, window, first, used).reshape(stretches, each)
         for values in (motion.acceleration_rad_s2, motion.velocity_rad_s, motion.angle_rad)

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from rigidimeter.analysis.estimation import fit_epochs
-from rigidimeter.analysis.estimation.closedloop.observation import loop_of
+from rigidimeter.analysis.estimation.closedloop.controller_used import command_made, loop_of
 from rigidimeter.analysis.estimation.diagnostics import checked
-from rigidimeter.analysis.estimation.diagnostics.controller_used import command_made
 from rigidimeter.analysis.estimation.prepared import prepare
 from rigidimeter.core.settings import changed_settings, parse_settings
 from rigidimeter.model import JointDynamics
@@ -51,7 +50,7 @@ def test_another_controller_is_told_by_the_command_and_does_not_bias_iv():
 
 def test_for_least_squares_it_matters_where_the_subject_pushes():
     assert found("bandlimited", WRONG)["controller_misfit"].level == "note"
-    assert found("bandlimited", WRONG, push_nm=0.3)["controller_misfit"].level == "caution"
+    assert found("published", WRONG, push_nm=0.3)["controller_misfit"].level == "caution"
 
 
 @pytest.mark.parametrize("push_nm", [0.0, 0.3])
@@ -99,7 +98,7 @@ def test_a_movement_that_is_imposed_beside_the_perturbation_is_no_other_controll
 @pytest.mark.parametrize("times", [10.0, 57.3])
 def test_a_loop_that_was_another_does_not_say_that_least_squares_is_unbiased(times):
     given = {"controller": {"inertia_kg_m2": 0.0458 * times, "damping_nm_s_rad": 1.604 * times}}
-    pushed = found("bandlimited", given, push_nm=0.1)
+    pushed = found("published", given, push_nm=0.1)
     assert pushed["controller_misfit"].level == pushed["loop_bias"].level == "caution"
 
 

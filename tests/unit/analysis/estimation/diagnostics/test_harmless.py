@@ -38,11 +38,11 @@ def test_a_level_that_was_set_is_used_in_any_case(level):
 @pytest.mark.parametrize(
     ("push_nm", "r_squared", "doubted"), [(0.5, 0.29, True), (0.5, 0.31, False), (0.0, 0.29, True)]
 )
-def test_a_small_r_squared_asks_for_caution_with_least_squares(push_nm, r_squared, doubted):
+def test_a_small_r_squared_asks_for_caution_without_weights(push_nm, r_squared, doubted):
     settings = parse_settings({"subject": {"OFF": {"voluntary_sd_nm": push_nm}}})
     epochs = [simulate_epochs(settings, 1, joints=[JOINT], conditions="OFF", seed=3).epoch(0)]
     (prepared,) = prepare(epochs, settings)
-    for method, level in (("bandlimited", "caution"), ("iv", "note")):
+    for method, level in (("published", "caution"), ("bandlimited", "note"), ("iv", "note")):
         (fit,), _ = fit_epochs(epochs, method, settings)
         findings = checked(prepared, replace(fit, r_squared=r_squared)).findings
         assert [f.level for f in findings if f.name == "r_squared"] == [level] * doubted
@@ -77,7 +77,8 @@ def test_a_bias_of_the_loop_below_a_percent_and_the_interval_is_a_note():
         "a", "1", "OFF", "bandlimited", Outcome(), value=value, low=0.99 * value, high=1.01 * value
     )
     for percent, level in ((0.8, "note"), (1.2, "caution")):
-        look = loop_bias(fit, value * [1.0, 1.0, 1 - percent / 100], DiagnosticsSettings())
+        unbiased = value * [1.0, 1.0, 1 - percent / 100]
+        look = loop_bias(fit, unbiased, False, DiagnosticsSettings())
         assert look.failed
         assert look.effect.percent == pytest.approx((0.0, 0.0, percent))
         assert look.effect.half_intervals == pytest.approx((0.0, 0.0, percent))
@@ -87,7 +88,18 @@ def test_a_bias_of_the_loop_below_a_percent_and_the_interval_is_a_note():
         assert finding.level == level
 
 
-@pytest.mark.parametrize("method", ["iv", "bandlimited"])
+@pytest.mark.parametrize(("percent", "failed"), [(4.9, False), (5.1, True)])
+def test_a_bias_that_the_interval_holds_fails_above_five_percent(percent, failed):
+    """All of half the interval is bias, which passes the limit of 50 %."""
+    value, share = np.array([0.0045, 0.1368, 1.751]), percent / 100
+    ends = {"low": (1 - share) * value, "high": (1 + share) * value}
+    fit = Fit("a", "1", "OFF", "bandlimited", Outcome(), value=value, **ends)
+    unbiased = value * [1.0, 1 - share, 1.0]
+    assert loop_bias(fit, unbiased, True, DiagnosticsSettings()).failed == failed
+    assert loop_bias(fit, unbiased, False, DiagnosticsSettings()).failed
+
+
+@pytest.mark.parametrize("method", ["iv", "published"])
 def test_a_push_says_what_it_does_to_the_method_used(method):
     push = found(method, {"voluntary_sd_nm": 0.3})
     effect = push["voluntary_torque"].effect

@@ -149,8 +149,8 @@ def lines_of(torque, motion, n=600, rate_hz=30.0):
     """Return lines without a window, of white signals."""
     line = np.arange(1, 256)
     grid = Grid(
-        np.arange(n) / rate_hz, rate_hz, np.ones(n), np.zeros(n), line,
-        2 * np.pi * line * rate_hz / n, float(n), np.zeros(line.size + 1, complex),
+        np.arange(n) / rate_hz, rate_hz, np.ones(n), np.zeros(n), np.zeros(n), line,
+        2 * np.pi * line * rate_hz / n, float(n), np.zeros(line.size, complex),
     )  # fmt: skip
     spectra = np.fft.rfft(motion, axis=0)[1:256]
     return VaryingLines(

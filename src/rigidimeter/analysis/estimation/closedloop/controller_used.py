@@ -14,19 +14,18 @@ all the others.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from rigidimeter.analysis.estimation.closedloop.observation import loop_of
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array
-from rigidimeter.analysis.estimation.window import with_hole
+from rigidimeter.analysis.estimation.window import Window, with_hole
 from rigidimeter.core.records import Epoch
-from rigidimeter.core.settings import ControllerSettings
-from rigidimeter.model import Loop, admittance, butterworth_lowpass
+from rigidimeter.core.settings import ControllerSettings, Settings
+from rigidimeter.model import DriveModel, Loop, admittance, butterworth_lowpass
 
 COMPARED_HZ = (0.5, 10.0)
 """Below, the start of the epoch still counts; above, how the torque is held between its samples."""
@@ -124,12 +123,12 @@ def command_made(epoch: Epoch, loop: Loop) -> CommandMade | None:
     rate_hz, n = command.mean_rate_hz, command.time_s.size
     if float(np.ptp(np.diff(command.time_s))) > 0.5 / rate_hz:
         return None
-    window, steep = np.hanning(n), np.zeros(n)
+    window = Window(np.hanning(n), np.zeros(n), np.zeros(n))
     for stretch in epoch.left_out:  # there neither torque nor, where samples are lost, command is
         hole_s = (stretch.start_s - command.time_s[0], stretch.stop_s - command.time_s[0])
-        window, steep = with_hole(window, steep, rate_hz, FORGOTTEN_S, hole_s)
+        window = with_hole(window, rate_hz, FORGOTTEN_S, hole_s)
     asked = _asked_nm(epoch, loop, command.time_s, rate_hz)
-    return CommandMade(command.values, asked, window, rate_hz)
+    return CommandMade(command.values, asked, window.value, rate_hz)
 
 
 def loop_shown(prepared: PreparedEpoch) -> Loop:
@@ -146,6 +145,28 @@ def misfit_of_settings(prepared: PreparedEpoch) -> tuple[float, float] | None:
     return None if made is None else made.misfit(loop.controller)
 
 
+def controller_used(prepared: PreparedEpoch) -> Loop:
+    """Return the loop with the controller that the recording shows.
+
+    That is the one of the settings unless another makes the recorded command and it does not.
+    """
+    loop, channels = loop_shown(prepared), prepared.epoch.channels
+    if not all(name in channels for name in ("velocity_command_rad_s", "perturbation_nm")):
+        return loop
+    misfit = prepared.once(misfit_of_settings)
+    most = prepared.settings.diagnostics.max_controller_misfit_percent
+    shown = controller_shown(prepared, loop) if misfit and misfit[0] > most else None
+    return loop if shown is None else replace(loop, controller=shown)
+
+
+def controller_shown(prepared: PreparedEpoch, loop: Loop) -> ControllerSettings | None:
+    """Return the controller that makes the recorded command, if there is one."""
+    made = command_made(prepared.epoch, loop)
+    shown = made.shown(loop.controller) if made is not None else None
+    most = prepared.settings.diagnostics.max_controller_misfit_percent
+    return None if made is None or shown is None or made.misfit(shown)[0] > most else shown
+
+
 def _asked_nm(epoch: Epoch, loop: Loop, ticks_s: Array, rate_hz: float) -> Array:
     perturbation, torque = epoch.channels["perturbation_nm"], epoch.channels["torque_nm"]
     held = np.searchsorted(perturbation.time_s, ticks_s + 0.01 / rate_hz, side="right") - 1
@@ -157,3 +178,21 @@ def _asked_nm(epoch: Epoch, loop: Loop, ticks_s: Array, rate_hz: float) -> Array
         b0, b1, b2, a1, a2 = butterworth_lowpass(cutoff_hz, rate_hz)
         read = signal.lfilter([b0, b1, b2], [1.0, a1, a2], read)
     return np.asarray(perturbation.values[np.maximum(held, 0)] - read, dtype=np.float64)
+
+
+def loop_of(settings: Settings, torque_rate_hz: float, drive: DriveModel | None) -> Loop:
+    """Return the loop that settings describe, with the drive that a recording shows.
+
+    Instruments made from a wrong loop are weaker, not wrong: whatever they are, they follow from
+    the perturbation alone.
+    """
+    rig, estimation = settings.rig, settings.estimation
+    # To the digits that stamps are good for, so that epochs of one rig have equal loops.
+    torque = rig.torque.model_copy(update={"rate_hz": float(f"{torque_rate_hz:.4g}")})
+    return Loop(
+        settings.controller,
+        rig.model_copy(update={"torque": torque}),
+        drive,
+        estimation.torque_lowpass_hz,
+        estimation.torque_lowpass_order,
+    )

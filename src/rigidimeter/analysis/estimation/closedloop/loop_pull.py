@@ -1,0 +1,83 @@
+"""How far the loop pulls least squares away from the joint, from the recording itself.
+
+A torque u that is added to the joint's own, Y = Φ p + u, is the subject's own torque and the noise
+of the sensor. In admittance control it comes back as motion: Φ = Φ_d + H(p) u, with Φ_d what the
+perturbation causes and H the loop's motion per torque. Least squares with weights 1/S then gives
+
+    p + b,    b = G⁻¹ Σ Re(Φ^H u) / S,    G = Σ Re(Φ^H Φ) / S,    E Re(Φ^H u) = Re(H(p)*) |u|²
+
+over the lines, whatever else moves the joint. With u = Y − Φ (p̂ − b) both sides depend on b alone,
+and are solved for it by iteration from b = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST, Problem
+from rigidimeter.analysis.estimation.closedloop.spectral_lines import Grid
+from rigidimeter.analysis.estimation.signals import Array
+from rigidimeter.model import Loop, OpenLoop
+
+ITERATIONS = 50
+DAMPING = 0.5
+SETTLED = 1e-3
+"""A step of less than this share of every parameter ends the iteration."""
+
+DIVERGED = 1e3
+"""So does a bias of so many times a parameter."""
+
+
+def loop_pull(problems: Sequence[Problem], powers: Sequence[Array], values: Array) -> Array:
+    """Return b, shape (p,); 0 for instruments, NaN where no joint fits recording and loop.
+
+    Parameters
+    ----------
+    problems : sequence of Problem
+    powers : sequence of array, shape (m,)
+        S at the lines of each.
+    values : array, shape (p,)
+        The solution.
+    """
+    p = values.size
+    gram, bias = np.zeros((p, p)), np.zeros(p)
+    pulled: list[tuple[Problem, Array, OpenLoop]] = []
+    for problem, power in zip(problems, powers, strict=True):
+        observation = problem.observation
+        if observation is None or observation.excitation is not None:
+            continue
+        pulled.append((problem, power, _opened(observation.loop, observation.lines.grid)))
+        gram += ((problem.instruments / power[:, None]).conj().T @ problem.regressors).real
+    if not pulled:
+        return bias
+    scale = np.sqrt(np.abs(np.diag(gram)))
+    scaled = gram / np.outer(scale, scale)
+    for _ in range(ITERATIONS):
+        moment = np.zeros(p)
+        for problem, power, opened in pulled:
+            held = np.array(problem.held)
+            J, B, K = np.maximum(np.concatenate([held, values - bias]), LEAST).tolist()
+            comes_back = opened.motion_per_torque((J, B, K)).real[held.size :]
+            u = problem.target - problem.regressors @ (values - bias)
+            moment += comes_back @ (np.abs(u) ** 2 / power)
+        step = np.linalg.solve(scaled, moment / scale) / scale - bias
+        bias = bias + DAMPING * step
+        if not np.all(np.abs(bias) < DIVERGED * np.abs(values)):
+            break
+        if np.all(np.abs(step) < SETTLED * np.abs(values)):
+            return bias
+    return np.full(p, np.nan)
+
+
+@lru_cache(maxsize=8)
+def _opened_at(loop: Loop, first: int, count: int, spacing_hz: float) -> OpenLoop:
+    highest_hz = 0.49 * loop.rig.tick_rate_hz
+    return loop.at_frequency(np.minimum(spacing_hz * np.arange(first, first + count), highest_hz))
+
+
+def _opened(loop: Loop, grid: Grid) -> OpenLoop:
+    spacing_hz = float(f"{grid.rate_hz / grid.time_s.size:.9g}")
+    return _opened_at(loop, int(grid.line[0]), grid.line.size, spacing_hz)
