@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks import two_rigs
 from benchmarks.known_joint import TRUTH, array, sessions, settings_with
 from rigidimeter.analysis.estimation import estimate_delays, fit_epochs
 from rigidimeter.analysis.estimation.closedloop.linear_problems import least_squares_start
@@ -273,6 +274,22 @@ def section_3_4(n: int) -> list[str]:
     ]
 
 
+def rigs(n: int) -> list[str]:
+    """Single epochs on the virtual rig and on an independent one."""
+    return [
+        "## Two rigs",
+        "",
+        f"{n} epochs of 20 s each, in recordings of {two_rigs.SESSION}: of the virtual rig, and of "
+        "one in continuous time that shares nothing with it "
+        "(`tests/scenarios/independent_rig.py`: a PI drive that its load slows down, another "
+        "controller and perturbation, voluntary torque with soft skirts, tremor that drifts). "
+        "Numbers are for J, B, K; coverage is that of 95 % intervals; SE / SD is the median "
+        "standard error over the SD.",
+        "",
+        *table(two_rigs.HEADER, two_rigs.rows(n)),
+    ]
+
+
 PARTS: Mapping[str, tuple[Callable[[int], list[str]], int]] = {
     "pooled": (pooled_bias, 1000),
     "relaxed": (
@@ -292,6 +309,7 @@ PARTS: Mapping[str, tuple[Callable[[int], list[str]], int]] = {
         partial(efficiency, "Voluntary torque of 0.5 N·m", 0.5, ("iv", "spectral")),
         500,
     ),
+    "two-rigs": (rigs, 200),
     "delay": (delay, 50),
     "rates": (paper_rates, 100),
     "section-3.4": (section_3_4, 100),
