@@ -10,7 +10,11 @@ with it. Run by `make bench`; a table goes to `docs/reference/benchmarks.md`.
 from __future__ import annotations
 
 import argparse
+import os
 import platform
+import resource
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
@@ -24,6 +28,8 @@ from rigidimeter.core.settings import parse_settings
 from rigidimeter.virtual import run_virtual_session
 
 TABLE = Path(__file__).parent.parent / "docs" / "reference" / "benchmarks.md"
+IMPORTS = 20
+"""Repeats of what takes a second and differs by some percent."""
 END = "<!-- measured: end -->"
 """What follows it in the page is written by hand, and stays."""
 
@@ -59,6 +65,29 @@ def reading_against_numpy(folder: Path, repeats: int) -> Row:
     return in_ms("CSV of 200,000 rows to checked epochs / numpy.loadtxt", times_s)
 
 
+def import_against_scipy(folder: Path, repeats: int) -> Row:
+    """CPU time of a process that takes `rigidimeter.estimate`, against one with scipy.signal.
+
+    Both from bytecode, as an installed package is.
+    """
+    environment = {**os.environ, "PYTHONPYCACHEPREFIX": str(folder), "PYTHONDONTWRITEBYTECODE": ""}
+
+    def running(code: str) -> None:
+        subprocess.run([sys.executable, "-c", code], check=True, env=environment)
+
+    def of_children_s() -> float:
+        usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return usage.ru_utime + usage.ru_stime
+
+    times_s = paired(
+        lambda: running("import rigidimeter; rigidimeter.estimate"),
+        lambda: running("import numpy, scipy.signal"),
+        repeats,
+        of_children_s,
+    )
+    return in_ms("import rigidimeter.estimate / numpy and scipy.signal, CPU", times_s)
+
+
 def main() -> None:
     """Run every benchmark, print the table and write it to the page."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
@@ -68,6 +97,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         rows = [
+            import_against_scipy(folder, 1 if quick else IMPORTS),
             loop_against_real_time(folder, repeats),
             reading_against_numpy(folder, repeats),
             *(batch.rows(1, 1, (1, 2)) if quick else batch.rows()),

@@ -63,6 +63,14 @@ def test_importing_the_package_imports_nothing_heavy() -> None:
     assert ours == {"rigidimeter", "rigidimeter.core", "rigidimeter.core.version"}
 
 
+def test_estimate_imports_no_part_of_scipy() -> None:
+    """Each is imported when it is used: together they cost more than the rest."""
+    code = "import rigidimeter, sys; rigidimeter.estimate; print(' '.join(sys.modules))"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    parts = {f"scipy.{name}" for name in ("fft", "optimize", "signal", "special", "stats")}
+    assert not {"pandas", "matplotlib", "h5py", *parts} & set(ran.stdout.split())
+
+
 def test_the_names_stay_functions_when_their_rooms_are_imported() -> None:
     """A sub-package of the same name would take the place of the function."""
     code = (

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal
 
 Array = NDArray[np.float64]
 
@@ -15,5 +15,5 @@ SEGMENT_S = 5.0
 def density(values: Array, rate_hz: float) -> tuple[Array, Array]:
     """Return frequencies in Hz and the one-sided power spectral density, in unit²/Hz."""
     segment = min(values.size, max(round(SEGMENT_S * rate_hz), 8))
-    frequency_hz, power = signal.welch(values, rate_hz, nperseg=segment)
+    frequency_hz, power = scipy.signal.welch(values, rate_hz, nperseg=segment)
     return frequency_hz, power

@@ -16,7 +16,7 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
     driven_behind,
@@ -102,9 +102,12 @@ _Filter = tuple[Array, Array]
 @lru_cache(maxsize=16)
 def _filters(low_hz: float, high_hz: float, rate_hz: float) -> tuple[_Filter, _Filter]:
     """Return low-pass and high-pass; to design them takes longer than to filter an epoch."""
-    lowpass = signal.butter(4, high_hz, "lowpass", fs=rate_hz, output="sos")
-    highpass = signal.butter(2, low_hz, "highpass", fs=rate_hz, output="sos")
-    return (lowpass, signal.sosfilt_zi(lowpass)), (highpass, signal.sosfilt_zi(highpass))
+    lowpass = scipy.signal.butter(4, high_hz, "lowpass", fs=rate_hz, output="sos")
+    highpass = scipy.signal.butter(2, low_hz, "highpass", fs=rate_hz, output="sos")
+    return (lowpass, scipy.signal.sosfilt_zi(lowpass)), (
+        highpass,
+        scipy.signal.sosfilt_zi(highpass),
+    )
 
 
 def _both_ways(through: _Filter, values: Array, memory: int) -> Array:
@@ -120,7 +123,7 @@ def _both_ways(through: _Filter, values: Array, memory: int) -> Array:
     whole = np.concatenate(mirrored, axis=-1)
     settled = settled.reshape(-1, *(1,) * (values.ndim - 1), 2)
     for _ in range(2):
-        passed, _ = signal.sosfilt(sections, whole, zi=settled * whole[..., :1])
+        passed, _ = scipy.signal.sosfilt(sections, whole, zi=settled * whole[..., :1])
         whole = np.ascontiguousarray(passed[..., ::-1])
     return whole[..., past : past + n]
 

@@ -27,7 +27,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy import special, stats
+import scipy
 
 from rigidimeter.analysis.estimation.found import found
 from rigidimeter.analysis.estimation.signals import Array
@@ -75,7 +75,7 @@ class Scatter(NamedTuple):
     def trend(self) -> tuple[float, float]:
         """Return what a straight line changes from the first epoch to the last, in %, and its p."""
         count = self.values.size
-        line = stats.linregress(np.arange(count), self.values)
+        line = scipy.stats.linregress(np.arange(count), self.values)
         change = float(line.slope) * (count - 1) / max(abs(self.mean), 1e-300)
         return 100 * change, float(line.pvalue)
 
@@ -96,7 +96,7 @@ def scatter(parameter: int, values: Array, errors: Array, degrees: Array) -> Sca
     Q = float(weight @ (values - mean) ** 2)
     unsure = float(np.sum((1 - weight / total) ** 2 / degrees))
     F = Q / (count - 1) / (1 + 2 * (count - 2) / (count**2 - 1) * unsure)
-    p = float(special.fdtrc(count - 1, (count**2 - 1) / (3 * unsure), F))
+    p = float(scipy.special.fdtrc(count - 1, (count**2 - 1) / (3 * unsure), F))
     beyond = max((Q - (count - 1)) / (total - float(weight @ weight) / total), 0.0)
     weight = 1 / (errors**2 + beyond)
     mean = float(weight @ values / np.sum(weight))
@@ -187,4 +187,4 @@ def _degrees(ratio: Array) -> Array:
 def _quantiles() -> tuple[Array, Array]:
     """Return degrees of freedom and Student's quantile for 95 % at each."""
     known = np.geomspace(1.0, 1e4, 400)
-    return known, np.asarray(special.stdtrit(known, 0.975))
+    return known, np.asarray(scipy.special.stdtrit(known, 0.975))

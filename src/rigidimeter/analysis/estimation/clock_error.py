@@ -17,14 +17,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from rigidimeter.analysis.estimation.method_record import FitEpochs
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.core.records import Delay, Fit
-
-_QUANTILE = float(stats.norm.ppf(0.975))
 
 
 def with_clock_error(
@@ -101,7 +99,7 @@ def _widened(fit: Fit, changes: Sequence[Array]) -> Fit:
     return replace(
         fit,
         se=np.hypot(fit.se, together),
-        low=fit.value - np.hypot(fit.value - fit.low, _QUANTILE * together),
-        high=fit.value + np.hypot(fit.high - fit.value, _QUANTILE * together),
+        low=fit.value - np.hypot(fit.value - fit.low, scipy.special.ndtri(0.975) * together),
+        high=fit.value + np.hypot(fit.high - fit.value, scipy.special.ndtri(0.975) * together),
         covariance=fit.covariance + sum(np.outer(change, change) for change in changes),
     )

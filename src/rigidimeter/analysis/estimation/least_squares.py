@@ -10,7 +10,7 @@ Standard errors and intervals are the textbook's: they take the residual for whi
 from __future__ import annotations
 
 import numpy as np
-from scipy import fft
+import scipy
 
 from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother
 from rigidimeter.analysis.estimation.linear_solution import solve
@@ -81,8 +81,8 @@ def fit_inertia_damping_stiffness(signals: Signals, inertia_kg_m2: float | None 
 def _bound(signals: Signals, regressors: Array, residual: Array) -> Array:
     """Return the Cramér–Rao bound on the standard errors, for the power of the residual."""
     n, rate_hz = residual.size, signals.rate_hz
-    frequency = fft.rfftfreq(n, 1.0 / rate_hz)
-    power = 2.0 / (n * rate_hz) * np.abs(fft.rfft(residual)) ** 2
+    frequency = scipy.fft.rfftfreq(n, 1.0 / rate_hz)
+    power = 2.0 / (n * rate_hz) * np.abs(scipy.fft.rfft(residual)) ** 2
     if n % 2 == 0:
         power[-1] /= 2.0  # half the rate has no other side
     low, high = signals.band_hz

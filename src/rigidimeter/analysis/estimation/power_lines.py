@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft, signal
 
 from rigidimeter.analysis.estimation.signals import Array
 
@@ -29,23 +29,23 @@ def power_lines(
     longer : int
         So many times as many lines, for a peak between two of them.
     """
-    values = values[: fft.prev_fast_len(values.size)]
+    values = values[: scipy.fft.prev_fast_len(values.size)]
     n = longer * values.size
     centred = values - np.mean(values)
     if tapered:
         centred *= _taper(values.size)
-    spectrum = fft.rfft(centred, n)
+    spectrum = scipy.fft.rfft(centred, n)
     power = (2.0 / (n * values.size)) * (spectrum.real**2 + spectrum.imag**2)
     power[0] /= 2.0
     if n % 2 == 0:
         power[-1] /= 2.0
-    return fft.rfftfreq(n, 1.0 / rate_hz), power
+    return scipy.fft.rfftfreq(n, 1.0 / rate_hz), power
 
 
 @lru_cache(maxsize=4)
 def _taper(n: int) -> Array:
     """Return Hann's window with a mean square of 1, which epochs of one length share."""
-    taper = np.asarray(np.sqrt(8.0 / 3.0) * signal.windows.hann(n))
+    taper = np.asarray(np.sqrt(8.0 / 3.0) * scipy.signal.windows.hann(n))
     taper.setflags(write=False)
     return taper
 

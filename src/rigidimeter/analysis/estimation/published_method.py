@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from rigidimeter.analysis.estimation.closedloop.between_finding import NAME
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
@@ -74,14 +74,14 @@ def published_signals(
     acceleration = np.diff(velocity) / dt
     # The sum starts from θ(0) = 0, so the first velocity does not enter it.
     angle = np.concatenate(([0.0], np.cumsum(velocity[1:]) * dt))
-    highpass = signal.butter(
+    highpass = scipy.signal.butter(
         settings.published_highpass_order,
         settings.published_highpass_hz,
         "highpass",
         fs=rate_hz,
         output="sos",
     )
-    angle = signal.sosfilt(highpass, angle)
+    angle = scipy.signal.sosfilt(highpass, angle)
     n = acceleration.size  # the last sample has no forward difference
     keep = sound(epoch, time_s[:n], settings.trim_s)
     return Signals(

@@ -19,8 +19,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy import optimize, signal
-from scipy.interpolate import CubicSpline
+import scipy
 
 from rigidimeter.analysis.estimation.power_lines import power_lines
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
@@ -126,21 +125,21 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
     fine = start + np.arange(points + 1) / (POINTS_PER_CYCLE * motion.frequency_hz)
     centred = both - np.mean(both, axis=1, keepdims=True)
     padded, before = _continued(grid, centred, motion.frequency_hz, moving, padding_s)
-    filtered = signal.sosfiltfilt(bandpass, padded)[:, before : before + grid.size]
-    torque, angle = CubicSpline(grid, filtered / gain, axis=1)(fine)
+    filtered = scipy.signal.sosfiltfilt(bandpass, padded)[:, before : before + grid.size]
+    torque, angle = scipy.interpolate.CubicSpline(grid, filtered / gain, axis=1)(fine)
     return Cycles(fine, torque, angle, motion.frequency_hz, n_cycles)
 
 
 @lru_cache(maxsize=16)
 def _bandpass(low_hz: float, high_hz: float, rate_hz: float) -> Array:
     """Return the filter of the scores; to design it takes as long as to filter with it."""
-    sections = signal.butter(2, [low_hz, high_hz], "bandpass", fs=rate_hz, output="sos")
+    sections = scipy.signal.butter(2, [low_hz, high_hz], "bandpass", fs=rate_hz, output="sos")
     return np.asarray(sections)
 
 
 def _gain(sections: Array, frequency_hz: float, rate_hz: float) -> float:
     """Return the gain of the filter at a frequency, once forwards and once backwards."""
-    _, response = signal.sosfreqz(sections, [frequency_hz], fs=rate_hz)
+    _, response = scipy.signal.sosfreqz(sections, [frequency_hz], fs=rate_hz)
     return float(np.abs(response[0]) ** 2)
 
 
@@ -167,7 +166,7 @@ def _continued(
     back = (-steps) % cycle_s  # how far into the first cycle, for each time before it
     early, late = np.repeat(values[:, :1], n, axis=1), np.repeat(values[:, -1:], n, axis=1)
     if any(moving):
-        motion = CubicSpline(grid, values, axis=1)
+        motion = scipy.interpolate.CubicSpline(grid, values, axis=1)
         early = motion(grid[0] + back) if moving[0] else early
         late = motion(grid[-1] - back) if moving[1] else late
     return np.concatenate([early[:, ::-1], values, late], axis=1), n
@@ -233,10 +232,10 @@ def find_motion(epoch: Epoch) -> Motion:
     time_s, angle = _angle(epoch)
     peak_hz, _ = _spectral_peak(time_s, angle)
     rate_hz = 1.0 / float(time_s[1] - time_s[0])
-    around = signal.butter(
+    around = scipy.signal.butter(
         2, [0.5 * peak_hz, min(2 * peak_hz, 0.45 * rate_hz)], "bandpass", fs=rate_hz, output="sos"
     )
-    envelope = np.abs(signal.hilbert(signal.sosfiltfilt(around, angle)))
+    envelope = np.abs(scipy.signal.hilbert(scipy.signal.sosfiltfilt(around, angle)))
     moving = np.flatnonzero(envelope > 0.5 * np.quantile(envelope, 0.9))
     first, last = int(moving[0]), int(moving[-1])
     t, x = time_s[first : last + 1], angle[first : last + 1]
@@ -247,7 +246,7 @@ def find_motion(epoch: Epoch) -> Motion:
         return float(np.sum((x - basis @ np.linalg.lstsq(basis, x, rcond=None)[0]) ** 2))
 
     width = 1.0 / float(t[-1] - t[0])
-    best = optimize.minimize_scalar(
+    best = scipy.optimize.minimize_scalar(
         unexplained, bounds=(max(peak_hz - width, 0.01), peak_hz + width), method="bounded"
     )
     return Motion(float(best.x), float(t[0]), float(t[-1] - t[0]))
@@ -289,7 +288,7 @@ def _angle(epoch: Epoch) -> tuple[Array, Array]:
     used = motion_channels(epoch)
     time_s = uniform_grid(used, grid_rate_hz(used, HIGHEST_HZ / 2))
     angle = angle_at(epoch, time_s)
-    return time_s, np.asarray(signal.detrend(angle), dtype=np.float64)
+    return time_s, np.asarray(scipy.signal.detrend(angle), dtype=np.float64)
 
 
 def _spectral_peak(time_s: Array, angle: Array) -> tuple[float, LineShares]:

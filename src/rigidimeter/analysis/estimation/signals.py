@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
-from scipy.linalg import solve_banded
 
 from rigidimeter.analysis.estimation.linear_solution import Solution, solve
 from rigidimeter.core.records import Channel, Epoch
@@ -102,9 +101,9 @@ def thinned(channel: Channel, highest_hz: float) -> Channel:
     return Channel(channel.name, time_s, values)
 
 
-def spline(channel: Channel) -> CubicSpline:
+def spline(channel: Channel) -> scipy.interpolate.CubicSpline:
     """Return the cubic spline through a channel's samples at its own stamps."""
-    return CubicSpline(channel.time_s, channel.values)
+    return scipy.interpolate.CubicSpline(channel.time_s, channel.values)
 
 
 def sampled(channel: Channel, time_s: Array, share: float = AS_SAMPLED) -> slice | None:
@@ -139,7 +138,9 @@ def columns_at(channel: Channel, columns: Sequence[Array], time_s: Array) -> Arr
     place = sampled(channel, time_s)
     if place is not None:
         return np.stack([column[place] for column in columns])
-    return np.asarray(CubicSpline(channel.time_s, np.stack(columns), axis=1)(time_s))
+    return np.asarray(
+        scipy.interpolate.CubicSpline(channel.time_s, np.stack(columns), axis=1)(time_s)
+    )
 
 
 def values_and_slopes(channel: Channel, time_s: Array) -> tuple[Array, Array]:
@@ -163,7 +164,7 @@ def spline_slopes(time_s: Array, values: Array) -> Array:
     """
     n = time_s.size
     if n < 4:
-        return np.asarray(CubicSpline(time_s, values).derivative()(time_s))
+        return np.asarray(scipy.interpolate.CubicSpline(time_s, values).derivative()(time_s))
     step = np.diff(time_s)
     rise = np.diff(values) / step
     banded, target = np.zeros((3, n)), np.empty(n)
@@ -175,7 +176,7 @@ def spline_slopes(time_s: Array, values: Array) -> Array:
         banded[1, end], banded[inner] = step[far], both
         weighted = (step[near] + 2 * both) * step[far] * rise[near] + step[near] ** 2 * rise[far]
         target[end] = weighted / both
-    return np.asarray(solve_banded((1, 1), banded, target, check_finite=False))
+    return np.asarray(scipy.linalg.solve_banded((1, 1), banded, target, check_finite=False))
 
 
 def kinematics(epoch: Epoch, time_s: Array) -> tuple[Array, Array, Array]:

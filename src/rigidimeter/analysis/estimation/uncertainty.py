@@ -19,8 +19,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft, special
 
 Array = NDArray[np.float64]
 
@@ -81,9 +81,9 @@ def correlation_samples(scores: Array) -> Array:
     scores : array, shape (n, p)
     """
     n = len(scores)
-    length = fft.next_fast_len(2 * n, real=True)
-    lines = fft.rfft(np.ascontiguousarray(scores.T), length)
-    autocovariance = fft.irfft(lines.real**2 + lines.imag**2, length)[:, :n]
+    length = scipy.fft.next_fast_len(2 * n, real=True)
+    lines = scipy.fft.rfft(np.ascontiguousarray(scores.T), length)
+    autocovariance = scipy.fft.irfft(lines.real**2 + lines.imag**2, length)[:, :n]
     times = []
     for column in autocovariance:
         if column[0] <= 0:
@@ -134,7 +134,7 @@ def t_interval(
     values: Array, standard_errors: Array, degrees_of_freedom: float
 ) -> tuple[Array, Array]:
     """Return the ends of the 95 % t intervals: values ∓ t · standard errors."""
-    half = float(special.stdtrit(degrees_of_freedom, 0.975)) * np.asarray(standard_errors)
+    half = float(scipy.special.stdtrit(degrees_of_freedom, 0.975)) * np.asarray(standard_errors)
     return np.asarray(values) - half, np.asarray(values) + half
 
 
@@ -163,7 +163,7 @@ def cramer_rao_coloured(regressors: Array, density: Array, rate_hz: float) -> Ar
     if n % 2 == 0:
         weight[-1] = 1.0
     known = np.flatnonzero(np.isfinite(density))
-    lines = fft.rfft(np.ascontiguousarray(regressors.T)).T[known]
+    lines = scipy.fft.rfft(np.ascontiguousarray(regressors.T)).T[known]
     matrix = np.sqrt(weight[known] / (n * rate_hz * density[known]))[:, None] * lines
     stacked = np.concatenate([matrix.real, matrix.imag])
     scale = np.linalg.norm(stacked, axis=0)
@@ -175,5 +175,5 @@ def cramer_rao_coloured(regressors: Array, density: Array, rate_hz: float) -> Ar
 def _cosine_sum(scores: Array, count: int) -> Array:
     """Return n times the density at zero: the mean outer product of `count` cosine sums."""
     # The transform gives 2 Σ cos(π j (t + ½)/n) g_t; a sum of unit mean square has √2 before it.
-    sums = fft.dct(scores, type=2, axis=0)[1 : count + 1] / np.sqrt(2.0)
+    sums = scipy.fft.dct(scores, type=2, axis=0)[1 : count + 1] / np.sqrt(2.0)
     return np.asarray(sums.T @ sums / count)

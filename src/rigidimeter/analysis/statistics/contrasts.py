@@ -14,9 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.stats import f as f_distribution
-from scipy.stats import t as t_distribution
 
 from rigidimeter.analysis.statistics.mixed import Mixed
 from rigidimeter.analysis.statistics.summary import Array
@@ -92,7 +91,7 @@ def interval_of(
     estimate: float, se: float, df: float, confidence: float = 0.95
 ) -> tuple[float, float]:
     """Return the interval of an estimate whose error follows t with these degrees of freedom."""
-    half = float(t_distribution.isf((1 - confidence) / 2, df)) * se
+    half = float(scipy.stats.t.isf((1 - confidence) / 2, df)) * se
     return estimate - half, estimate + half
 
 
@@ -158,12 +157,12 @@ def joint_test(fit: Mixed, weights: ArrayLike | None = None) -> JointTest:
         f=f,
         df_numerator=m,
         df_residual=float(fit.df_residual),
-        p_residual=float(f_distribution.sf(f, m, fit.df_residual)),
+        p_residual=float(scipy.stats.f.sf(f, m, fit.df_residual)),
         df_satterthwaite=df,
-        p_satterthwaite=float(f_distribution.sf(f, m, df)),
+        p_satterthwaite=float(scipy.stats.f.sf(f, m, df)),
         f_kenward_roger=scaled,
         df_kenward_roger=df_kr,
-        p_kenward_roger=float(f_distribution.sf(scaled, m, df_kr)),
+        p_kenward_roger=float(scipy.stats.f.sf(scaled, m, df_kr)),
     )
 
 

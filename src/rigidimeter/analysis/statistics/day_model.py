@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.stats import t as t_distribution
 
 from rigidimeter.analysis.statistics.contrasts import interval_of
 from rigidimeter.analysis.statistics.day_components import day_components
@@ -81,7 +81,7 @@ class DayDifference:
 
     def least_shown(self, level: float) -> float:
         """Return how many standard errors a difference has whose p is this level."""
-        return float(t_distribution.isf(level / 2, self.df))
+        return float(scipy.stats.t.isf(level / 2, self.df))
 
 
 def day_difference(
@@ -165,7 +165,7 @@ def day_difference(
         se=se,
         low=low,
         high=high,
-        p=2 * float(t_distribution.sf(abs(estimate) / se, df)),
+        p=2 * float(scipy.stats.t.sf(abs(estimate) / se, df)),
         df=df,
         n_days_x=have[0],
         n_days_y=have[1],

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import minimum_filter
+import scipy
 
 from rigidimeter.analysis.statistics.summary import Array
 
@@ -219,7 +219,7 @@ def minimise(data: Products) -> Point:
     heights = np.concatenate(
         [_solved(data, part).deviance for part in np.array_split(grid, together)]
     ).reshape(shape)
-    valleys = heights == minimum_filter(heights, size=3, mode="nearest")
+    valleys = heights == scipy.ndimage.minimum_filter(heights, size=3, mode="nearest")
     found = [_descend(data, evaluate(data, grid[k])) for k in np.flatnonzero(valleys)]
     return min(found, key=lambda point: point.deviance)
 

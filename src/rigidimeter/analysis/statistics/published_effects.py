@@ -13,8 +13,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from scipy.optimize import brentq
-from scipy.stats import norm
+import scipy
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ def effect_from_p(p: float, n_x: int, n_y: int) -> PublishedEffect:
     if not 0 < p <= 1:
         raise ValueError(f"p must be above 0 and at most 1, got {p}")
     _checked(n_x, n_y)
-    z = float(norm.isf(p / 2))
+    z = float(scipy.stats.norm.isf(p / 2))
     sigma = math.sqrt(n_x * n_y * (n_x + n_y + 1) / 12)
     rank_biserial = min(z * sigma / (n_x * n_y / 2), 1.0)
     low, high = rank_biserial_interval(rank_biserial, n_x, n_y)
@@ -103,14 +102,14 @@ def rank_biserial_interval(
         low, high = rank_biserial_interval(-rank_biserial, n_x, n_y, confidence=confidence)
         return -high, -low
     found = (1 + rank_biserial) / 2
-    z = float(norm.isf((1 - confidence) / 2))
+    z = float(scipy.stats.norm.isf((1 - confidence) / 2))
 
     def beyond(area: float) -> float:
         return abs(found - area) - z * math.sqrt(_variance(area, n_x, n_y))
 
     inside = found - 1e-12
-    low = float(brentq(beyond, 0.0, inside))
-    high = 1.0 if found > 1 - 1e-9 else float(brentq(beyond, found, 1.0))
+    low = float(scipy.optimize.brentq(beyond, 0.0, inside))
+    high = 1.0 if found > 1 - 1e-9 else float(scipy.optimize.brentq(beyond, found, 1.0))
     return 2 * low - 1, 2 * high - 1
 
 
@@ -127,7 +126,11 @@ def compare_published(first: PublishedEffect, second: PublishedEffect) -> Publis
     """
     a, b = first.rank_biserial, second.rank_biserial
     variance = sum(4 * _variance((1 + e.rank_biserial) / 2, e.n_x, e.n_y) for e in (first, second))
-    p = 2 * float(norm.sf(abs(a - b) / math.sqrt(variance))) if variance > 0 else math.nan
+    p = (
+        2 * float(scipy.stats.norm.sf(abs(a - b) / math.sqrt(variance)))
+        if variance > 0
+        else math.nan
+    )
     return PublishedDifference(
         estimate=a - b,
         low=a - b - math.hypot(a - first.rank_biserial_low, second.rank_biserial_high - b),

@@ -24,8 +24,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import mannwhitneyu, norm, rankdata
 
 from rigidimeter.analysis.statistics.summary import Array, checked_sample
 from rigidimeter.core.errors import UserError
@@ -139,7 +139,7 @@ def ranksum(x: ArrayLike, y: ArrayLike, *, confidence: float = 0.95) -> RankSum:
     u, p, p_uncorrected = pairs / 2, 1.0, 1.0
     if sigma > 0:
         corrected, plain = (
-            mannwhitneyu(sample_x, sample_y, method="asymptotic", use_continuity=flag)
+            scipy.stats.mannwhitneyu(sample_x, sample_y, method="asymptotic", use_continuity=flag)
             for flag in (True, False)
         )
         u, p, p_uncorrected = (
@@ -203,7 +203,7 @@ def _lower_end(x: Array, y: Array, confidence: float) -> int:
     the interval has no end.
     """
     sigma = _sigma_from_ties(x.size, y.size, _tie_term(x) + _tie_term(y))
-    reach = float(norm.isf((1 - confidence) / 2)) * sigma + 0.5
+    reach = float(scipy.stats.norm.isf((1 - confidence) / 2)) * sigma + 0.5
     return math.ceil(x.size * y.size / 2 - reach)
 
 
@@ -234,7 +234,7 @@ def exact_ranksum(strata: Sequence[tuple[ArrayLike, ArrayLike]]) -> float:
         if first.size == 0 or second.size == 0:
             continue
         known = True
-        twice = np.rint(2 * rankdata(np.concatenate([first, second]))).astype(np.int64)
+        twice = np.rint(2 * scipy.stats.rankdata(np.concatenate([first, second]))).astype(np.int64)
         counts = np.convolve(counts, _sums(twice, first.size))
         found += int(twice[: first.size].sum())
         mean += first.size * float(twice.mean())
@@ -295,7 +295,7 @@ def rank_correlation(
     for name in names:
         own = labels == name
         for row, values in zip(ranks, (first, second), strict=True):
-            row[own] = rankdata(values[own])
+            row[own] = scipy.stats.rankdata(values[own])
             row[own] -= row[own].mean()
     size = math.sqrt(float(ranks[0] @ ranks[0]) * float(ranks[1] @ ranks[1]))
     if not size:
@@ -304,6 +304,6 @@ def rank_correlation(
     free = first.size - 3 - (len(names) - 1)
     if free < 1 or abs(rho) > 1 - 1e-12:
         return RankCorrelation(rho, math.nan, math.nan)
-    half = float(norm.ppf((1 + confidence) / 2)) * math.sqrt((1 + rho**2 / 2) / free)
+    half = float(scipy.stats.norm.ppf((1 + confidence) / 2)) * math.sqrt((1 + rho**2 / 2) / free)
     z = math.atanh(rho)
     return RankCorrelation(rho, math.tanh(z - half), math.tanh(z + half))

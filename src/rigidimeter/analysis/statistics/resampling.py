@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+import scipy
 
 from rigidimeter.analysis.statistics.summary import Array
 from rigidimeter.core.errors import UserError
@@ -101,17 +101,17 @@ def bootstrap(
     found = found[np.isfinite(found)]
     if found.size == 0 or np.ptp(found) <= 1e-14 * max(1.0, abs(estimate)):
         return Bootstrapped(estimate, math.nan, math.nan, math.nan, found)
-    z0 = float(norm.ppf(_clipped(_share_below(found, estimate), found.size)))
+    z0 = float(scipy.stats.norm.ppf(_clipped(_share_below(found, estimate), found.size)))
     a = _acceleration(statistic, sizes)
 
     def end(tail: float) -> float:
-        z = z0 + float(norm.ppf(tail))
-        return float(np.quantile(found, norm.cdf(z0 + z / (1 - a * z))))
+        z = z0 + float(scipy.stats.norm.ppf(tail))
+        return float(np.quantile(found, scipy.stats.norm.cdf(z0 + z / (1 - a * z))))
 
     tail = (1 - confidence) / 2
-    moved = float(norm.ppf(_clipped(_share_below(found, 0.0), found.size))) - z0
+    moved = float(scipy.stats.norm.ppf(_clipped(_share_below(found, 0.0), found.size))) - z0
     z = moved / (1 + a * moved) - z0
-    p = max(2 * float(norm.sf(abs(z))), 1 / found.size)
+    p = max(2 * float(scipy.stats.norm.sf(abs(z))), 1 / found.size)
     return Bootstrapped(estimate, end(tail), end(1 - tail), p, found)
 
 

@@ -15,8 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
-from scipy.stats import t as t_distribution
+import scipy
 
 from rigidimeter.analysis.statistics import summarise
 from rigidimeter.analysis.study.compared import measure_names
@@ -26,7 +25,8 @@ from rigidimeter.analysis.study.measures import MEASURES, Measure
 from rigidimeter.analysis.study.results import StudyResult
 from rigidimeter.core.records import PARAMETERS, Analysis, Fit
 
-_WIDE = float(norm.ppf(0.975))
+_WIDE = 1.959963984540054
+"""97.5 % quantile of the normal distribution."""
 WANTED_PERCENT = 5.0
 """Half the interval that is asked for, in per cent of the value."""
 
@@ -151,6 +151,6 @@ def _of_fit(measure: Measure, fit: Fit, k: int, values: Sequence[float]) -> Prec
 def _of_values(measure: Measure, values: Sequence[float]) -> Precision:
     n, mean = len(values), float(np.mean(values))
     se = float(np.std(values, ddof=1)) / math.sqrt(n) if n > 1 else math.nan
-    half = float(t_distribution.ppf(0.975, n - 1)) * se if n > 1 else math.nan
+    half = float(scipy.stats.t.ppf(0.975, n - 1)) * se if n > 1 else math.nan
     sd_percent = summarise(values).sd_percent
     return Precision(measure, n, mean, mean - half, mean + half, se, sd_percent)

@@ -26,7 +26,7 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from rigidimeter.analysis.estimation.closedloop.line_noise import Complex, Smoother, line_covariance
 from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines
@@ -195,7 +195,7 @@ def _change(
         variance += spread * np.diag(covariance)
         squares += (spread * np.diag(covariance)) ** 2 / (degrees / spread)
     se = np.sqrt(variance)
-    p = 2 * stats.t.sf(np.abs(change) / se, variance**2 / squares)
+    p = 2 * scipy.stats.t.sf(np.abs(change) / se, variance**2 / squares)
     return change, se, np.asarray(p, dtype=np.float64)
 
 

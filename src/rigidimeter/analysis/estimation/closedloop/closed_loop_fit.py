@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy import special
+import scipy
 
 from rigidimeter.analysis.estimation.closedloop.between_uncertainty import between_samples
 from rigidimeter.analysis.estimation.closedloop.linear_problems import (
@@ -187,7 +187,7 @@ def _estimate(fit: LineFit, inertia_kg_m2: float | None) -> Estimate:
     """Return J, B and K with their uncertainty, as a `Fit` holds them."""
     bound = np.sqrt(np.diag(fit.bound))
     away = fit.between + np.nan_to_num(np.abs(fit.pulled))
-    half = special.stdtrit(fit.degrees, 0.975) * fit.standard_errors + away
+    half = scipy.special.stdtrit(fit.degrees, 0.975) * fit.standard_errors + away
     low, high = fit.values - half, fit.values + half
     found = Estimate(fit.values, fit.standard_errors, low, high, bound, fit.covariance)
     return found if inertia_kg_m2 is None else found.with_inertia(inertia_kg_m2)

@@ -17,8 +17,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal
 
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array
@@ -93,7 +93,7 @@ class CommandMade:
         decay, gain = admittance(
             controller.inertia_kg_m2, controller.damping_nm_s_rad, 1.0 / self.rate_hz
         )
-        made_rad_s = signal.lfilter([gain], [1.0, -decay], self.asked_nm)
+        made_rad_s = scipy.signal.lfilter([gain], [1.0, -decay], self.asked_nm)
         return self._lines(self.command_rad_s, made_rad_s)
 
     @staticmethod
@@ -176,7 +176,7 @@ def _asked_nm(epoch: Epoch, loop: Loop, ticks_s: Array, rate_hz: float) -> Array
     cutoff_hz = loop.controller.torque_cutoff_hz
     if cutoff_hz < rate_hz / 2:
         b0, b1, b2, a1, a2 = butterworth_lowpass(cutoff_hz, rate_hz)
-        read = signal.lfilter([b0, b1, b2], [1.0, a1, a2], read)
+        read = scipy.signal.lfilter([b0, b1, b2], [1.0, a1, a2], read)
     return np.asarray(perturbation.values[np.maximum(held, 0)] - read, dtype=np.float64)
 
 

@@ -20,8 +20,8 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft
 
 from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother
 from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST, Problem
@@ -130,7 +130,7 @@ def _pair(grid: Grid, simulated: Array, measured: Array) -> tuple[Complex, Compl
 
     def lines(windowed: Array) -> Complex:
         mean = float(np.add.reduce(windowed * grid.window)) / grid.energy
-        return np.asarray(fft.rfft(windowed - mean * grid.window)[grid.line])
+        return np.asarray(scipy.fft.rfft(windowed - mean * grid.window)[grid.line])
 
     return lines(simulated), lines(measured)
 

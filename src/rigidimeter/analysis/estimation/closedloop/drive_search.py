@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import leastsq
+import scipy
 
 from rigidimeter.analysis.estimation.closedloop.drive_motion import since_ticks
 from rigidimeter.analysis.estimation.closedloop.drive_terms import (
@@ -109,7 +109,7 @@ def search(
             return at_x[0]
 
         scale = np.append(0.1 * degrees, 0.1)[: x.size]
-        done, *_ = leastsq(
+        done, *_ = scipy.optimize.leastsq(
             left,
             x,
             Dfun=slopes,

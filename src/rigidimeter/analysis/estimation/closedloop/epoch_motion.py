@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from rigidimeter.analysis.estimation.closedloop.between_samples import without_driven
 from rigidimeter.analysis.estimation.closedloop.drive_motion import DrivenAt
@@ -31,7 +31,7 @@ class EpochMotion:
     def __init__(self, epoch: Epoch, drive: DriveModel | None) -> None:
         self._epoch = epoch
         self._drive = drive
-        self._splines: dict[str, CubicSpline] = {}
+        self._splines: dict[str, scipy.interpolate.CubicSpline] = {}
 
     @cached_property
     def driven_at(self) -> DrivenAt | None:

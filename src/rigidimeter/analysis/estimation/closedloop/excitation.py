@@ -21,9 +21,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft
-from scipy.interpolate import CubicSpline
 
 from rigidimeter.analysis.estimation.closedloop.spectral_lines import SAME_TIME, Grid
 from rigidimeter.analysis.estimation.signals import Array
@@ -91,15 +90,15 @@ class Excitation:
         windowed = self._windowed(spectra)
         mean = np.add.reduce(windowed * self.grid.window, axis=1) / self.grid.energy
         windowed -= mean[:, None] * self.grid.window
-        return np.asarray(fft.rfft(windowed, axis=1)[:, self.grid.line].T)
+        return np.asarray(scipy.fft.rfft(windowed, axis=1)[:, self.grid.line].T)
 
     def _windowed(self, spectra: Complex) -> Array:
         # The inverse FFT gives only the samples that are wanted, where their number allows it.
         folds = self.stride if self.stride % 2 == 0 and self.size % (2 * self.stride) == 0 else 1
-        signals = fft.irfft(_folded(spectra, folds), self.size // folds, axis=1)
+        signals = scipy.fft.irfft(_folded(spectra, folds), self.size // folds, axis=1)
         if self.ticks_s is not None and self.raising is not None:
             raised = signals[:, : self.raising.size] * self.raising
-            signals = CubicSpline(self.ticks_s, raised, axis=1)(self.grid.time_s)
+            signals = scipy.interpolate.CubicSpline(self.ticks_s, raised, axis=1)(self.grid.time_s)
         return np.asarray(signals[:, :: self.stride // folds][:, : self.weight.size] * self.weight)
 
 

@@ -30,9 +30,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.polynomial import Legendre
 from numpy.typing import NDArray
-from scipy import stats
 
 from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother
 from rigidimeter.analysis.estimation.closedloop.spectral_lines import Grid
@@ -130,7 +130,7 @@ def proportional(answers: Sequence[Answer]) -> list[Misfit]:
     for part in _parts(frequency[starts], answers[0].frequency_hz[-1]):
         numerator, denominator = 2 * part.size, 2 * int(np.sum(sizes[part] - 1))
         noise = float(np.sum(left[part])) / denominator
-        p = stats.f.sf(np.sum(answered[part]) / numerator / noise, numerator, denominator)
+        p = scipy.stats.f.sf(np.sum(answered[part]) / numerator / noise, numerator, denominator)
         # The mean of |h|², less what noise leaves: groups count by how well h is known in them, or
         # a tremor in one would be the mean.
         beyond = float(np.sum(answered[part])) - numerator * noise
@@ -161,7 +161,7 @@ def repeated(answers: Sequence[Answer]) -> list[Misfit]:
         m = part.size
         between = count * float(np.sum(np.abs(mean[part]) ** 2)) / (2 * m)
         within = float(np.sum(scatter[part])) / (2 * m)
-        p = stats.f.sf(between / within, 2 * m, 2 * m * (count - 1))
+        p = scipy.stats.f.sf(between / within, 2 * m, 2 * m * (count - 1))
         own = np.mean(power[:, part], axis=0)
         beyond = np.sum((np.abs(mean[part]) ** 2 - scatter[part] / count) * own)
         share = float(np.sqrt(max(beyond, 0.0) / np.sum(size[part])))
@@ -286,6 +286,6 @@ def periodic(answer: Answer, excited: NDArray[np.bool_]) -> list[Misfit]:
         size = float(np.sum(np.abs(answer.response_nm[lines]) ** 2))
         share = float(np.sqrt(max(float(np.sum(power[lines] - beside)), 0.0) / size))
         low, high = answer.frequency_hz[lines[[0, -1]]]
-        p = float(stats.norm.sf(excess / np.sqrt(variance)))
+        p = float(scipy.stats.norm.sf(excess / np.sqrt(variance)))
         found.append(Misfit(float(low), float(high), share, p))
     return found

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft
 
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
     INEXACT,
@@ -175,9 +175,9 @@ def period_s(perturbation: Channel) -> float | None:
     """Return the shortest period of a perturbation; None if it does not repeat within the epoch."""
     values = perturbation.values - np.mean(perturbation.values)
     n = values.size
-    length = fft.next_fast_len(2 * n, real=True)
-    spectrum = fft.rfft(values, length)
-    products = fft.irfft(np.abs(spectrum) ** 2, length)[: n // 2 + 1]
+    length = scipy.fft.next_fast_len(2 * n, real=True)
+    spectrum = scipy.fft.rfft(values, length)
+    products = scipy.fft.irfft(np.abs(spectrum) ** 2, length)[: n // 2 + 1]
     power = np.concatenate(([0.0], np.cumsum(values**2)))
     lag = np.arange(products.size)
     scale = np.sqrt((power[n] - power[lag]) * power[n - lag])

@@ -27,8 +27,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft
 
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
     TorqueFilter,
@@ -125,12 +125,12 @@ class Grid:
 
         def lines(window: Array) -> Complex:
             windowed = window * centred
-            spectrum = fft.rfft(windowed)
+            spectrum = scipy.fft.rfft(windowed)
             if values.size % 2 == 0:
                 apart = spectrum[half - self.line].conj()
             else:
                 windowed[1::2] *= -1
-                apart = fft.rfft(windowed)[self.line]
+                apart = scipy.fft.rfft(windowed)[self.line]
             return np.stack([spectrum[self.line], apart])
 
         def without_mean(derivative: Complex, by_parts: Array) -> Complex:
@@ -212,7 +212,7 @@ def epoch_grid(
         n = samples(time_s.size, rate_hz)
         time_s = time_s[time_s.size - n :]
     else:
-        n = fft.prev_fast_len(time_s.size, real=True) if time_s.size else 0
+        n = scipy.fft.prev_fast_len(time_s.size, real=True) if time_s.size else 0
         time_s = time_s[:n]
     if n == 0:
         return Grid(time_s, rate_hz, *_layout(n, float(f"{rate_hz:.9g}"), band_hz, taper_s, ()))
@@ -245,7 +245,7 @@ def _layout(
     for hole_s in holes_s:
         window = with_hole(window, rate_hz, taper_s, hole_s)
     energy = float(np.sum(window.value**2))
-    constant = np.asarray(fft.rfft(window.value)[line], dtype=np.complex128)
+    constant = np.asarray(scipy.fft.rfft(window.value)[line], dtype=np.complex128)
     omega = np.asarray(2 * np.pi * line / duration_s, dtype=np.float64)
     for part in (*window, line, omega, constant):
         part.setflags(write=False)

@@ -21,7 +21,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+import scipy
 
 from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look, at_least
 from rigidimeter.analysis.estimation.diagnostics.excitation_checks import perturbation_nm
@@ -49,7 +49,7 @@ def static_torque(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings)
     # Noise above the band is nobody's torque. A filter without overshoot keeps the function.
     length = max(round(signals.rate_hz / (2.0 * signals.band_hz[1])), 1)
     angle, torque = (
-        uniform_filter1d(_at(epoch.channels[name], time_s), length)
+        scipy.ndimage.uniform_filter1d(_at(epoch.channels[name], time_s), length)
         for name in ("angle_rad", "torque_nm")
     )
     steps = np.diff(torque[np.argsort(angle, kind="stable")])

@@ -13,8 +13,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import scipy
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy import fft, signal
 
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
     Check,
@@ -77,13 +77,13 @@ def _coherence(cause: Array, effects: Array, signals: Signals) -> Array:
 
     As `scipy.signal.coherence` has it with segments that overlap by half, but every spectrum once.
     """
-    length = fft.prev_fast_len(max(2 * signals.time_s.size // (SEGMENTS + 1), 8), real=True)
-    frequency = fft.rfftfreq(length, 1.0 / signals.rate_hz)
+    length = scipy.fft.prev_fast_len(max(2 * signals.time_s.size // (SEGMENTS + 1), 8), real=True)
+    frequency = scipy.fft.rfftfreq(length, 1.0 / signals.rate_hz)
     inside = lines_inside(frequency, signals.band_hz)
     whole = np.concatenate([cause[None], effects])
     parts = sliding_window_view(whole, length, axis=1)[:, :: length - length // 2]
     parts = parts - np.mean(parts, axis=2, keepdims=True)
-    spectra = fft.rfft(parts * signal.windows.hann(length, sym=False))[:, :, inside]
+    spectra = scipy.fft.rfft(parts * scipy.signal.windows.hann(length, sym=False))[:, :, inside]
     power = np.mean(np.abs(spectra) ** 2, axis=1)
     together = np.mean(spectra[0].conj() * spectra[1:], axis=1)
     return np.asarray(np.abs(together) ** 2 / (power[0] * power[1:]))

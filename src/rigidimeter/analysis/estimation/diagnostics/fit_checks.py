@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy import fft
-from scipy.special import digamma
+import scipy
 
 from rigidimeter.analysis.estimation.bandlimited import zero_phase_band
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
@@ -49,7 +48,7 @@ def residual_whiteness(residual_nm: Array, signals: Signals, settings: Diagnosti
     means = power[: groups * LINES_TOGETHER].reshape(groups, -1).mean(axis=1)
     value, least = math.nan, settings.min_residual_flatness
     if np.all(means > 0):
-        made_up = math.log(LINES_TOGETHER) - float(digamma(LINES_TOGETHER))
+        made_up = math.log(LINES_TOGETHER) - float(scipy.special.digamma(LINES_TOGETHER))
         value = min(float(np.exp(np.mean(np.log(means)) + made_up) / np.mean(means)), 1.0)
     return at_least(value, least)
 
@@ -70,9 +69,9 @@ def residual_perturbation(
     size = float(np.linalg.norm(cause) * np.linalg.norm(residual))
     lag = min(round(LONGEST_LAG_S * signals.rate_hz), residual.size - 1)
     # As many zeros as lags, so that no end meets the other.
-    length = fft.next_fast_len(residual.size + lag, real=True)
-    both = fft.rfft(residual, length) * fft.rfft(cause, length).conj()
-    together = fft.irfft(both, length) / (size or math.inf)
+    length = scipy.fft.next_fast_len(residual.size + lag, real=True)
+    both = scipy.fft.rfft(residual, length) * scipy.fft.rfft(cause, length).conj()
+    together = scipy.fft.irfft(both, length) / (size or math.inf)
     near = together[np.arange(-lag, lag + 1)]
     at = int(np.argmax(np.abs(near)))
     delay_s = (at - lag) / signals.rate_hz
@@ -92,15 +91,15 @@ def _chance_correlation(a: Array, b: Array, rate_hz: float, lag: int) -> float:
     1935). As the lag runs, a Gaussian correlation of rms frequency ν passes ±u standard deviations
     2 ν T exp(−u²/2) times on average (Rice 1944), which is set to 1/20.
     """
-    n = fft.prev_fast_len(a.size)  # a transform of any number may take many times as long
-    power_a, power_b = np.abs(fft.rfft(a[:n])) ** 2, np.abs(fft.rfft(b[:n])) ** 2
+    n = scipy.fft.prev_fast_len(a.size)  # a transform of any number may take many times as long
+    power_a, power_b = np.abs(scipy.fft.rfft(a[:n])) ** 2, np.abs(scipy.fft.rfft(b[:n])) ** 2
     power = power_a * power_b
     total = float(np.sum(power_a) * np.sum(power_b))
     if total == 0.0:
         return 0.0
     # One-sided sums hold half of each: ½ remains.
     deviation = math.sqrt(0.5 * float(np.sum(power)) / total)
-    frequency = fft.rfftfreq(n, 1.0 / rate_hz)
+    frequency = scipy.fft.rfftfreq(n, 1.0 / rate_hz)
     rms_hz = math.sqrt(float(np.sum(frequency**2 * power)) / float(np.sum(power)))
     crossings = max(2.0 * rms_hz * 2.0 * lag / rate_hz, 0.1)
     return deviation * math.sqrt(2.0 * math.log(crossings / 0.05))

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy import fft
+import scipy
 
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
     HARMFUL,
@@ -65,7 +65,7 @@ class _Found:
         motion = wideband_signals(epoch, high_hz)
         # Stiffness is that at the mean posture, and what is not linear is so about it.
         motion = replace(motion, angle_rad=motion.angle_rad - np.mean(motion.angle_rad))
-        motion = motion.part(slice(fft.prev_fast_len(motion.time_s.size)))
+        motion = motion.part(slice(scipy.fft.prev_fast_len(motion.time_s.size)))
         self.beyond: BeyondLinear | None = None
         self.terms: tuple[OmittedTerm, ...] = ()
         self.linear: LinearTerm | None = None

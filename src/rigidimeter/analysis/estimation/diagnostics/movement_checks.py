@@ -11,7 +11,7 @@ is seen here is the least of it.
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+import scipy
 
 from rigidimeter.analysis.estimation.bandlimited import zero_phase_band
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
@@ -105,7 +105,7 @@ def emg_envelope_v(emg: Channel, window_s: float) -> Array:
     """Return the moving mean of the rectified EMG, its own mean taken off first, in V."""
     length = max(round(window_s * emg.rate_hz), 1)
     rectified = np.abs(emg.values - np.mean(emg.values))
-    return np.asarray(uniform_filter1d(rectified, length, mode="nearest"))
+    return np.asarray(scipy.ndimage.uniform_filter1d(rectified, length, mode="nearest"))
 
 
 def emg_activity(emg: Channel, settings: DiagnosticsSettings) -> Look:

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft
 
 from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother
 from rigidimeter.analysis.estimation.closedloop.line_weights import ENOUGH_LINES, NEIGHBOURS
@@ -86,7 +86,7 @@ class VaryingLines:
         spectrum = np.zeros((n // 2 + 1, *lines.shape[1:]), dtype=np.complex128)
         last = int(self.grid.line[-1]) + 1
         spectrum[last - lines.shape[0] : last] = lines
-        return np.asarray(fft.irfft(spectrum, n, axis=0))
+        return np.asarray(scipy.fft.irfft(spectrum, n, axis=0))
 
     def whitened(self, lines: Complex) -> Array:
         """Return lines of the band over the noise, real parts above imaginary ones."""
@@ -95,15 +95,15 @@ class VaryingLines:
 
     def in_band(self, signals: Array) -> Complex:
         """Return the lines of the band of signals on the coarse time grid, shape (n, c)."""
-        spectrum = fft.rfft(signals, axis=0)
+        spectrum = scipy.fft.rfft(signals, axis=0)
         return np.asarray(spectrum[int(self.grid.line[0]) : int(self.grid.line[-1]) + 1])
 
     def slow_part(self, signal: Array, below_hz: float) -> Array:
         """Return what of a signal on the coarse time grid is slower, without phase."""
         n = signal.size
-        spectrum = fft.rfft(signal)
+        spectrum = scipy.fft.rfft(signal)
         frequency = np.arange(spectrum.size) / self.duration_s
-        return np.asarray(fft.irfft(spectrum * np.exp(-0.5 * (frequency / below_hz) ** 2), n))
+        return np.asarray(scipy.fft.irfft(spectrum * np.exp(-0.5 * (frequency / below_hz) ** 2), n))
 
 
 def varying_lines(prepared: PreparedEpoch, parameters: Array) -> VaryingLines:
@@ -124,7 +124,7 @@ def varying_lines(prepared: PreparedEpoch, parameters: Array) -> VaryingLines:
     by_perturbation = not closed_loop_obstacle(prepared.epoch)
     observation = prepared.once(observe if by_perturbation else observe_motion)
     grid = observation.lines.grid
-    n = fft.next_fast_len(int(POINTS_PER_CYCLE * (grid.line[-1] + 1)), real=True)
+    n = scipy.fft.next_fast_len(int(POINTS_PER_CYCLE * (grid.line[-1] + 1)), real=True)
     time_s = grid.time_s[0] + np.arange(n) * (grid.time_s.size / grid.rate_hz / n)
     angle, velocity = _coarse_motion(prepared.epoch, time_s)
     wide = _from_first_line(grid)
@@ -153,7 +153,7 @@ def _from_first_line(grid: Grid) -> Grid:
         grid,
         line=line,
         omega_rad_s=np.asarray(step_rad_s * line, dtype=np.float64),
-        window_lines=np.asarray(fft.rfft(grid.window)[line]),
+        window_lines=np.asarray(scipy.fft.rfft(grid.window)[line]),
     )
 
 
@@ -186,6 +186,6 @@ def _low_motion(grid: Grid, omega_rad_s: Array, angle_rad: Array, velocity_rad_s
     signals = np.stack([angle_rad, velocity_rad_s])
     centred = signals - np.sum(window**2 * signals, axis=1, keepdims=True) / np.sum(window**2)
     below = slice(1, omega_rad_s.size + 1)
-    angle, velocity = (fft.rfft(window * centred, axis=1) * (grid.time_s.size / n))[:, below]
-    turning = fft.rfft(slope * centred[1])[below] * (grid.time_s.size / n)
+    angle, velocity = (scipy.fft.rfft(window * centred, axis=1) * (grid.time_s.size / n))[:, below]
+    turning = scipy.fft.rfft(slope * centred[1])[below] * (grid.time_s.size / n)
     return np.stack([1j * omega_rad_s * velocity - turning, velocity, angle], axis=1)

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from rigidimeter.analysis.estimation.diagnostics.varying_lines import VaryingLines
 from rigidimeter.analysis.estimation.diagnostics.varying_shapes import (
@@ -218,7 +218,7 @@ def _extremes(shapes: Shapes, found: Effect, parameter: int, p: float) -> Change
     functions = np.column_stack([np.ones(len(shapes.at)), shapes.at])
     values = functions @ np.concatenate([found.constant[[parameter]], found.coefficients])
     variance = np.einsum("gi,ij,gj->g", functions, found.covariance, functions)
-    half = float(stats.t.ppf(0.975, found.degrees)) * np.sqrt(variance)
+    half = float(scipy.stats.t.ppf(0.975, found.degrees)) * np.sqrt(variance)
     low, high = int(np.argmin(values)), int(np.argmax(values))
     middle = abs(float(values[low] + values[high])) / 2
     return Change(

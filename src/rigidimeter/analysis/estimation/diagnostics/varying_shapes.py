@@ -17,8 +17,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.polynomial import legendre
-from scipy import fft
 
 from rigidimeter.analysis.estimation.diagnostics.varying_lines import VaryingLines
 from rigidimeter.analysis.estimation.signals import Array
@@ -175,10 +175,10 @@ def _phase(lines: VaryingLines, frequency_hz: float) -> Array:
     """Return the phase of the movement, 0 where the angle is highest, shape (n,)."""
     n = lines.angle_rad.size
     # Mirrored at the end, so that a movement that is no whole number of cycles has no step there.
-    spectrum = fft.fft(np.concatenate([lines.angle_rad, lines.angle_rad[::-1]]))
+    spectrum = scipy.fft.fft(np.concatenate([lines.angle_rad, lines.angle_rad[::-1]]))
     frequency = np.arange(2 * n) / (2 * lines.duration_s)
     spectrum *= np.exp(-0.5 * ((frequency - frequency_hz) / (frequency_hz / 3)) ** 2)
-    return np.asarray(np.angle(fft.ifft(spectrum)[:n]))
+    return np.asarray(np.angle(scipy.fft.ifft(spectrum)[:n]))
 
 
 def _powers(values: Array, degree: int) -> Array:

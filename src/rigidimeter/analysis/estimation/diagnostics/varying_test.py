@@ -29,7 +29,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy import special
+import scipy
 
 from rigidimeter.analysis.estimation.diagnostics.varying_lines import VaryingLines
 from rigidimeter.analysis.estimation.signals import Array
@@ -125,7 +125,7 @@ def sign_p(blocks: Array) -> float:
     count, q = blocks.shape
     whitened = np.linalg.solve(np.linalg.cholesky(blocks.T @ blocks), blocks.T)
     statistic = float(np.sum(whitened.sum(axis=1) ** 2))
-    even = float(special.betainc((count - q) / 2, q / 2, max(1 - statistic / count, 0.0)))
+    even = float(scipy.special.betainc((count - q) / 2, q / 2, max(1 - statistic / count, 0.0)))
     if even > UNLIKELY:
         return even
     drawn = np.sum((whitened @ _signs(count)) ** 2, axis=0)

@@ -25,7 +25,7 @@ from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
-from scipy import fft
+import scipy
 
 from rigidimeter.analysis.estimation.signals import Array, Signals
 from rigidimeter.analysis.estimation.terms.catalogue import REFLEXES, term_named
@@ -184,7 +184,7 @@ class BeyondLinear:
         whole = np.zeros((last + 1, *lines.shape[1:]), dtype=np.complex128)
         whole[self._first : last] = lines
         n = 2 * last
-        values = fft.irfft(whole, n, axis=0) * np.sqrt(n / 2)
+        values = scipy.fft.irfft(whole, n, axis=0) * np.sqrt(n / 2)
         edge = round(n * float(np.mean(self._window < 0.5)) / 2)
         return np.asarray(values[edge : n - edge], dtype=np.float64)
 
@@ -334,7 +334,7 @@ def _lines(values: Array, window: Array, first: int, count: int) -> Complex:
     n = values.size
     parts = next(r for r in PARTS if n % r == 0 and n // r // 2 + 1 >= first + count)
     tapered = (window * (values - np.mean(values))).reshape(n // parts, parts)
-    spectra = fft.rfft(tapered, axis=0)[first : first + count]
+    spectra = scipy.fft.rfft(tapered, axis=0)[first : first + count]
     return np.asarray(np.einsum("kq,kq->k", spectra, _turns(n, parts, first, count)))
 
 

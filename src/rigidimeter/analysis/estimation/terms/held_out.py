@@ -14,8 +14,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from rigidimeter.analysis.estimation.signals import Array
 
@@ -106,6 +106,6 @@ def gain(smaller: Array, larger: Array, comparisons: int = 1) -> Gain:
     blocks_used = smaller.size
     without = np.log(np.maximum((rest - larger) / (total - smaller), SMALLEST_RATIO))
     spread = np.sqrt((blocks_used - 1) / blocks_used * np.sum((without - np.mean(without)) ** 2))
-    half = float(stats.t.ppf(1 - 0.025 / comparisons, blocks_used - 1) * spread)
+    half = float(scipy.stats.t.ppf(1 - 0.025 / comparisons, blocks_used - 1) * spread)
     ratio = max(float(rest / total), SMALLEST_RATIO)
     return Gain(*(100.0 * (1.0 - ratio * np.exp(power)) for power in (0.0, half, -half)))

@@ -18,7 +18,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import optimize, special
+import scipy
 
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.analysis.estimation.terms.beyond_linear import BeyondLinear
@@ -86,7 +86,7 @@ def linear_term(beyond: BeyondLinear) -> LinearTerm | None:
     taken = beyond.free_gains - 3
     left = target.size - beyond.free_gains
     ratio = (rest - free) / taken / beyond.taper_loss / (free / left)
-    p = float(special.fdtrc(taken, left, ratio))
+    p = float(scipy.special.fdtrc(taken, left, ratio))
     if not p < CHANCE:
         return None
     found = [
@@ -127,7 +127,7 @@ def _coupling(joint: Array, omega: Array, angle: Complex, target: Array) -> Foun
 
     tried = []
     for softness in SOFTEST:
-        values, *_ = optimize.leastsq(
+        values, *_ = scipy.optimize.leastsq(
             residual,
             [1.0, 1.0, 1.0, softness],
             Dfun=jacobian,

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy import special
+import scipy
 
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.analysis.estimation.terms.beyond_linear import BeyondLinear
@@ -193,7 +193,7 @@ class _Search:
         gained = max(before.left - fit.left, 0.0) / more / beyond.taper_loss
         ratio = gained / (fit.left / degrees) if fit.left > 0 else np.inf
         # The tail of Fisher's distribution.
-        return _Test(name, float(special.fdtrc(more, degrees, ratio)), fit)
+        return _Test(name, float(scipy.special.fdtrc(more, degrees, ratio)), fit)
 
     def best(self, found: Sequence[_Found], test: _Test) -> tuple[_Found, Explained]:
         """Return the term and its fit, a reflex with its delay of least residual."""

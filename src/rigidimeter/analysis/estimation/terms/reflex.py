@@ -25,8 +25,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft
 
 from rigidimeter.analysis.estimation.signals import Array, Signals
 
@@ -120,11 +120,11 @@ def pass_through(stretch: Array, rate_hz: float, found: Kernel, nonlinear: Array
     past = min(n - 1, round(2.0 * rate_hz))
     # As many zeros as past, so that what leaves at the end does not come back at the start.
     whole = np.concatenate((stretch[past:0:-1], stretch, np.zeros(past)))
-    size = fft.next_fast_len(whole.size, real=True)
-    spectrum = fft.rfft(whole, size)
-    frequency_hz = fft.rfftfreq(size, 1.0 / rate_hz)
+    size = scipy.fft.next_fast_len(whole.size, real=True)
+    spectrum = scipy.fft.rfft(whole, size)
+    frequency_hz = scipy.fft.rfftfreq(size, 1.0 / rate_hz)
     return [
-        np.asarray(fft.irfft(spectrum * gain, size)[past : past + n], dtype=np.float64)
+        np.asarray(scipy.fft.irfft(spectrum * gain, size)[past : past + n], dtype=np.float64)
         for gain in found.transfer(frequency_hz, nonlinear)
     ]
 

@@ -15,7 +15,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy import signal, stats
+import scipy
 
 from rigidimeter.analysis.estimation.signals import Array
 
@@ -65,9 +65,9 @@ def residual_test(
     weights = 1.0 - np.abs(np.arange(-reach, reach + 1)) / (reach + 1)
     variance = max(float(np.sum(weights * both)), 1e-3) / count
     largest = float(cross[np.argmax(np.abs(cross))])
-    single = 2.0 * float(stats.norm.sf(abs(largest) / math.sqrt(variance)))
+    single = 2.0 * float(scipy.stats.norm.sf(abs(largest) / math.sqrt(variance)))
     return ResidualTest(
-        ljung_box_p=float(stats.chi2.sf(q, lags)),
+        ljung_box_p=float(scipy.stats.chi2.sf(q, lags)),
         input_correlation=largest,
         input_p=min(1.0, single * cross.size),
     )
@@ -75,12 +75,14 @@ def residual_test(
 
 def _resampled(values: Array, count: int) -> Array:
     centred = values - np.mean(values)
-    return np.asarray(signal.resample(centred, count), dtype=np.float64)
+    return np.asarray(scipy.signal.resample(centred, count), dtype=np.float64)
 
 
 def _correlation(one: Array, other: Array, lags: int) -> Array:
     """Return the correlation at lags from −lags to lags; zero where a signal is."""
     size = one.size
-    full = signal.correlate(one, other, mode="full", method="fft")[size - 1 - lags : size + lags]
+    full = scipy.signal.correlate(one, other, mode="full", method="fft")[
+        size - 1 - lags : size + lags
+    ]
     scale = math.sqrt(float(one @ one) * float(other @ other))
     return np.asarray(full / scale if scale > 0 else 0.0 * full, dtype=np.float64)

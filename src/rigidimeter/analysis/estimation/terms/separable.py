@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize
+import scipy
 
 from rigidimeter.analysis.estimation.signals import Array
 
@@ -88,7 +88,7 @@ def search(
     best = sorted(inside, key=lambda start: cost(start.tolist()))[:REFINED_STARTS]
     scale = np.asarray(high) - np.asarray(low)
     refined = [
-        optimize.least_squares(
+        scipy.optimize.least_squares(
             residual,
             start,
             bounds=(low, high),

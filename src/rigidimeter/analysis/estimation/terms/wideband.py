@@ -17,7 +17,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy import fft, signal
+import scipy
 
 from rigidimeter.analysis.estimation.bandlimited import zero_phase_band
 from rigidimeter.analysis.estimation.signals import (
@@ -74,7 +74,7 @@ def wideband_signals(epoch: Epoch, high_hz: float) -> Signals:
     wide_hz = max(high_hz, min(WIDE_OVER_BAND * high_hz, USABLE_FRACTION_OF_RATE * slowest))
     time_s = uniform_grid(used, rate_hz)
     if time_s.size > 2:
-        time_s = time_s[: fft.prev_fast_len(time_s.size - 1) + 1]  # of the period below
+        time_s = time_s[: scipy.fft.prev_fast_len(time_s.size - 1) + 1]  # of the period below
     torque = values_at(epoch.channels["torque_nm"], time_s)
     if "velocity_rad_s" not in epoch.channels:
         angle = values_at(epoch.channels["angle_rad"], time_s)
@@ -104,9 +104,9 @@ def banded(values: Array, rate_hz: float, band_hz: tuple[float, float]) -> Array
         )
     if low > 0:
         return zero_phase_band(values, rate_hz, band_hz)
-    lowpass = signal.butter(4, high, "lowpass", fs=rate_hz, output="sos")
+    lowpass = scipy.signal.butter(4, high, "lowpass", fs=rate_hz, output="sos")
     memory = min(values.size - 1, round(10 * rate_hz / high))
-    passed = signal.sosfiltfilt(lowpass, values, padtype="even", padlen=memory)
+    passed = scipy.signal.sosfiltfilt(lowpass, values, padtype="even", padlen=memory)
     return np.asarray(passed, dtype=np.float64)
 
 
@@ -123,7 +123,7 @@ class _Sines:
         lowpass, self._omega = _sine_lines(n, float(f"{rate_hz:.12g}"), wide_hz)
         # Of two samples nothing but the line is left.
         inner = (values - self._line)[..., 1:-1]
-        self._sines = fft.dst(inner, 1) * lowpass if n > 2 else inner
+        self._sines = scipy.fft.dst(inner, 1) * lowpass if n > 2 else inner
 
     def value(self) -> Array:
         """Return the signals."""
@@ -134,7 +134,7 @@ class _Sines:
         n = self._line.shape[-1]
         ends = [(0, 0)] * (self._line.ndim - 1) + [(1, 1)]
         cosines = np.pad(self._sines * self._omega, ends)
-        return np.asarray(fft.dct(cosines, 1) / (2 * (n - 1)) + self._rise_per_s)
+        return np.asarray(scipy.fft.dct(cosines, 1) / (2 * (n - 1)) + self._rise_per_s)
 
     def curvature(self) -> Array:
         """Return their second derivative."""
@@ -143,7 +143,7 @@ class _Sines:
     def _sum(self, sines: Array, beside: Array) -> Array:
         found = beside.copy()
         if sines.shape[-1]:
-            found[..., 1:-1] += fft.idst(sines, 1)
+            found[..., 1:-1] += scipy.fft.idst(sines, 1)
         return found
 
 
