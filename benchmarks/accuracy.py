@@ -25,8 +25,8 @@ import numpy as np
 from benchmarks import two_rigs
 from benchmarks.known_joint import TRUTH, array, sessions, settings_with
 from rigidimeter.analysis.estimation import estimate_delays, fit_epochs
+from rigidimeter.analysis.estimation.closedloop.line_methods import LINE_METHODS
 from rigidimeter.analysis.estimation.closedloop.linear_problems import least_squares_start
-from rigidimeter.analysis.estimation.closedloop.perturbation_methods import CLOSED_LOOP
 from rigidimeter.analysis.estimation.closedloop.refine import fit_pooled
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch, Source, prepare
 from rigidimeter.core.records import Channel, Epoch, Fit
@@ -57,7 +57,7 @@ def pooled_bias(n: int) -> list[str]:
     rows = []
     for sd in (0.2, 0.5):
         settings = settings_with(sd)
-        kept: dict[str, list[Any]] = {method: [] for method in CLOSED_LOOP}
+        kept: dict[str, list[Any]] = {method: [] for method in ("iv", "spectral")}
         squares, excluded, first = [], 0, None
         source: Source | None = None
         for epochs in sessions(settings, n, 11):
@@ -71,11 +71,11 @@ def pooled_bias(n: int) -> list[str]:
                 )  # one copy of the sequence is enough
                 prepared = PreparedEpoch(shared, settings, source)
                 for method, members in kept.items():
-                    members.append(CLOSED_LOOP[method].observe(prepared))
+                    members.append(LINE_METHODS[method].observe(prepared))
             squares += fit_epochs(good[:3], "bandlimited", settings)[0]
         for method, observations in kept.items():
             start = least_squares_start(observations)
-            fit, _ = fit_pooled(observations, CLOSED_LOOP[method].linearise, start)
+            fit, _ = fit_pooled(observations, LINE_METHODS[method].linearise, start)
             error, se = fit.values / TRUTH - 1, fit.standard_errors / TRUTH
             rows.append(
                 [

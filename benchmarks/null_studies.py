@@ -44,7 +44,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation import score_epoch
 from rigidimeter.analysis.estimation.closedloop.closed_loop_fit import fit_closed_loop
-from rigidimeter.analysis.estimation.closedloop.perturbation_methods import CLOSED_LOOP
+from rigidimeter.analysis.estimation.closedloop.line_methods import LINE_METHODS
 from rigidimeter.analysis.estimation.prepared import prepare
 from rigidimeter.analysis.estimation.scores import angular_impulse_nm_s, loop_area_j, scoring_cycles
 from rigidimeter.analysis.statistics import (
@@ -223,10 +223,10 @@ def _estimates(
     )
     epochs = [batch.epoch(i) for i in range(len(batch))]
     prepared = prepare(epochs, settings)
-    first, _ = fit_closed_loop(CLOSED_LOOP["iv"], prepared, pooled=False)
+    first, _ = fit_closed_loop(LINE_METHODS["iv"], prepared, pooled=False)
     if math.isnan(inertia_kg_m2):
         inertia_kg_m2 = float(np.median([fit.inertia_kg_m2 for fit in first]))
-    second, _ = fit_closed_loop(CLOSED_LOOP["iv"], prepared, inertia_kg_m2, pooled=False)
+    second, _ = fit_closed_loop(LINE_METHODS["iv"], prepared, inertia_kg_m2, pooled=False)
     assert all(fit.outcome.included for fit in (*first, *second))
     found = {}
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(SINUSOID, key)))

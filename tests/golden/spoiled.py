@@ -85,6 +85,16 @@ def narrow(columns: Columns) -> None:
     _follow(columns, 2.0 * signal.sosfiltfilt(band, noise))
 
 
+def noise_of_the_angle(columns: Columns) -> None:
+    """Noise of 3 mrad that went through a filter of 50 Hz, beside slow motion of 30 mrad."""
+    noise = np.random.default_rng(8).normal(size=(2, columns["time_s"].size))
+    slow = signal.butter(2, [0.3, 8.0], "bandpass", fs=RATE_HZ, output="sos")
+    angle = signal.sosfiltfilt(slow, noise[0])
+    _follow(columns, 0.03 * angle / angle.std())
+    added = signal.lfilter(*signal.butter(2, 50.0, fs=RATE_HZ), noise[1])
+    columns["angle_rad"] = columns["angle_rad"] + 3e-3 * added / added.std()
+
+
 def computed_torque(columns: Columns) -> None:
     columns["torque_nm"] = 0.137 * columns["velocity_rad_s"] + 1.75 * columns["angle_rad"]
     _alone(columns, "torque_nm", "angle_rad", "velocity_rad_s")
@@ -132,6 +142,7 @@ def torque_and_angle(columns: Columns) -> None:
 SPOILED: Mapping[str, tuple[Callable[[Columns], object], Mapping[str, object]]] = {
     "as it is": (as_it_is, {}),
     "torque and angle alone": (torque_and_angle, {}),
+    "noise of the angle behind a filter": (noise_of_the_angle, {}),
     "clipped torque": (clipped, {}),
     "frozen torque": (frozen, {}),
     "a stretch left out": (as_it_is, {"leave_out": "4:7 cough"}),

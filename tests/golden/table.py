@@ -108,7 +108,7 @@ def _tolerance(key: str, row: Row) -> float:
     if base in ("estimate", "low", "high"):
         error, ends = row.get("se"), [row.get("low"), row.get("high")]
     if isinstance(error, float) and error > 0:
-        return ERROR_SHARE * error + 1e-9 * size
+        return ERROR_SHARE * error + 5e-9 * size  # half of the ninth digit
     if all(isinstance(end, (int, float)) for end in ends) and ends[0] != ends[1]:
         return ERROR_SHARE * abs(ends[1] - ends[0]) / 2  # type: ignore[operator]
     return RELATIVE * size

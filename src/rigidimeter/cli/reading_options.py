@@ -101,8 +101,8 @@ class Recordings:
     )
     band_hz: tuple[float, float] | None = ESTIMATE.further(
         "--band-hz LOW HIGH",
-        "Band of the fit. Default: bandlimited 0.15 to 10 where the perturbation is known, else "
-        "to 50; iv and spectral 0.15 to 30; at most 0.4 times the slowest channel's rate.",
+        "Band of the fit. Default: 0.15 to 30; at most 0.4 times the slowest channel's rate, and "
+        "a sixteenth of it where torque and motion are all there is.",
     )
     controller: tuple[float, float] | None = ESTIMATE.further(
         "--controller J_C B_C",

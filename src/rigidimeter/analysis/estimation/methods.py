@@ -6,13 +6,13 @@ import difflib
 from collections.abc import Iterable, Sequence
 
 from rigidimeter.analysis.estimation.bandlimited import bandlimited_signals
-from rigidimeter.analysis.estimation.closedloop.observation import closed_loop_obstacle, observe
-from rigidimeter.analysis.estimation.closedloop.periodic_response import follows_perturbation
-from rigidimeter.analysis.estimation.closedloop.perturbation_methods import (
+from rigidimeter.analysis.estimation.closedloop.line_methods import (
     BANDLIMITED,
     IV,
     SPECTRAL,
 )
+from rigidimeter.analysis.estimation.closedloop.observation import closed_loop_obstacle, observe
+from rigidimeter.analysis.estimation.closedloop.periodic_response import follows_perturbation
 from rigidimeter.analysis.estimation.method_record import Method
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch, prepare
 from rigidimeter.analysis.estimation.published_method import PUBLISHED
@@ -70,8 +70,8 @@ def choose_method(epochs: Sequence[PreparedEpoch]) -> tuple[str, str]:
         obstacle for prepared in epochs if (obstacle := closed_loop_obstacle(prepared.epoch))
     ]
     least_squares = (
-        "so least squares is used: torque that something but the robot adds biases it in a closed "
-        "loop"
+        "so least squares weighted by noise is used: torque of the subject over all of the band, "
+        "or a joint that is not J, B and K, biases it"
     )
     if 2 * len(obstacles) > len(epochs):
         found = f"{obstacles[0]} (in {len(obstacles)} of {len(epochs)} epochs)"

@@ -258,8 +258,8 @@ def advice(result: StudyResult, light: TrafficLight | None) -> list[str]:
     ]
     if perturbed and not any("perturbation_nm" in names for names in perturbed):
         found.append(
-            "Record the perturbation (perturbation_nm): without it torque that something but the "
-            "robot adds biases J, B and K, whatever the number of epochs."
+            "Record the perturbation (perturbation_nm): without it torque of the subject is "
+            "separated from the joint by its frequencies alone."
         )
     measured = precisions(result)
     more = [

@@ -34,9 +34,44 @@ JOINT_KINDS = (
                 "meaning": "Least squares takes torque beyond J, B and K for the joint, and how "
                 "much cannot be computed.",
             },
+            "first_order": {
+                "meaning": "Least squares takes it for the joint. The intervals include it to the "
+                "first order, which so large a bias exceeds."
+            },
             "negligible": OF_SUBJECT["negligible"],
         },
         example={"value": 180.0, "limit": 50.0, "percent_of": (-17.0, -16.0, -7.2)},
+    ),
+    Kind(
+        "unweighted_fit",
+        "difference of least squares without weights from that in which each frequency counts by "
+        "its noise, the bias by the loop taken off; the largest of J, B and K, beyond four "
+        "standard errors",
+        headline="Without weights {symbol} is {value:.2g} % {way}",
+        measured="By least squares in which all frequencies count alike, {symbol} is {value:.2g} % "
+        "{way} than where each counts by its noise (at most {limit:g} %), the bias by the loop "
+        "taken off.",
+        meaning="Noise does not do that: the torque holds more than J, B and K, and the answer "
+        "depends on the frequencies that count.",
+        remedy="Look for what is missing with rigidimeter model --compare, or record the "
+        "perturbation and use iv.",
+        setting="max_unweighted_percent",
+        example={"value": 24.0, "limit": 10.0, "way": "lower"},
+    ),
+    Kind(
+        "noise_of_motion",
+        "how many times smaller J or B is where each frequency counts by its noise than where all "
+        "count alike: noise of the motion that neighbouring samples share",
+        headline="Noise of the motion makes {symbol} {value:.2g} times smaller",
+        measured="Where each frequency counts by its noise, {symbol} is {value:.2g} times smaller "
+        "than where all count alike (at most {limit:g} times).",
+        meaning="Frequencies at which the motion is noise decide the fit, so its numbers mean "
+        "nothing.",
+        remedy="Use a better motion sensor, a larger perturbation, or --band-hz to end the band "
+        "where the motion ends.",
+        unit="1",
+        level="exclude",
+        example={"value": 66.0, "limit": 3.0, "symbol": "J"},
     ),
     Kind(
         "voluntary_torque",

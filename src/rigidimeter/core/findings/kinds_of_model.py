@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from rigidimeter.core.findings.kind import Kind
-from rigidimeter.core.findings.kinds_of_fit import OF_SUBJECT
 
 _SAMPLE_FASTER = (
     "sample the torque faster, filter it before it is sampled (estimation.torque_lowpass_hz), use "
@@ -161,7 +160,10 @@ MODEL_KINDS = (
                 "multiplied by 57.3."
             },
             "instrument": {"meaning": "{method} is less precise with it, not biased."},
-            "in_interval": OF_SUBJECT["in_interval"],
+            "in_interval": {
+                "meaning": "Each frequency counts by its noise, and the intervals include what "
+                "torque from elsewhere does by the loop."
+            },
             "small_bias": {
                 "meaning": "By the loop that the recording shows, torque from elsewhere biases J, "
                 "B and K by {share:.2g} % of half their intervals at most."
@@ -185,7 +187,10 @@ MODEL_KINDS = (
                 "meaning": "{method} takes the motion that the perturbation would cause without "
                 "feedback, so it is less precise, not biased."
             },
-            "in_interval": OF_SUBJECT["in_interval"],
+            "in_interval": {
+                "meaning": "Each frequency counts by its noise, and the intervals include what "
+                "torque from elsewhere does by the loop."
+            },
             "small_bias": {
                 "meaning": "By the loop, torque from elsewhere biases J, B and K by {share:.2g} % "
                 "of half their intervals at most."

@@ -120,6 +120,7 @@ class DiagnosticsSettings(Section):
     tremor_high_hz: float = quantity(12.0, "Hz", 1.0, 50.0)
     max_tremor_share_percent: float = quantity(3.0, "%", 0.0, 100.0)
     max_loop_bias_percent: float = quantity(50.0, "%", 0.0, 1000.0)
+    max_unweighted_percent: float = quantity(10.0, "%", 0.0, 1000.0)
     active_torque_nm: float = quantity(0.1, "N·m", 0.0, 100.0, above=True)
     active_share_percent: float = quantity(50.0, "%", 0.0, 1000.0)
     max_active_percent: float = quantity(20.0, "%", 0.0, 100.0)

@@ -239,8 +239,9 @@ def _pooled_fit(
     sources = dict.fromkeys(single.source for single in singles)
     weight = np.array([single.n_samples for single in singles], dtype=np.float64)
     power = np.array([single.residual_sd_nm**2 for single in singles])
-    total = power / (1 - np.array([single.r_squared for single in singles]))
-    share = float(weight @ power / (weight @ total))
+    unexplained = 1 - np.array([single.r_squared for single in singles])
+    total = power / np.maximum(unexplained, np.finfo(np.float64).tiny)
+    share = float(weight @ power / max(weight @ total, np.finfo(np.float64).tiny))
     return replace(
         singles[0],
         source=", ".join(sources),

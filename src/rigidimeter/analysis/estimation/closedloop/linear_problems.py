@@ -37,17 +37,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation.closedloop.excitation import Excitation
-from rigidimeter.analysis.estimation.closedloop.observation import Observation
+from rigidimeter.analysis.estimation.closedloop.observation import DENSE, Observation
 from rigidimeter.analysis.estimation.signals import Array
 
 Complex = NDArray[np.complex128]
 
 LEAST = np.array([1e-5, 1e-3, 1e-2])
 """Smallest J, B and K that a response is simulated with, so that the simulated loop is stable."""
-
-DENSE = 16.0
-"""Samples a cycle of the highest line from which half of them show the motion as well as all: an
-acceleration near half the rate is then an angle 49 times smaller than at that line, or less."""
 
 T = TypeVar("T")
 
@@ -80,7 +76,7 @@ def direct(observations: Sequence[Observation], values: Array) -> list[Problem]:
     for observation in observations:
         lines = observation.lines
         motion = instruments = lines.motion
-        if lines.noise is not None and lines.grid.rate_hz > DENSE * lines.grid.band_hz[1]:
+        if lines.noise is not None and lines.grid.rate_hz >= DENSE * lines.grid.band_hz[1]:
             apart = lines.noise * np.where(lines.grid.line % 2, 1.0, -1.0)[:, None]
             motion, instruments = lines.motion + apart, lines.motion - apart
         problems.append(Problem(instruments, motion, lines.torque_nm, observation))
@@ -128,13 +124,19 @@ def holding(linearise: Linearise, inertia_kg_m2: float) -> Linearise:
 
 def least_squares_start(observations: Sequence[Observation]) -> Array:
     """Return where to begin: least squares, kept where the loop can be simulated; shape (3,)."""
+    found = least_squares(direct(observations, np.empty(0)))
+    return np.asarray(np.maximum(found, 10 * LEAST), dtype=np.float64)
+
+
+def least_squares(problems: Sequence[Problem]) -> Array:
+    """Return the solution in which every line counts alike, shape (3,)."""
     gram, moment = np.zeros((3, 3)), np.zeros(3)
-    for problem in direct(observations, np.empty(0)):
+    for problem in problems:
         gram += (problem.regressors.conj().T @ problem.regressors).real
         moment += (problem.regressors.conj().T @ problem.target).real
     scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(np.float64).tiny))
     values = np.linalg.lstsq(gram / np.outer(scale, scale), moment / scale)[0] / scale
-    return np.asarray(np.maximum(values, 10 * LEAST), dtype=np.float64)
+    return np.asarray(values, dtype=np.float64)
 
 
 def _of_each(observations: Sequence[Observation], simulate: Callable[[Excitation], T]) -> list[T]:

@@ -35,6 +35,7 @@ from rigidimeter.analysis.estimation.closedloop.spectral_lines import (
     epoch_lines,
 )
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
+from rigidimeter.analysis.estimation.screening import LEAST_BAND_RATIO
 from rigidimeter.analysis.estimation.signals import motion_channels
 from rigidimeter.analysis.estimation.stretches import longest_part
 from rigidimeter.core.records import Channel, Epoch
@@ -42,6 +43,10 @@ from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE, Settings
 from rigidimeter.model import DriveModel, Loop
 
 Complex = NDArray[np.complex128]
+
+DENSE = 16.0
+"""Samples a cycle of the highest line from which half of them show the motion as well as all: an
+acceleration near half the rate is then an angle 49 times smaller than at that line, or less."""
 
 WIDER = 0.5, 1.4
 """Lines are also kept of a band whose edges are these times those of the fit."""
@@ -159,7 +164,7 @@ def observe_motion(prepared: PreparedEpoch, motion: EpochMotion | None = None) -
     """
     if prepared.obstacle:
         raise ValueError(prepared.obstacle)
-    grid = _grid(prepared, None)
+    grid = _grid(prepared, None, alone=True)
     everywhere = np.ones(grid.line.size, dtype=np.bool_)
     return _observed(prepared, None, grid, everywhere, None, motion)
 
@@ -250,14 +255,23 @@ def _grid(
     prepared: PreparedEpoch,
     samples: Callable[[int, float], int] | None,
     factors: tuple[float, float] = (1.0, 1.0),
+    *,
+    alone: bool = False,
 ) -> Grid:
-    """Return the grid in the band, its edges times these factors as far as the rate allows."""
+    """Return the grid in the band, its edges times these factors as far as the rate allows.
+
+    `alone` says whether the motion is its own instrument.
+    """
     epoch, estimation = prepared.epoch, prepared.settings.estimation
     torque = epoch.channels["torque_nm"]
     limiting = [torque] if prepared.source.drive else [torque, *motion_channels(epoch)]
     slowest = min(channel.rate_hz for channel in limiting)
     low, high = estimation.band_low_hz, estimation.band_high_closed_loop_hz
-    band = factors[0] * low, min(factors[1] * high, USABLE_FRACTION_OF_RATE * slowest)
+    usable_hz = USABLE_FRACTION_OF_RATE * slowest
+    if alone and not prepared.source.drive:
+        # Higher, noise of the motion that no half of the samples shows would count as motion.
+        usable_hz = min(usable_hz, max(slowest / DENSE, LEAST_BAND_RATIO * low))
+    band = factors[0] * low, min(factors[1] * high, usable_hz)
     return epoch_grid(epoch, band, estimation.trim_s, samples)
 
 

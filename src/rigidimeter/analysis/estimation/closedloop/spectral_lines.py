@@ -103,10 +103,9 @@ class Grid:
     def transforms(self, values: Array, derivatives: int) -> Complex:
         """Return `transform` of x and of its derivatives, without differentiating it.
 
-        The mean of a derivative goes too, as of x: ∫ w² x' dt = −∫ (w²)' x dt. Each stands beside
-        half the difference of what the even samples and the odd ones alone give: that
-        is the spectrum as far below half the rate as the line is above zero, which holds noise
-        alone where the motion is slow against the samples.
+        Means go, of derivatives too: ∫ w² x' dt = −∫ (w²)' x dt. Beside each stands half the
+        difference of what the even and the odd samples give: the spectrum as far below half the
+        rate as the line is above zero, which is noise where the motion is slow.
 
         Parameters
         ----------

@@ -53,7 +53,9 @@ def push_harmless(case: Case, look: Look) -> Harmless:
     if not case.loop_bias_is_small:
         return HARMFUL
     if case.bias_in_interval:
-        return "in_interval", {}
+        # Torque that shows no joint is not the joint's.
+        shown = bool(np.all(np.abs(case.parameters) > case.half_widths))
+        return ("in_interval", {}) if shown else HARMFUL
     return "small_bias", {"share": case.loop_bias_percent or 0.0}
 
 

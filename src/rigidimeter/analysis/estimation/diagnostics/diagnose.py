@@ -9,13 +9,6 @@ import numpy as np
 
 from rigidimeter.analysis.estimation.bandlimited import bandlimited_signals
 from rigidimeter.analysis.estimation.closedloop.controller_used import loop_shown
-from rigidimeter.analysis.estimation.closedloop.line_weights import (
-    shared_density,
-    smoother_for,
-)
-from rigidimeter.analysis.estimation.closedloop.linear_problems import direct
-from rigidimeter.analysis.estimation.closedloop.loop_pull import loop_pull
-from rigidimeter.analysis.estimation.closedloop.observation import observe_motion
 from rigidimeter.analysis.estimation.diagnostics.channel_checks import CHANNEL_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look
 from rigidimeter.analysis.estimation.diagnostics.computed_torque_checks import (
@@ -27,6 +20,10 @@ from rigidimeter.analysis.estimation.diagnostics.controller_checks import (
 )
 from rigidimeter.analysis.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
+from rigidimeter.analysis.estimation.diagnostics.least_squares_checks import (
+    LEAST_SQUARES_CHECKS,
+    unbiased,
+)
 from rigidimeter.analysis.estimation.diagnostics.missing_term import MISSING_TERM_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.motion_checks import MOTION_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.movement_checks import MOVEMENT_CHECKS
@@ -48,6 +45,7 @@ CHECKS: list[Check] = [
     *STATIC_TORQUE_CHECKS,
     *RESIDUAL_CHECKS,
     *MISSING_TERM_CHECKS,
+    *LEAST_SQUARES_CHECKS,
     *MOVEMENT_CHECKS,
     *TREMOR_CHECKS,
     *VARYING_CHECKS,
@@ -126,19 +124,6 @@ def _case(prepared: PreparedEpoch, parameters: Array) -> Case:
         loop=loop_shown(prepared),
         prepared=prepared,
     )
-
-
-def unbiased(prepared: PreparedEpoch, fit: Fit, by_noise: bool) -> Array:
-    """Return J, B and K by least squares without the pull of the loop; NaN where it is too large.
-
-    By that of least squares in which each line counts by its noise, or alike.
-    """
-    observation = prepared.once(observe_motion)
-    problems, lines = direct([observation], fit.value), [observation.lines]
-    power = np.ones(lines[0].torque_nm.size)
-    if by_noise:
-        power = shared_density(lines, problems, fit.value, smoother_for(lines)).at(lines[0])
-    return fit.value - loop_pull(problems, [power], fit.value)
 
 
 def _seen_without_fit(prepared: PreparedEpoch) -> dict[str, Look | None]:

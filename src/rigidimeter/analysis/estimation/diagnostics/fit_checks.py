@@ -224,6 +224,7 @@ PARAMETER_CHECKS = (
         (),
         lambda c: r_squared(c.fit.r_squared, c.settings) if c.fit is not None else None,
         harmless=_by_noise,
+        effect=push_effect,
     ),
     Check(
         "negative_parameters",

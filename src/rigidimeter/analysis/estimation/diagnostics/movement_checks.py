@@ -15,19 +15,15 @@ import scipy
 
 from rigidimeter.analysis.estimation.bandlimited import zero_phase_band
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
-    Case,
     Check,
     Look,
     at_most,
     push_effect,
     push_harmless,
-    too_biased,
 )
-from rigidimeter.analysis.estimation.found import half_widths
 from rigidimeter.analysis.estimation.power_lines import lines_inside, power_lines
 from rigidimeter.analysis.estimation.signals import Array, Signals
-from rigidimeter.core.findings import Effect
-from rigidimeter.core.records import Channel, Fit
+from rigidimeter.core.records import Channel
 from rigidimeter.core.settings import DiagnosticsSettings
 
 WINDOW_S = 1.0
@@ -83,24 +79,6 @@ def active_movement(voluntary_nm: Array, signals: Signals, settings: Diagnostics
     return at_most(value, settings.max_active_percent, above_nm=above_nm, first_s=first_s)
 
 
-def loop_bias(fit: Fit, unbiased: Array, in_interval: bool, settings: DiagnosticsSettings) -> Look:
-    """Return how far the loop pulls least squares from the joint, in % of half the intervals."""
-    bias = fit.value - unbiased
-    value = 100.0 * float(np.max(np.abs(bias) / half_widths(fit)))
-    most = settings.max_loop_bias_percent
-    large = too_biased(bias, fit.value, half_widths(fit), most, in_interval)
-    if not np.isfinite(value):
-        return Look(value, most, True, variant="unknown")
-    effect = Effect.of(bias, fit.value, half_widths(fit))
-    return Look(value, most, large, effect=effect)
-
-
-def _loop_bias(case: Case) -> Look | None:
-    if case.fit is None or case.unbiased is None:
-        return None
-    return loop_bias(case.fit, case.unbiased, case.bias_in_interval, case.settings)
-
-
 def emg_envelope_v(emg: Channel, window_s: float) -> Array:
     """Return the moving mean of the rectified EMG, its own mean taken off first, in V."""
     length = max(round(window_s * emg.rate_hz), 1)
@@ -121,7 +99,6 @@ def emg_activity(emg: Channel, settings: DiagnosticsSettings) -> Look:
 
 
 MOVEMENT_CHECKS = (
-    Check("loop_bias", (), _loop_bias),
     Check(
         "voluntary_torque",
         (),

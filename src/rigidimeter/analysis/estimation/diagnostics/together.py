@@ -36,8 +36,10 @@ from rigidimeter.analysis.estimation.closedloop.observation import (
 )
 from rigidimeter.analysis.estimation.closedloop.spectral_lines import Complex
 from rigidimeter.analysis.estimation.diagnostics.band_check import band_estimates, band_finding
-from rigidimeter.analysis.estimation.diagnostics.diagnose import unbiased
-from rigidimeter.analysis.estimation.diagnostics.movement_checks import loop_bias
+from rigidimeter.analysis.estimation.diagnostics.least_squares_checks import (
+    loop_bias,
+    unbiased,
+)
 from rigidimeter.analysis.estimation.found import found, in_half_intervals
 from rigidimeter.analysis.estimation.method_record import Method
 from rigidimeter.analysis.estimation.methods import method_named

@@ -148,7 +148,7 @@ def _unexplained(result: StudyResult) -> Iterator[Block]:
         "sensor noise, and whatever the model lacks. Voluntary movement is below 4 Hz; a tremor is "
         "a peak."
     )
-    if not method_of(result.analysis.method).uses_perturbation:
+    if not method_of(result.analysis.method).by_noise:
         text += " Least squares makes this torque as small as it can, and so hides part of it."
     yield paragraph(text)
     sizes_nm = {

@@ -4,10 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.scenarios.catalogue import SCENARIOS
+from tests.scenarios.recordings import measured_alone
 
+import rigidimeter as rm
 from rigidimeter.analysis.estimation import fit_epochs
 from rigidimeter.analysis.estimation.diagnostics import checked
-from rigidimeter.analysis.estimation.diagnostics.movement_checks import loop_bias
+from rigidimeter.analysis.estimation.diagnostics.least_squares_checks import loop_bias
 from rigidimeter.analysis.estimation.found import found as made
 from rigidimeter.analysis.estimation.prepared import prepare
 from rigidimeter.core.findings import Effect
@@ -108,3 +111,24 @@ def test_a_push_says_what_it_does_to_the_method_used(method):
     else:
         assert effect == push["loop_bias"].effect
         assert 100 * np.max(np.abs(effect.half_intervals)) == pytest.approx(push["loop_bias"].value)
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        ("relaxed", False),
+        ("voluntary 0.2 N·m", False),
+        ("tremor 0.3 N·m", False),
+        ("reflex 60 ms, 0.15", True),
+    ],
+)
+def test_weights_move_the_answer_only_where_the_model_lacks_something(row, said):
+    scenario = SCENARIOS[row]
+    epochs, _ = scenario.simulated(0, 4)
+    analysis = rm.estimate(
+        [measured_alone(epoch) for epoch in epochs],
+        "bandlimited",
+        settings=scenario.analysed_with(),
+    )
+    names = [[finding.name for finding in fit.findings] for fit in analysis.fits]
+    assert ["unweighted_fit" in own for own in names] == [said] * 4

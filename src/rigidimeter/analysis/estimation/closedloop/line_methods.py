@@ -21,6 +21,17 @@ from rigidimeter.analysis.estimation.closedloop.observation import (
 from rigidimeter.analysis.estimation.closedloop.refine import ENOUGH_EPOCHS
 from rigidimeter.analysis.estimation.method_record import Method
 
+LINE_METHODS = {
+    one.name: one
+    for one in (
+        LineMethod("iv", observe, instrumental),
+        LineMethod("spectral", observe_periods, periodic),
+        LineMethod("bandlimited", observe_motion, direct),
+    )
+}
+"""What each observes and solves."""
+
+
 _INTERVALS_TEXT = (
     "Intervals are made from the power of the residual at each frequency, torque that "
     "something but the robot adds included"
@@ -36,7 +47,7 @@ IV = Method(
     title="instrumental variables, made from the perturbation",
     needs=("perturbation_nm",),
     methods_text="by refined instrumental variables made from the known perturbation",
-    fit=partial(fit_closed_loop, LineMethod("iv", observe, instrumental)),
+    fit=partial(fit_closed_loop, LINE_METHODS["iv"]),
     references=("riv", "riv_loop"),
     intervals_text=_INTERVALS_TEXT,
     pooled_text=_POOLED_TEXT,
@@ -48,7 +59,7 @@ SPECTRAL = Method(
     title="instrumental variables at the lines of a periodic perturbation",
     needs=("perturbation_nm",),
     methods_text="by instrumental variables at the lines of the periodic perturbation",
-    fit=partial(fit_closed_loop, LineMethod("spectral", observe_periods, periodic)),
+    fit=partial(fit_closed_loop, LINE_METHODS["spectral"]),
     intervals_text=_INTERVALS_TEXT,
     pooled_text=_POOLED_TEXT,
     by_noise=True,
@@ -58,7 +69,7 @@ BANDLIMITED = Method(
     title="least squares, each frequency weighted by its noise",
     needs=(),
     methods_text="by least squares in which each frequency counts by its noise",
-    fit=partial(fit_closed_loop, LineMethod("bandlimited", observe_motion, direct)),
+    fit=partial(fit_closed_loop, LINE_METHODS["bandlimited"]),
     intervals_text=_INTERVALS_TEXT
     + ". They hold what that torque, coming back by the loop of the settings, does to least "
     "squares, and where the drive is not known what one as that of the settings does between the "

@@ -1,0 +1,152 @@
+"""What least squares of the measured motion rests on: a known loop, and a joint of J, B and K.
+
+Torque u that something but the robot adds pulls least squares by b (`closedloop.loop_pull`). Where
+each line counts by its noise, b is small and in the interval; where lines count alike it is not.
+
+Weights do not change what noise and the loop alone leave: with p₀ the solution in which lines count
+alike, b₀ its pull and p̂ the weighted one,
+
+    p₀ − b₀ − p̂
+
+is then zero but for the standard error of p₀, which is the larger (Hausman 1978). What the model
+lacks, such as a reflex, has other sizes at other frequencies, so the two solutions differ.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rigidimeter.analysis.estimation.closedloop.line_noise import line_covariance
+from rigidimeter.analysis.estimation.closedloop.line_weights import (
+    scaled_inverse,
+    shared_density,
+    smoother_for,
+)
+from rigidimeter.analysis.estimation.closedloop.linear_problems import direct, least_squares
+from rigidimeter.analysis.estimation.closedloop.loop_pull import loop_pull
+from rigidimeter.analysis.estimation.closedloop.observation import observe_motion
+from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look, too_biased
+from rigidimeter.analysis.estimation.found import half_widths
+from rigidimeter.analysis.estimation.prepared import PreparedEpoch
+from rigidimeter.analysis.estimation.signals import Array
+from rigidimeter.core.findings import Effect
+from rigidimeter.core.records import Fit
+from rigidimeter.core.settings import DiagnosticsSettings
+
+STANDARD_ERRORS = 4.0
+"""So far may the two solutions be apart by chance, of whichever of J, B and K."""
+
+TIMES_SMALLER = 3.0
+"""No reflex, friction or cuff makes J or B so many times smaller where lines are weighted."""
+
+PULL_SHARE = 0.5
+"""And by this share of b₀, which is computed from the residual of one epoch."""
+
+
+def unbiased(prepared: PreparedEpoch, fit: Fit, by_noise: bool) -> Array:
+    """Return J, B and K by least squares without the pull of the loop; NaN where it is too large.
+
+    Parameters
+    ----------
+    prepared : PreparedEpoch
+    fit : Fit
+        Where lines count by their noise, the solution.
+    by_noise : bool
+        Or all lines count alike.
+    """
+    observation = prepared.once(observe_motion)
+    problems, lines = direct([observation], fit.value), [observation.lines]
+    if by_noise:
+        values = fit.value
+        power = shared_density(lines, problems, values, smoother_for(lines)).at(lines[0])
+    else:
+        values, power = least_squares(problems), np.ones(lines[0].torque_nm.size)
+    return values - loop_pull(problems, [power], values)
+
+
+def loop_bias(
+    fit: Fit, without_pull: Array, in_interval: bool, settings: DiagnosticsSettings
+) -> Look:
+    """Return how far the loop pulls least squares from the joint, in % of half the intervals."""
+    bias = fit.value - without_pull
+    value = 100.0 * float(np.max(np.abs(bias) / half_widths(fit)))
+    most = settings.max_loop_bias_percent
+    if not np.isfinite(value):
+        return Look(value, most, True, variant="unknown")
+    large = too_biased(bias, fit.value, half_widths(fit), most, in_interval)
+    effect = Effect.of(bias, fit.value, half_widths(fit))
+    return Look(value, most, large, variant="first_order" if in_interval else "", effect=effect)
+
+
+class _Unweighted(NamedTuple):
+    """J, B and K without weights, the pull of the loop taken off, and how far chance may put it."""
+
+    values: Array
+    allowed: Array
+
+
+def _unweighted(case: Case) -> _Unweighted | None:
+    """Return that of a method that weights; None for others, and where the pull is too large."""
+    if case.fit is None or case.prepared is None or not case.bias_in_interval:
+        return None
+    if case.uses_perturbation:
+        return None
+    observation = case.prepared.once(observe_motion)
+    (problem,), lines = direct([observation], case.parameters), observation.lines
+    alike = least_squares([problem])
+    pull = loop_pull([problem], [np.ones(lines.torque_nm.size)], alike)
+    if not np.all(np.isfinite(pull)):
+        return None
+    smoother = smoother_for([lines])
+    shape = shared_density([lines], [problem], alike, smoother).at(lines)
+    inverse = scaled_inverse((problem.instruments.conj().T @ problem.regressors).real)
+    residual = problem.target - problem.regressors @ alike
+    covariance, _ = line_covariance(inverse, problem.instruments, residual, smoother, shape)
+    chance = STANDARD_ERRORS * np.sqrt(lines.grid.spread * np.diag(covariance))
+    return _Unweighted(alike - pull, chance + PULL_SHARE * np.abs(pull))
+
+
+def unweighted_fit(case: Case) -> Look | None:
+    """Return by how many % least squares without weights differs, more than noise and loop do."""
+    found = case.once(_unweighted)
+    if found is None:
+        return None
+    apart = found.values - case.parameters
+    percent = 100.0 * apart / np.abs(case.parameters)
+    most = case.settings.max_unweighted_percent
+    sure = (np.abs(apart) > found.allowed) & (np.abs(percent) > most)
+    about = int(np.argmax(np.where(sure, np.abs(percent), -1.0)))
+    facts = {"symbol": "JBK"[about], "way": "higher" if percent[about] > 0 else "lower"}
+    return Look(float(abs(percent[about])), most, bool(np.any(sure)), facts)
+
+
+def noise_of_motion(case: Case) -> Look | None:
+    """Return how many times smaller weights make J or B.
+
+    Noise of the motion that neighbouring samples share is motion without torque. Weights that let
+    lines of such noise decide make J and B small, and then these lines fit best.
+    """
+    found = case.once(_unweighted)
+    if found is None:
+        return None
+    apart = np.abs(found.values - case.parameters)[:2]
+    factor = np.abs(found.values / case.parameters)[:2]
+    factor[apart <= found.allowed[:2]] = 0.0
+    about = int(np.argmax(factor))
+    value = float(factor[about])
+    return Look(value, TIMES_SMALLER, value > TIMES_SMALLER, {"symbol": "JB"[about]})
+
+
+def _loop_bias(case: Case) -> Look | None:
+    if case.fit is None or case.unbiased is None:
+        return None
+    return loop_bias(case.fit, case.unbiased, case.bias_in_interval, case.settings)
+
+
+LEAST_SQUARES_CHECKS = (
+    Check("loop_bias", (), _loop_bias),
+    Check("unweighted_fit", (), unweighted_fit),
+    Check("noise_of_motion", (), noise_of_motion),
+)
