@@ -289,6 +289,8 @@ def test_fault_15_not_as_commanded(rig, case, tmp_path, measured):
         measured(15, rig, case, trial, bound_s)
 
 
+# On the ASCII line, as the name of the test does not say.
+@pytest.mark.realtime(priority=10, resolves_s=0.05, ordinary_probe=True)
 def test_a_port_that_vanishes_as_the_session_ends_leaves_the_power_unconfirmed(tmp_path):
     """When all epochs are done: nobody may believe that the drive is off."""
     with bench(ASCII) as made:
