@@ -21,11 +21,11 @@ from rigidimeter.analysis.estimation.closedloop.linear_problems import (
     least_squares_start,
 )
 from rigidimeter.analysis.estimation.closedloop.observation import (
-    closed_loop_obstacle,
     motion_of,
     observe,
     observe_motion,
 )
+from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
 from rigidimeter.analysis.estimation.closedloop.refine import LineFit
 from rigidimeter.analysis.estimation.method_record import Progress
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch, torque_earlier

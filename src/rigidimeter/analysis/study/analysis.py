@@ -19,7 +19,7 @@ from rigidimeter.analysis.estimation import (
 from rigidimeter.analysis.estimation.alignment import MOST_EPOCHS, aligned_prepared
 from rigidimeter.analysis.estimation.between_epochs import between_epochs
 from rigidimeter.analysis.estimation.clock_error import with_clock_error
-from rigidimeter.analysis.estimation.closedloop.observation import closed_loop_obstacle
+from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
 from rigidimeter.analysis.estimation.diagnostics import checked, checked_together
 from rigidimeter.analysis.estimation.diagnostics.delay_check import delay_of_drive_s, torque_delay
 from rigidimeter.analysis.estimation.method_record import Progress

@@ -20,10 +20,10 @@ FEWEST_LINES = 8
 class EstimationSettings(Section):
     """How J, B and K are estimated from an epoch.
 
-    `band_high_hz` applies where the perturbation is known; `band_high_unknown_hz` where it is not,
-    since an imposed motion may excite the joint far above the paper's 10 Hz;
-    `band_high_closed_loop_hz` to the methods that weight each frequency by its noise. Higher, they
-    gain precision where the subject pushes slowly, and take a soft cuff for the joint.
+    `band_high_closed_loop_hz` applies to the methods that weight each frequency by its noise:
+    higher, they gain precision where the subject pushes slowly, and take a soft cuff for the joint.
+    Checks and models with terms see the signals to `band_high_hz` where the perturbation is known,
+    and to `band_high_unknown_hz` where it is not.
 
     `torque_lowpass_hz` is the corner of the low-pass in the torque sensor or its amplifier, a
     Butterworth filter of the given order; 0 where there is none, or none below half the rate. What

@@ -1,4 +1,4 @@
-"""What least squares of the measured motion rests on: a known loop, and a joint of J, B and K.
+"""What least squares of the measured motion assumes: a known loop, and a joint of J, B and K.
 
 Torque u that something but the robot adds pulls least squares by b (`closedloop.loop_pull`). Where
 each line counts by its noise, b is small and in the interval; where lines count alike it is not.
@@ -38,11 +38,11 @@ from rigidimeter.core.settings import DiagnosticsSettings
 STANDARD_ERRORS = 4.0
 """So far may the two solutions be apart by chance, of whichever of J, B and K."""
 
-TIMES_SMALLER = 3.0
-"""No reflex, friction or cuff makes J or B so many times smaller where lines are weighted."""
-
 PULL_SHARE = 0.5
 """And by this share of b₀, which is computed from the residual of one epoch."""
+
+TIMES_SMALLER = 3.0
+"""No reflex, friction or cuff makes J or B so many times smaller where lines are weighted."""
 
 
 def unbiased(prepared: PreparedEpoch, fit: Fit, by_noise: bool) -> Array:
@@ -95,13 +95,13 @@ def _unweighted(case: Case) -> _Unweighted | None:
         return None
     observation = case.prepared.once(observe_motion)
     (problem,), lines = direct([observation], case.parameters), observation.lines
-    alike = least_squares([problem])
+    inverse = scaled_inverse((problem.instruments.conj().T @ problem.regressors).real)
+    alike = inverse @ (problem.instruments.conj().T @ problem.target).real
     pull = loop_pull([problem], [np.ones(lines.torque_nm.size)], alike)
     if not np.all(np.isfinite(pull)):
         return None
     smoother = smoother_for([lines])
     shape = shared_density([lines], [problem], alike, smoother).at(lines)
-    inverse = scaled_inverse((problem.instruments.conj().T @ problem.regressors).real)
     residual = problem.target - problem.regressors @ alike
     covariance, _ = line_covariance(inverse, problem.instruments, residual, smoother, shape)
     chance = STANDARD_ERRORS * np.sqrt(lines.grid.spread * np.diag(covariance))

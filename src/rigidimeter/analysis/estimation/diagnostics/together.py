@@ -30,10 +30,10 @@ from rigidimeter.analysis.estimation.closedloop.lack_of_fit import (
 from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST
 from rigidimeter.analysis.estimation.closedloop.observation import (
     Observation,
-    closed_loop_obstacle,
     observe,
     observe_periods,
 )
+from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
 from rigidimeter.analysis.estimation.closedloop.spectral_lines import Complex
 from rigidimeter.analysis.estimation.diagnostics.band_check import band_estimates, band_finding
 from rigidimeter.analysis.estimation.diagnostics.least_squares_checks import (

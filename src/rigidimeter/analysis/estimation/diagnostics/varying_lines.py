@@ -20,10 +20,10 @@ from rigidimeter.analysis.estimation.closedloop.line_weights import ENOUGH_LINES
 from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST
 from rigidimeter.analysis.estimation.closedloop.observation import (
     Observation,
-    closed_loop_obstacle,
     observe,
     observe_motion,
 )
+from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
 from rigidimeter.analysis.estimation.closedloop.spectral_lines import Grid
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.analysis.estimation import aligned, estimate_delays
-from rigidimeter.analysis.estimation.closedloop.observation import period_s
+from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import period_s
 from rigidimeter.analysis.estimation.prepared import prepare
 from rigidimeter.core.records import Channel
 from rigidimeter.virtual import PAPER_RATES
