@@ -163,8 +163,8 @@ def days_to_decide(c: Comparison) -> int | None:
     epochs = [max(round(len(own) / n), 1) for own, n in zip(each, days, strict=True)]
     scatter = ASSUMED[title]
     if min(map(len, each)) >= _MIN_EPOCHS:
-        within = max(c.summaries[name].sd_percent for name in c.pair)
-        scatter = replace(scatter, between_epochs_percent=within)
+        sd_percent = max(c.summaries[name].sd_percent for name in c.pair)
+        scatter = replace(scatter, between_epochs_percent=sd_percent)
     if min(values) <= 0:
         return None
     sd = day_difference_sd(scatter, (values[0], values[1]), (0.0, 0.0), (epochs[0], epochs[1]))
