@@ -18,7 +18,6 @@ from rigidimeter.model.drive_model import (
     HeldCommand,
     lowpass,
     same_time,
-    state_at_every,
     state_at_ticks,
     state_later,
     with_conjugates,

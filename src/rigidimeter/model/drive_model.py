@@ -262,25 +262,6 @@ def state_at_ticks(
     return np.append(0.0, state)
 
 
-def state_at_every(
-    pole: complex, command_rad_s: Array, interval_s: float, first: int, stride: int
-) -> Array | Complex:
-    """Return x of x' = λ x + c, from rest, at the tick `first` and each `stride` ticks later.
-
-    For ticks that came evenly. What the commands of one stride add is summed before the recursion.
-    """
-    growth = _growth(pole)
-    decay = np.exp(growth * interval_s)
-    began = state_at_ticks(pole, command_rad_s[: first + 1], interval_s)[-1]
-    strides = (command_rad_s.size - 1 - first) // stride
-    blocks = command_rad_s[first : first + strides * stride].reshape(strides, stride)
-    weights = (decay - 1) / growth * decay ** np.arange(stride)[::-1]
-    added = blocks @ weights.real + (1j * (blocks @ weights.imag) if pole.imag else 0.0)
-    whole = decay**stride
-    state, _ = scipy.signal.lfilter([1.0], [1.0, -whole], added, zi=np.atleast_1d(whole * began))
-    return np.append(began, state)
-
-
 def state_later(
     pole: complex, state: Array | Complex, command_rad_s: Array, after_s: Array | float
 ) -> Array | Complex:

@@ -12,7 +12,6 @@ from rigidimeter.model import (
     drive,
     drive_step,
     lowpass,
-    state_at_every,
     state_at_ticks,
 )
 
@@ -118,16 +117,13 @@ def test_a_low_pass_whose_pole_is_the_drives_own_is_not_divided_by_zero():
 
 
 @pytest.mark.parametrize("pole", [complex(-50.0), complex(-50.0, 80.0)])
-@pytest.mark.parametrize(("first", "stride"), [(0, 4), (7, 3), (99, 2)])
-def test_the_state_at_every_so_many_ticks_is_that_of_each_tick(pole, first, stride):
+def test_the_state_at_ticks_follows_tick_by_tick(pole):
     """x(t + T) = e^(λT) x(t) + (e^(λT) − 1)/λ c, tick by tick."""
     command = np.random.default_rng(0).normal(size=100)
     decay, state, states = cmath.exp(pole * 1e-3), 0j, []
     for sent in command:
         states.append(state)
         state = decay * state + (decay - 1) / pole * sent
-    found = state_at_every(pole, command, 1e-3, first, stride)
-    assert found == pytest.approx(np.array(states[first::stride]), rel=1e-12)
     each = state_at_ticks(pole, command, 1e-3)
     assert each == pytest.approx(np.array(states), rel=1e-12)
 

@@ -1,207 +1,150 @@
-"""The drive of one structure that explains the velocity best.
+"""The drive of so many poles and zeros that explains the velocity best, and those near it.
 
-For given poles and delay the velocity is linear in the numerator, so only poles and delay are
-searched (variable projection, Golub and Pereyra 1973).
+Neighbours are moved by two standard errors along each axis of the covariance of place and
+numerator,
+
+    C = (G'G)⁻¹ G' <e e'> G (G'G)⁻¹
+
+with G the slopes of the velocity and e what is left of it (`uncertainty.hac_covariance`). At few
+samples a tick constant one axis is long: delay, fastest pole and numerator change together, hardly
+the velocity at the samples, and the acceleration between them a lot.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections import deque
-from collections.abc import Callable
+from collections.abc import Sequence
 
 import numpy as np
 import scipy
 
-from rigidimeter.analysis.estimation.closedloop.drive_motion import since_ticks
-from rigidimeter.analysis.estimation.closedloop.drive_terms import (
-    FASTEST,
-    SLOWEST,
-    TINY,
-    Acting,
-    Fitted,
+from rigidimeter.analysis.estimation.closedloop.drive_answer import (
+    LONGEST_S,
+    LONGEST_TICKS,
+    Answer,
     Samples,
-    Structure,
-    Terms,
-    acting_on,
-    coordinates_of,
-    terms_of,
+    answer,
+    drive_at,
+    velocities,
 )
 from rigidimeter.analysis.estimation.signals import Array
-from rigidimeter.core.records import Channel
+from rigidimeter.analysis.estimation.uncertainty import hac_covariance
 from rigidimeter.model import DriveModel
 
-LONGEST_S, LONGEST_TICKS = 0.1, 4.0
-"""The longest delay of a drive, the larger of both."""
+STANDARD_ERRORS = 2.0
+"""A delay is there if it is longer than so many, and neighbours are so many away."""
 
-EARLIEST = -0.5
-"""In ticks. The search may pass through delays below zero; none is the answer."""
-
-SHORT, LATER = 0.1, 0.5
-"""In ticks: the shortest delay that a search begins with, and where one begins again that came to
-no delay at first."""
+SHORT = 0.25
+"""In ticks: the shortest delay that a search begins with."""
 
 MOST_TRIES = 80
 """Steps of a search; one that takes longer is on its way to poles without an end."""
 
-STEP = float(np.sqrt(np.finfo(np.float64).eps))
-"""Of a coordinate, for its slope: rounding and curvature disturb it alike."""
+STEP = 1e-4
+"""Of a coordinate, for its slope."""
 
-EVERYTHING = slice(None)
+CURVED, LONG, HALVINGS = 2.0, 5.0, 8
+"""A move that changes the velocity by more times what the slopes say is too long, and so is one of
+more than this of a coordinate; it is halved so often."""
 
-LAGS_TICKS = (0, *sorted(step << octave for octave in range(13) for step in (2, 3)))
-"""Edges of stretches of an input, ever longer the longer ago."""
+RUBBED = 4.0
+"""With friction a drive that leaves so many times the power explains as well: poles and delay are
+bent to what the law of friction leaves."""
 
 
-def search(
-    samples: Samples,
-    structure: Structure,
-    start: DriveModel,
-    part: slice = EVERYTHING,
-    delayed: bool = True,
-) -> Fitted:
-    """Return the drive of a structure that explains a part of the samples best.
+def power_of(one: Answer) -> float:
+    """Return what a drive leaves, to compare drives by."""
+    return one.power
 
-    Of those without a delay if that is what `delayed` says.
+
+def best_drive(samples: Samples, begins: Sequence[Array], zeros: int) -> Answer:
+    """Return the drive that explains the velocity best, with a delay only where one is shown.
+
+    `begins` are coordinates of poles at which the search starts.
     """
-    interval_s, time_s = samples.interval_s, samples.time_s[part]
-    measured = samples.measured[part] / samples.scale
-    degrees = np.array(([1.0, 2.0] * structure.poles)[: structure.poles])
-    longest = max(LONGEST_S / interval_s, LONGEST_TICKS)
-    lower = np.append(degrees * math.log(SLOWEST), EARLIEST)
-    upper = np.append(degrees * math.log(FASTEST), longest)
-    inputs = acting_on(samples, structure, time_s)
-
-    def solved(x: Array) -> tuple[Terms, Array, Array]:
-        terms = terms_of(inputs, structure, np.minimum(np.maximum(x, lower), upper), interval_s)
-        numerator = terms.numerator(measured)
-        return terms, numerator, numerator @ terms.table - measured
-
-    # The solver asks for slopes where it has just been.
-    recent: deque[tuple[bytes, Array]] = deque(maxlen=degrees.size + 3)
-
-    def misfit(x: Array) -> Array:
-        place = x.tobytes()
-        for known, left in recent:
-            if known == place:
-                return left
-        left = solved(x)[-1]
-        recent.append((place, left))
-        return left
-
-    def undelayed(x: Array) -> Array:
-        return misfit(np.append(x, 0.0))
-
-    def fitted(x: Array, delay_ticks: float) -> Fitted:
-        terms, numerator, left = solved(np.append(x, delay_ticks))
-        return terms.fitted(structure, samples, numerator, float(np.mean(left**2)))
-
-    def found(x: Array, left: Callable[[Array], Array]) -> Array:
-        place_of_x = x.tobytes()
-        at_x: list[Array] = []
-
-        def slopes(place: Array) -> Array:
-            if place.tobytes() != place_of_x:
-                return _slopes(left, place)
-            if not at_x:  # asked for twice: the solver looks at their shape first
-                at_x.append(_slopes(left, place))
-            return at_x[0]
-
-        scale = np.append(0.1 * degrees, 0.1)[: x.size]
-        done, *_ = scipy.optimize.leastsq(
-            left,
-            x,
-            Dfun=slopes,
-            full_output=True,
-            diag=1.0 / scale,
-            ftol=1e-6,
-            xtol=1e-6,
-            gtol=1e-8,
-            maxfev=MOST_TRIES,
-        )
-        return np.asarray(done)
-
-    begin = coordinates_of(structure, start, interval_s)
-    begin[-1] = max(begin[-1], SHORT)
-    if not delayed:
-        return fitted(found(begin[:-1], undelayed), 0.0)
-    x = found(begin, misfit)
-    if 0.0 < x[-1] < LATER:
-        return fitted(x[:-1], x[-1])
-    # No delay, a short one and a long one are valleys of their own.
-    valleys = [fitted(found(begin[:-1], undelayed), 0.0)]
-    if x[-1] <= 0.0:
-        valleys.append(fitted(found(x[:-1], undelayed), 0.0))
-        x = found(np.append(begin[:-1], LATER), misfit)
-    if x[-1] > 0.0:
-        valleys.append(fitted(x[:-1], x[-1]))
-    return min(valleys, key=lambda one: one.power)
+    places = [np.append(begin, 0.0) for begin in begins]
+    still = min((searched(samples, x, zeros, delayed=False) for x in places), key=power_of)
+    matrix, covariance = _scatter(still)
+    delay = still.place.size - 1
+    step = np.linalg.lstsq(matrix, -still.left)[0][delay]
+    if step <= STANDARD_ERRORS * math.sqrt(max(covariance[delay, delay], 0.0)):
+        return still
+    longest = max(LONGEST_S / samples.interval_s, LONGEST_TICKS)
+    places = [np.append(still.place[:-1], ticks) for ticks in np.geomspace(SHORT, longest, 12)]
+    begin = min((answer(samples, place, zeros) for place in places), key=power_of)
+    late = searched(samples, begin.place, zeros, delayed=True)
+    if samples.sign is None:
+        shown = 1.0 - STANDARD_ERRORS**2 / samples.measured.size
+    else:
+        shown = 1.0 / RUBBED
+    return late if late.place[-1] > 0.0 and late.power < shown * still.power else still
 
 
-def _slopes(function: Callable[[Array], Array], x: Array) -> Array:
-    """Return how a function of the coordinates changes along each of them, shape (n, coordinates).
+def searched(samples: Samples, begin: Array, zeros: int, *, delayed: bool) -> Answer:
+    """Return the best drive near a place, whose delay is searched too or stays."""
+    free = begin.size if delayed else begin.size - 1
 
-    By forward differences; those of scipy take as long beside the function as the function.
+    def at(x: Array) -> Answer:
+        return answer(samples, np.append(x, begin[free:]), zeros)
+
+    def left(x: Array) -> Array:
+        return at(x).left
+
+    found, *_ = scipy.optimize.leastsq(
+        left,
+        begin[:free],
+        full_output=True,
+        epsfcn=STEP**2,
+        ftol=1e-6,
+        xtol=1e-6,
+        maxfev=MOST_TRIES,
+    )
+    return at(found)
+
+
+def _scatter(one: Answer) -> tuple[Array, Array]:
+    """Return the slopes of the velocity along place and numerator, and the covariance of these."""
+    explained = one.numerator @ one.table
+    steps = STEP * np.eye(one.place.size)
+    moved = [one.numerator @ velocities(one.samples, one.place + by, one.zeros) for by in steps]
+    matrix = np.column_stack([*((there - explained) / STEP for there in moved), *one.table])
+    size = _lengths(matrix)
+    _, singular, right = np.linalg.svd(matrix / size, full_matrices=False)
+    shown = singular > np.finfo(np.float64).eps * singular[0]  # one at its limit changes nothing
+    inverse = right[shown].T / singular[shown]
+    scores = matrix / size * one.left[:, None]
+    scaled = hac_covariance(inverse @ inverse.T, scores).covariance
+    return matrix, scaled / np.outer(size, size)
+
+
+def _lengths(matrix: Array) -> Array:
+    """Return the lengths of the columns, 1 for one without any."""
+    lengths = np.linalg.norm(matrix, axis=0)
+    return np.asarray(np.where(lengths > 0, lengths, 1.0))
+
+
+def neighbours(one: Answer) -> list[DriveModel]:
+    """Return the drive moved by two standard errors either way along each axis of its covariance.
+
+    A move is halved until it changes the velocity about as its slopes say, and leaves no delay
+    below zero.
     """
-    here = function(x)
-    columns = []
-    for at, step in enumerate(STEP * np.where(x >= 0, 1.0, -1.0) * np.maximum(1.0, np.abs(x))):
-        there = x.copy()
-        there[at] += step
-        columns.append((function(there) - here) / (there[at] - x[at]))
-    return np.column_stack(columns)
-
-
-def explained(samples: Samples, fitted: Fitted, time_s: Array) -> Array:
-    """Return the velocity of a fitted drive, its answer to friction included."""
-    model = fitted.model
-    answers = ((model.residues, model.delay_s), (fitted.rubbing, 0.0))
-    inputs = samples.inputs(fitted.structure.friction)
-    columns = [
-        Acting(acting, time_s).columns(model.poles_rad_s, np.array(row)[:, None], late_s)[0]
-        for acting, (row, late_s) in zip(inputs, answers, strict=False)
-    ]
-    return np.asarray(np.sum(columns, axis=0))
-
-
-def explainable(samples: Samples, fitted: Fitted) -> float:
-    """Return how much of what is left any linear drive might explain, as a share of its power.
-
-    Whatever its poles, it adds up the past of its inputs: so do their means over `LAGS_TICKS`. What
-    chance gives so many of them is taken off.
-    """
-    left = samples.measured - explained(samples, fitted, samples.time_s)
-    columns = []
-    for channel in samples.inputs(fitted.structure.friction):
-        sums = np.concatenate(([0.0], np.cumsum(channel.values)))
-        tick, _ = since_ticks(channel, samples.time_s, 0.0)
-        edges = [sums[np.maximum(tick + 1 - lag, 0)] for lag in LAGS_TICKS if lag <= tick[-1]]
-        columns += [late - early for late, early in itertools.pairwise(edges)]
-    table = np.column_stack(columns)
-    basis, _ = np.linalg.qr(table / (np.linalg.norm(table, axis=0) + TINY))
-    along = basis.T @ left
-    free = max(left.size - along.size, 1)
-    return 1.0 - float(left @ left - along @ along) / float(left @ left) * left.size / free
-
-
-def power_left(samples: Samples, fitted: Fitted, part: slice) -> float:
-    """Return the power that is left of a part of the velocity, as a share of its variance."""
-    left = explained(samples, fitted, samples.time_s[part]) - samples.measured[part]
-    return float(np.mean((left / samples.scale) ** 2))
-
-
-def with_sign_of(samples: Samples, fitted: Fitted) -> Samples:
-    """Return the samples with the sign that the velocity has between them, by a fitted drive."""
-    time_s = samples.sign.time_s
-    left = samples.measured - explained(samples, fitted, samples.time_s)
-    velocity = explained(samples, fitted, time_s) + np.interp(time_s, samples.time_s, left)
-    return samples._replace(sign=mean_sign(time_s, velocity))
-
-
-def mean_sign(time_s: Array, velocity_rad_s: Array) -> Channel:
-    """Return the mean sign, from each time to the next, of what goes straight between them."""
-    after = np.append(velocity_rad_s[1:], velocity_rad_s[-1])
-    larger = np.abs(velocity_rad_s) + np.abs(after)
-    sign = (velocity_rad_s + after) / np.where(larger > 0, larger, 1.0)
-    return Channel("velocity_rad_s", time_s, sign)
+    matrix, covariance = _scatter(one)
+    size = _lengths(matrix)
+    variances, axes = np.linalg.eigh(covariance * np.outer(size, size))
+    explained, p = one.numerator @ one.table, one.place.size
+    found = []
+    for variance, axis in zip(variances, axes.T, strict=True):
+        longest = STANDARD_ERRORS * math.sqrt(max(variance, 0.0)) * axis / size
+        most = CURVED * np.linalg.norm(matrix @ longest)
+        for move in (longest, -longest):
+            for halved in range(HALVINGS):
+                by = move / 2**halved
+                place, numerator = one.place + by[:p], one.numerator + by[p:]
+                if place[-1] < 0.0 or np.max(np.abs(by[:p])) > LONG:
+                    continue
+                velocity = numerator @ velocities(one.samples, place, one.zeros)
+                if np.linalg.norm(velocity - explained) <= most:
+                    found.append(drive_at(one.samples, place, numerator[: one.zeros + 1]))
+                    break
+    return found

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
     INEXACT,
     acceleration_beyond_slope,
+    filtered,
     phases_s,
     seen_beyond_samples,
     step_kept_s,
@@ -22,8 +23,6 @@ from rigidimeter.analysis.estimation.closedloop.controller_used import (
     controller_used,
     loop_shown,
 )
-from rigidimeter.analysis.estimation.closedloop.drive_fit import FoundDrive
-from rigidimeter.analysis.estimation.closedloop.drive_friction import half_of_friction
 from rigidimeter.analysis.estimation.closedloop.drive_motion import since_ticks
 from rigidimeter.analysis.estimation.closedloop.epoch_motion import EpochMotion
 from rigidimeter.analysis.estimation.closedloop.excitation import Excitation, excitation
@@ -43,8 +42,8 @@ from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.screening import LEAST_BAND_RATIO
 from rigidimeter.analysis.estimation.signals import motion_channels
 from rigidimeter.analysis.estimation.stretches import longest_part
-from rigidimeter.core.records import Channel, Epoch
-from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE, Settings
+from rigidimeter.core.records import Channel
+from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE
 from rigidimeter.model import DriveModel, Loop
 
 Complex = NDArray[np.complex128]
@@ -224,9 +223,6 @@ def _observed(
     torque_filter = torque_filter_of(prepared.settings.estimation)
     motion = motion_of(prepared) if motion is None else motion
     everything = epoch_lines(epoch, wider or grid, motion, torque_filter)
-    rubbing = half_of_friction(epoch, everything.grid, found, torque_filter)
-    by_friction = replace(everything, motion=rubbing).on(grid).motion
-    everything = replace(everything, motion=everything.motion + rubbing)
     lines = everything.on(grid)
     return Observation(
         lines,
@@ -236,42 +232,44 @@ def _observed(
         excited,
         drive is not None,
         everything if wider is not None else None,
-        partial(_otherwise, epoch, prepared.settings, found, lines, by_friction),
+        partial(_otherwise, prepared, lines),
     )
 
 
-def _otherwise(
-    epoch: Epoch,
-    settings: Settings,
-    found: FoundDrive | None,
-    lines: Lines,
-    by_friction: Complex,
-) -> list[Complex]:
+def _otherwise(prepared: PreparedEpoch, lines: Lines) -> list[Complex]:
     """Return what would add to the motion without a drive, and with others.
 
     One that tells a little less, the rivals, samples that kept step with the ticks where it may be
-    the stamps that did not, and half of what friction in the drive does between the samples.
+    the stamps that did not, and motion that the command does not cause as if it did.
     """
-    grid, command = lines.grid, epoch.channels.get("velocity_command_rad_s")
-    torque_filter = torque_filter_of(settings.estimation)
+    epoch, found, grid = prepared.epoch, prepared.source.drive, lines.grid
+    command, omega = epoch.channels.get("velocity_command_rad_s"), grid.omega_rad_s
+    torque_filter = torque_filter_of(prepared.settings.estimation)
     if found is None or command is None:
-        beyond = acceleration_beyond_slope(settings.rig, torque_filter, grid.omega_rad_s)
+        beyond = acceleration_beyond_slope(prepared.settings.rig, torque_filter, omega)
         change = np.zeros_like(lines.motion)
         change[:, 0] = beyond * lines.motion[:, 1]
         return [np.zeros_like(change), change]
     stamps_s, interval_s = epoch.channels["torque_nm"].time_s, 1.0 / command.mean_rate_hz
     tick, after = since_ticks(command, grid.time_s, 0.0)
-    mean_s = float(np.mean(after))
+    mean_s, drive = float(np.mean(after)), found.model
 
     def seen(drive: DriveModel, after_s: float = mean_s) -> Complex:
-        return seen_beyond_samples(drive, torque_filter, grid.omega_rad_s, interval_s, after_s)
+        return seen_beyond_samples(drive, torque_filter, omega, interval_s, after_s)
 
-    ours = seen(found.model)
-    changes = [-ours, -INEXACT * ours, *(seen(drive) - ours for drive in found.rivals)]
+    def made() -> tuple[Complex, list[Complex]]:
+        ours = seen(drive)
+        velocity = drive.transfer(np.exp(1j * omega * interval_s), interval_s, mean_s)[1]
+        velocity *= filtered(torque_filter, omega)[:, 0]
+        others = [seen(rival) - ours for rival in found.rivals]
+        return ours / velocity[:, None], [-ours, -INEXACT * ours, *others]
+
+    key = omega.size, omega[0], omega[-1], round(1e12 * interval_s), round(1e12 * mean_s)
+    share, changes = prepared.source.once(key, made)
     kept_s = step_kept_s(command, stamps_s)
     if kept_s is not None:
-        there = [seen(found.model, after_s) for after_s in phases_s(command, stamps_s).tolist()]
-        changes.append(seen(found.model, kept_s) - np.mean(there, axis=0))
+        there = [seen(drive, after_s) for after_s in phases_s(command, stamps_s).tolist()]
+        changes = [*changes, seen(drive, kept_s) - np.mean(there, axis=0)]
     sent = grid.transform(command.values[tick])[:, None]
-    moved = [np.asarray(change * sent) for change in changes]
-    return [*moved, by_friction] if found.fitted.rubbing else moved
+    more = share * lines.motion[:, 1:2] + changes[0] * sent
+    return [*(np.asarray(change * sent) for change in changes), more]

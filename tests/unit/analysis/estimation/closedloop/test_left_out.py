@@ -107,7 +107,6 @@ def test_the_drive_is_found_although_commands_are_lost(start_s):
         bridged(without_samples(epoch, start_s, start_s + 0.1)),
         DriveModel.second_order(50.0, 0.7071),
     )
-    assert found.structure == "second order"
     (pole,) = found.model.poles_rad_s
     (true,) = DriveModel.second_order(23.0, 0.6).poles_rad_s
     # After SETTLED_S no more is left of what is not known than its share of the velocity.
