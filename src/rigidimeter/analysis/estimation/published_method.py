@@ -23,6 +23,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
+from rigidimeter.analysis.estimation.amplitude import amplitude_of_signals, amplitude_together
 from rigidimeter.analysis.estimation.closedloop.between_finding import NAME
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
     acceleration_seen,
@@ -133,6 +134,7 @@ def fit_published(
                 method="published",
                 outcome=outcome,
                 findings=seen,
+                **amplitude_of_signals(epoch, signals)._asdict(),
             )
             fits.append(fit)
             if outcome.included:
@@ -187,6 +189,7 @@ def _pooled(
         condition=condition,
         method="published",
         findings=fits[0].findings,
+        **amplitude_together(fits)._asdict(),
     )
 
 

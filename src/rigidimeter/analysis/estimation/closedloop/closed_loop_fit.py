@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
+from rigidimeter.analysis.estimation.amplitude import amplitude_of_lines, amplitude_together
 from rigidimeter.analysis.estimation.closedloop.between_uncertainty import between_samples
 from rigidimeter.analysis.estimation.closedloop.linear_problems import (
     Linearise,
@@ -221,6 +222,7 @@ def _epoch_fit(
         n_samples=int(np.count_nonzero(grid.window)),
         band_hz=grid.band_hz,
         **found._asdict(),
+        **amplitude_of_lines(epoch, lines)._asdict(),
     )
 
 
@@ -251,6 +253,7 @@ def _pooled_fit(
         vaf_percent=100 * (1 - share),
         residual_sd_nm=float(np.sqrt(weight @ power / weight.sum())),
         n_samples=int(weight.sum()),
+        **amplitude_together(singles)._asdict(),
     )
 
 
