@@ -94,8 +94,8 @@ def scaled_inverse(matrix: Array) -> Array:
     """Invert a small matrix whose columns differ by orders of magnitude."""
     scale = np.sqrt(np.abs(np.diag(matrix)))
     if not np.all(np.isfinite(matrix)) or not np.all(scale > 0):
-        raise ValueError("the perturbation did not move the joint")
+        raise ValueError("nothing moved the joint in the band of the fit")
     scaled = matrix / np.outer(scale, scale)
     if np.linalg.cond(scaled) > 1e10:
-        raise ValueError("the motion that the perturbation causes cannot distinguish J, B and K")
+        raise ValueError("the motion that is fitted cannot distinguish J, B and K")
     return np.asarray(np.linalg.inv(scaled) / np.outer(scale, scale), dtype=np.float64)

@@ -261,8 +261,9 @@ def with_uncertainty(solution: PooledSolution) -> LineFit:
 def _refuse_unsettled(step: Array, scale: Array, values: Array) -> None:
     if not np.all(np.abs(step) < np.maximum(SETTLED * scale, SETTLED_SHARE * np.abs(values))):
         raise ValueError(
-            f"the estimate did not settle in {ITERATIONS} iterations: the perturbation causes too "
-            "little of the motion, or the controller's values are far off (--controller, per rad)"
+            f"the estimate did not settle in {ITERATIONS} iterations: the motion tells J, B and K "
+            "apart too little, or, where the perturbation is used, it causes too little of the "
+            "motion or the controller's values are far off (--controller, per rad)"
         )
 
 
