@@ -157,7 +157,10 @@ def test_a_report_of_a_foreign_recording(rigidimeter, tmp_path):
         (["simulate", "--out", "{session}"], "is not empty"),
         (["simulate", "--out", "x", "--epochs", "3"], "need --task"),
         (["simulate", "--out", "x", "--task", "dance"], "--task dance: must be prbs or sinusoid"),
-        (["simulate", "--out", "x", "--task", "prbs", "--condition", "Z"], "condition 'Z'"),
+        (
+            ["simulate", "--out", "x", "--task", "prbs", "--condition", "Z"],
+            "--condition Z: there is no [subject.Z] in the settings; known conditions: DBS, OFF",
+        ),
         (["simulate", "--out", "x", "--task", "prbs", "--epochs", "0"], "epochs = 0: Input should"),
         (["report", "{session}", "--out", "{session}/manifest.json"], "lies in a session folder"),
         (
