@@ -29,6 +29,7 @@ import numpy as np
 import scipy
 
 from rigidimeter.analysis.estimation.closedloop.line_noise import Complex, Smoother, line_covariance
+from rigidimeter.analysis.estimation.closedloop.normal_equations import scaled_inverse
 from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.core.settings import FEWEST_LINES
@@ -108,7 +109,7 @@ def band_changes(members: Sequence[Member]) -> tuple[Array, list[BandChange]]:
 
     Raises
     ------
-    numpy.linalg.LinAlgError
+    ValueError
         If the epochs cannot distinguish J, B and K.
     """
     weighted = [_weighted(member) for member in members]
@@ -118,7 +119,7 @@ def band_changes(members: Sequence[Member]) -> tuple[Array, list[BandChange]]:
         used = one.instruments[fitted].conj().T
         gram += (used @ lines.motion[fitted]).real
         moment += (used @ lines.torque_nm[fitted]).real
-    inverse = _inverse(gram)
+    inverse = scaled_inverse(gram)
     values = inverse @ moment
     left = [
         one._replace(residual=one.member.lines.torque_nm - one.member.lines.motion @ values)
@@ -183,7 +184,7 @@ def _change(
             used = one.instruments[within]
             grams.append((used.conj().T @ one.member.lines.motion[within]).real)
             effects.append(_only(one.instruments, within))
-    inverse = _inverse(np.sum(grams, axis=0))
+    inverse = scaled_inverse(np.sum(grams, axis=0))
     change, variance, squares = np.zeros(3), np.zeros(3), np.zeros(3)
     for one, effect, of_epoch, gram in zip(weighted, effects, own, grams, strict=True):
         difference = (effect - of_epoch @ gram.T) @ inverse.T
@@ -202,7 +203,7 @@ def _change(
 def _own(one: _Weighted) -> Complex:
     """Return the effects of the lines on the epoch's own estimate in the band of the fit."""
     used = _only(one.instruments, one.member.fitted)
-    return np.asarray(used @ _inverse((used.conj().T @ one.member.lines.motion).real).T)
+    return np.asarray(used @ scaled_inverse((used.conj().T @ one.member.lines.motion).real).T)
 
 
 def _only(values: Complex, within: slice) -> Complex:
@@ -225,9 +226,3 @@ def _halved_adjoint(weights: Complex, sign: int) -> Complex:
     beside[:-1] = weights[1:]
     beside[1:] -= weights[:-1]
     return np.asarray(0.5 * weights - sign * beside / 4j)
-
-
-def _inverse(gram: Array) -> Array:
-    """Invert a matrix whose columns differ by orders of magnitude."""
-    scale = np.sqrt(np.abs(np.diag(gram)))
-    return np.asarray(np.linalg.inv(gram / np.outer(scale, scale)) / np.outer(scale, scale))

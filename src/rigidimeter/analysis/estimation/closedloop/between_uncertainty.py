@@ -18,7 +18,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigidimeter.analysis.estimation.closedloop.between_finding import between_finding
-from rigidimeter.analysis.estimation.closedloop.linear_problems import Problem
+from rigidimeter.analysis.estimation.closedloop.normal_equations import (
+    Problem,
+    solution,
+    sums,
+)
 from rigidimeter.analysis.estimation.closedloop.observation import Observation
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.core.findings import Finding
@@ -40,24 +44,21 @@ def moved_elsewhere(problems: Sequence[Problem], powers: Sequence[Array], values
     values : array, shape (p,)
         The solution of the problems.
     """
-    moved = [one.observation.otherwise if one.observation else () for one in problems]
-    p, count = values.size, max(map(len, moved))
+    moved = [problem.observation.otherwise for problem in problems]
+    count = max(map(len, moved))
     if not count:
-        return np.zeros(p)
-    grams, moments = np.zeros((count, p, p)), np.zeros((count, p))
-    for problem, power, more in zip(problems, powers, moved, strict=True):
-        weighted, held = (problem.instruments / power[:, None]).conj().T, len(problem.held)
-        grams += (weighted @ problem.regressors).real
-        moments += (weighted @ problem.target).real
-        if len(more):
-            added = (weighted @ more).real
-            grams[: len(more)] += added[:, :, held:]
-            moments[: len(more)] -= added[:, :, :held] @ np.array(problem.held)
-    size = np.sqrt(np.abs(np.diagonal(grams, axis1=1, axis2=2)))
-    scaled = np.linalg.pinv(grams / (size[:, :, None] * size[:, None, :]))
-    found = (scaled @ (moments / size)[:, :, None])[:, :, 0] / size
-    without, *others = np.abs(found - values)
-    most = np.max(others, axis=0)
+        return np.zeros(values.size)
+    others = []
+    for problem, more in zip(problems, moved, strict=True):
+        held = len(problem.held)
+        regressors = np.repeat(problem.regressors[None], count, axis=0)
+        target = np.repeat(problem.target[None], count, axis=0)
+        regressors[: len(more)] += more[:, :, held:]
+        target[: len(more)] -= more[:, :, :held] @ np.array(problem.held)
+        others.append(problem._replace(regressors=regressors, target=target))
+    gram, moment, _ = sums(others, powers)
+    without, *found = np.abs(solution(gram, moment) - values)
+    most = np.max(found, axis=0)
     return np.asarray(
         np.where(most > UNSETTLED * np.abs(values), np.maximum(most, 2 * without), most)
     )

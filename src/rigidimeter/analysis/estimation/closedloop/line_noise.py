@@ -20,10 +20,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines
 from rigidimeter.analysis.estimation.signals import Array
 
 Complex = NDArray[np.complex128]
+
+ENOUGH_LINES = 9
+"""How many lines, over epochs and neighbours, the power of the noise is averaged over at least."""
+
+NEIGHBOURS = 0.1
+"""And over neighbours within this fraction of a line's own number."""
 
 
 @dataclass(frozen=True)
@@ -72,16 +77,9 @@ class Smoother:
         return first, np.searchsorted(self.start, line, side="right")
 
 
-@dataclass(frozen=True)
-class Shape:
-    """Power of the noise over frequency, for a window of unit energy."""
-
-    omega_rad_s: Array
-    density: Array
-
-    def at(self, lines: Lines) -> Array:
-        """Return the power at the lines of an epoch."""
-        return power_on(lines.grid.omega_rad_s, self.omega_rad_s, self.density)
+def smoother_for(line: NDArray[np.intp], epochs: int) -> Smoother:
+    """Return the mean over neighbours that, with that over epochs, takes `ENOUGH_LINES`."""
+    return Smoother.over(line, -(-ENOUGH_LINES // epochs) // 2, NEIGHBOURS)
 
 
 def power_on(wanted_rad_s: Array, omega_rad_s: Array, power: Array) -> Array:
