@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.analysis.estimation.bad_stretches import (
-    frozen_stretches,
-    saturated_stretches,
+    bad_stretches,
     without_bad_stretches,
 )
 from rigidimeter.analysis.estimation.diagnostics import checked
@@ -125,10 +124,13 @@ def held(**extra):
 
 
 def found_in(epoch):
-    diagnostics = SETTINGS.diagnostics
     frozen, saturated = (
-        {stretch.reason.split()[0] for stretch in find(epoch, diagnostics)}
-        for find in (frozen_stretches, saturated_stretches)
+        {
+            stretch.reason.split()[0]
+            for stretch in bad_stretches(epoch, SETTINGS.diagnostics)
+            if stretch.check == check
+        }
+        for check in ("frozen", "saturation")
     )
     return frozen, saturated
 

@@ -48,16 +48,17 @@ def moved_elsewhere(problems: Sequence[Problem], powers: Sequence[Array], values
     count = max(map(len, moved))
     if not count:
         return np.zeros(values.size)
-    others = []
-    for problem, more in zip(problems, moved, strict=True):
+    gram, moment, _ = sums(problems, powers)
+    grams, moments = np.repeat(gram[None], count, axis=0), np.repeat(moment[None], count, axis=0)
+    # Another motion adds its difference to the sums.
+    for problem, power, more in zip(problems, powers, moved, strict=True):
         held = len(problem.held)
-        regressors = np.repeat(problem.regressors[None], count, axis=0)
-        target = np.repeat(problem.target[None], count, axis=0)
-        regressors[: len(more)] += more[:, :, held:]
-        target[: len(more)] -= more[:, :, :held] @ np.array(problem.held)
-        others.append(problem._replace(regressors=regressors, target=target))
-    gram, moment, _ = sums(others, powers)
-    without, *found = np.abs(solution(gram, moment) - values)
+        target = -(more[:, :, :held] @ np.array(problem.held))
+        change = problem._replace(regressors=more[:, :, held:], target=target)
+        added, more_moment, _ = sums([change], [power])
+        grams[: len(more)] += added
+        moments[: len(more)] += more_moment
+    without, *found = np.abs(solution(grams, moments) - values)
     most = np.max(found, axis=0)
     return np.asarray(
         np.where(most > UNSETTLED * np.abs(values), np.maximum(most, 2 * without), most)

@@ -15,7 +15,7 @@ lag window). How many independent lines stand behind it gives the degrees of fre
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,10 +49,8 @@ class Smoother:
 
     @classmethod
     def over(cls, lines: NDArray[np.intp], least: int, fraction: float) -> Smoother:
-        """Average at least `least` lines to each side, and the given fraction of the line's own."""
-        place = np.arange(lines.size)
-        half = np.maximum(least, np.rint(fraction * lines).astype(np.intp))
-        return cls(np.maximum(place - half, 0), np.minimum(place + half + 1, lines.size))
+        """Average `least` lines in a row to each side or more, and this fraction of their own."""
+        return _smoother(int(lines[0]), lines.size, least, fraction)
 
     def __call__(self, power: Array) -> Array:
         """Return the smoothed power."""
@@ -75,6 +73,14 @@ class Smoother:
         line = np.arange(self.start.size)
         first = np.searchsorted(self.stop, line, side="right")
         return first, np.searchsorted(self.start, line, side="right")
+
+
+@lru_cache(maxsize=64)
+def _smoother(first: int, count: int, least: int, fraction: float) -> Smoother:
+    """Return `Smoother.over` lines from the first on, which epochs of one layout share."""
+    place = np.arange(count)
+    half = np.maximum(least, np.rint(fraction * (first + place)).astype(np.intp))
+    return Smoother(np.maximum(place - half, 0), np.minimum(place + half + 1, count))
 
 
 def smoother_for(line: NDArray[np.intp], epochs: int) -> Smoother:

@@ -183,12 +183,14 @@ def _with_uncertainty(
     each variance is the larger of that and what the lines say.
     """
     p, count = values.size, len(problems)
-    moments, of_lines, squares = np.empty((count, p)), np.zeros((p, p)), np.zeros(p)
+    effects, of_lines, squares = np.empty((count, p)), np.zeros((p, p)), np.zeros(p)
     for place, (problem, power, own) in enumerate(zip(problems, powers, weighted, strict=True)):
+        residual = problem.target - problem.regressors @ values
+        effects[place] = inverse @ (residual @ own.conj()).real
+        if count >= ENOUGH_EPOCHS:
+            continue
         grid = problem.observation.lines.grid
         smoother = smoother_for(grid.line, 1)
-        residual = problem.target - problem.regressors @ values
-        moments[place] = (own.conj().T @ residual).real
         part, degrees = line_covariance(inverse, own, residual, smoother, power)
         of_lines += grid.spread * part
         squares += (grid.spread * np.diag(part)) ** 2 / (degrees / grid.spread)
@@ -196,7 +198,13 @@ def _with_uncertainty(
         # The epoch's own level on the common shape.
         left = power * smoother(np.abs(residual) ** 2 / power)
         weighted = [problem.instruments / left[:, None]]
-    covariance, degrees = _pooled(of_lines, np.diag(of_lines) ** 2 / squares, moments @ inverse.T)
+    covariance = effects.T @ effects * (count / max(count - 1, 1))
+    degrees = np.full(p, count - 1.0)
+    if count < ENOUGH_EPOCHS:
+        wider = np.diag(covariance) > np.diag(of_lines) if count > 1 else np.zeros(p, dtype=bool)
+        scale = np.sqrt(np.where(wider, np.diag(covariance) / np.diag(of_lines), 1.0))
+        covariance = of_lines * np.outer(scale, scale)
+        degrees = np.where(wider, degrees, np.diag(of_lines) ** 2 / squares)
     return LineFit(
         values,
         covariance,
@@ -208,28 +216,16 @@ def _with_uncertainty(
     )
 
 
-def _pooled(of_lines: Array, degrees: Array, effects: Array) -> tuple[Array, Array]:
-    """Return covariance and degrees of freedom, of lines and of what each epoch adds, (e, p)."""
-    count, p = effects.shape
-    between = effects.T @ effects * (count / max(count - 1, 1))
-    if count >= ENOUGH_EPOCHS:
-        return between, np.full(p, count - 1.0)
-    wider = np.diag(between) > np.diag(of_lines)
-    if count == 1 or not np.any(wider):
-        return of_lines, degrees
-    scale = np.sqrt(np.maximum(np.diag(between) / np.diag(of_lines), 1.0))
-    return of_lines * np.outer(scale, scale), np.where(wider, count - 1.0, degrees)
-
-
 def _condition_number(problem: Problem, power: Array) -> float:
     """Return that of the whitened instruments, each scaled to unit length.
 
     Of least squares that of the motion itself: lines that hold noise alone tell J, B and K apart
     where they are whitened, and show nothing of the joint.
     """
-    rows = problem.instruments
-    if problem.observation.excitation is not None:
-        rows = rows / np.sqrt(power)[:, None]
-    stacked = np.concatenate([rows.real, rows.imag])
-    singular = np.linalg.svd(stacked / np.linalg.norm(stacked, axis=0), compute_uv=False)
-    return float(singular[0] / singular[-1])
+    whitened = problem.observation.excitation is not None
+    gram = sums([problem._replace(regressors=problem.instruments)], [power] if whitened else None)[
+        0
+    ]
+    size = np.sqrt(np.diag(gram))
+    least, *_, most = np.linalg.eigvalsh(gram / np.outer(size, size))
+    return float(np.sqrt(most / least)) if least > 0 else np.inf

@@ -22,7 +22,7 @@ ticks bias the fit (`drive`).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -98,53 +98,70 @@ class Grid:
 
     def transform(self, values: Array) -> Complex:
         """Return Σ w x e^(−iωt) at the lines, free of the mean of x."""
-        return np.asarray(self.transforms(values, 0)[0, 0])
+        return np.asarray(self.transforms([(values, 0)])[0][0, 0])
 
-    def transforms(self, values: Array, derivatives: int) -> Complex:
-        """Return `transform` of x and of its derivatives, without differentiating it.
+    def transforms(
+        self, signals: Sequence[tuple[Array, int]], *, halves: bool = False
+    ) -> list[Complex]:
+        """Return `transform` of signals and of their derivatives, without differentiating them.
 
-        Means go, of derivatives too: ∫ w² x' dt = −∫ (w²)' x dt. Beside each stands half the
-        difference of what the even and the odd samples give: the spectrum as far below half the
-        rate as the line is above zero, which is noise where the motion is slow.
+        Means go, of derivatives too: ∫ w² x' dt = −∫ (w²)' x dt.
 
         Parameters
         ----------
-        values : array, shape (n,)
-        derivatives : int
-            How many, up to 2.
+        signals : sequence of (array, shape (n,), int)
+            Each x, and how many of its derivatives, up to 2.
+        halves : bool
+            Also return half the difference of what the even and the odd samples give: the spectrum
+            as far below half the rate as the line is above zero, which is noise where the motion is
+            slow.
 
         Returns
         -------
-        complex array, shape (derivatives + 1, 2, m)
-            x, x', x''; the line, and half the difference.
+        list of complex array, shape (derivatives + 1, 1 or 2, m)
+            x, x', x'' of each; the line, and half the difference.
         """
-        w, slope, curvature = self.window, self.window_slope_per_s, self.window_curvature_per_s2
-        centred = values - float(np.add.reduce(w**2 * values)) / self.energy
-        half, turn = values.size // 2, 1j * self.omega_rad_s
+        windows = self.window, self.window_slope_per_s, self.window_curvature_per_s2
+        w, slope, _ = windows
+        share = w * w / self.energy
+        wanted = [(values, order) for values, count in signals for order in range(count + 1)]
+        lines = np.empty((len(wanted), 1 + halves, self.line.size), dtype=np.complex128)
+        products = np.empty((len(wanted), 2))
+        pair = np.empty((2, w.size))
+        # Two at a time: that takes little more than one, and little memory.
+        for first in range(0, len(wanted), 2):
+            own = wanted[first : first + 2]
+            for place, (values, order) in enumerate(own):
+                row = np.subtract(values, share @ values, out=pair[place])
+                row *= windows[order]
+                products[first + place] = w @ row, slope @ row
+            lines[first : first + 2] = self._lines(pair[: len(own)], halves)
+        products *= 2 / self.energy
+        turn, found, at = 1j * self.omega_rad_s, [], 0
+        for _, count in signals:
+            through, sums = lines[at : at + count + 1], products[at : at + count + 1]
+            made = [through[0]]
+            if count > 0:
+                made.append(turn * through[0] - through[1])
+                made[1][0] += sums[1, 0] * self.window_lines
+            if count > 1:
+                made.append(turn**2 * through[0] - 2 * turn * through[1] + through[2])
+                made[2][0] -= (sums[1, 1] + sums[2, 0]) * self.window_lines
+            found.append(np.stack(made))
+            at += count + 1
+        return found
 
-        def lines(window: Array) -> Complex:
-            windowed = window * centred
-            spectrum = scipy.fft.rfft(windowed)
-            if values.size % 2 == 0:
-                apart = spectrum[half - self.line].conj()
-            else:
-                windowed[1::2] *= -1
-                apart = scipy.fft.rfft(windowed)[self.line]
-            return np.stack([spectrum[self.line], apart])
-
-        def without_mean(derivative: Complex, by_parts: Array) -> Complex:
-            mean = float(np.add.reduce(by_parts * centred)) / self.energy
-            return np.stack([derivative[0] - mean * self.window_lines, derivative[1]])
-
-        through = lines(w)
-        found = [through]
-        if derivatives > 0:
-            through_slope = lines(slope)
-            found.append(without_mean(turn * through - through_slope, -2 * w * slope))
-        if derivatives > 1:
-            twice = turn**2 * through - 2 * turn * through_slope + lines(curvature)
-            found.append(without_mean(twice, 2 * (slope**2 + w * curvature)))
-        return np.stack(found)
+    def _lines(self, through: Array, halves: bool) -> Complex:
+        """Return the lines of signals through the window, (k, n), and half the differences."""
+        n, place = through.shape[1], slice(int(self.line[0]), int(self.line[-1]) + 1)
+        spectra = scipy.fft.rfft(through, axis=1)
+        found = [spectra[:, place]]
+        if halves and n % 2 == 0:
+            found.append(spectra[:, n // 2 - self.line].conj())
+        elif halves:
+            turned = through * np.where(np.arange(n) % 2, -1.0, 1.0)
+            found.append(scipy.fft.rfft(turned, axis=1)[:, place])
+        return np.stack(found, axis=1)
 
 
 @dataclass(frozen=True)
@@ -159,7 +176,7 @@ class Lines:
         Acceleration, velocity and angle.
     noise : complex array, shape (m, 3), or None
         Half the difference of what the even and the odd samples of the motion give, whose noise is
-        independent; None where the motion lies between its samples.
+        independent; None where that was not wanted, or the motion lies between its samples.
     """
 
     grid: Grid
@@ -213,13 +230,27 @@ def epoch_grid(
     else:
         n = scipy.fft.prev_fast_len(time_s.size, real=True) if time_s.size else 0
         time_s = time_s[:n]
-    if n == 0:
-        return Grid(time_s, rate_hz, *_layout(n, float(f"{rate_hz:.9g}"), band_hz, taper_s, ()))
+    return _grid(time_s, rate_hz, band_hz, taper_s, epoch)
+
+
+def wider_grid(grid: Grid, epoch: Epoch, band_hz: tuple[float, float], taper_s: float) -> Grid:
+    """Return the same samples with the lines of another band.
+
+    Parameters and errors are those of `epoch_grid`.
+    """
+    return _grid(grid.time_s, grid.rate_hz, band_hz, taper_s, epoch)
+
+
+def _grid(
+    time_s: Array, rate_hz: float, band_hz: tuple[float, float], taper_s: float, epoch: Epoch
+) -> Grid:
+    start_s = float(time_s[0]) if time_s.size else 0.0
     holes = tuple(
-        (round(stretch.start_s - float(time_s[0]), 9), round(stretch.stop_s - float(time_s[0]), 9))
+        (round(stretch.start_s - start_s, 9), round(stretch.stop_s - start_s, 9))
         for stretch in epoch.left_out
     )
-    return Grid(time_s, rate_hz, *_layout(n, float(f"{rate_hz:.9g}"), band_hz, taper_s, holes))
+    layout = _layout(time_s.size, float(f"{rate_hz:.9g}"), band_hz, taper_s, holes)
+    return Grid(time_s, rate_hz, *layout)
 
 
 @lru_cache(maxsize=32)
@@ -257,6 +288,8 @@ def epoch_lines(
     grid: Grid,
     motion: EpochMotion,
     torque_filter: TorqueFilter | None = None,
+    *,
+    noise: bool = False,
 ) -> Lines:
     """Return torque and motion at the lines.
 
@@ -270,62 +303,53 @@ def epoch_lines(
         taken into account.
     torque_filter : TorqueFilter or None
         That the torque went through; the motion is sent through it too.
+    noise : bool
+        Whether `Lines.noise` is wanted.
     """
-    torque = grid.transform(values_at(epoch.channels["torque_nm"], grid.time_s, SAME_TIME))
+    stamped, time_s = epoch.channels["torque_nm"], grid.time_s
     angle, velocity = (
-        _sampled(epoch.channels.get(name), grid.time_s) for name in ("angle_rad", "velocity_rad_s")
+        _sampled(epoch.channels.get(name), time_s) for name in ("angle_rad", "velocity_rad_s")
+    )
+    recorded = angle is not None and (
+        velocity is not None or "velocity_rad_s" not in epoch.channels
     )
     through = filtered(torque_filter, grid.omega_rad_s)
-    at_stamps = [_sampled(one, grid.time_s) is not None for one in motion_channels(epoch)]
-    if motion.driven_at is None:
-        if angle is not None and all(at_stamps):
-            return Lines(grid, torque, *(through * spectra(grid, angle, velocity)))
-        between = spectra(grid, *motion.beyond_at(grid.time_s, SAME_TIME))
-        return Lines(grid, torque, through * between[0])
-    command = motion.driven_at.command
-    tick, after_s = since_ticks(command, grid.time_s, 0.0)
-    interval_s = 1.0 / command.mean_rate_hz
-    if angle is not None and velocity is not None and in_step(tick, after_s, interval_s):
-        beyond = seen_beyond_samples(
-            motion.driven_at.drive,
-            torque_filter,
-            grid.omega_rad_s,
-            interval_s,
-            float(np.mean(after_s)),
-        )
-        lines, noise = through * spectra(grid, angle, velocity)
-        sent = grid.transform(command.values[tick])
-        return Lines(grid, torque, lines + beyond * sent[:, None], noise)
-    lines = through * spectra(grid, *motion.beyond_at(grid.time_s, SAME_TIME))[0]
-    # At the stamps of the torque, and from there like the torque.
-    stamped = epoch.channels["torque_nm"]
-    for column, part in enumerate(driven_behind(motion.driven_at, torque_filter, stamped)):
-        there = Channel(stamped.name, stamped.time_s, part)
-        lines[:, column] += grid.transform(values_at(there, grid.time_s, SAME_TIME))
-    return Lines(grid, torque, lines)
+    caused: list[Array] = []
+    if motion.driven_at is not None:
+        command = motion.driven_at.command
+        tick, after_s = since_ticks(command, time_s, 0.0)
+        interval_s, mean_s = 1.0 / command.mean_rate_hz, float(np.mean(after_s))
+        recorded &= velocity is not None and in_step(tick, after_s, interval_s)
+        if recorded:
+            caused = [command.values[tick]]
+        else:
+            # At the stamps of the torque, and from there like the torque.
+            caused = [
+                values_at(Channel(stamped.name, stamped.time_s, part), time_s, SAME_TIME)
+                for part in driven_behind(motion.driven_at, torque_filter, stamped)
+            ]
+    if not recorded:
+        angle, velocity = motion.beyond_at(time_s, SAME_TIME)
+    assert angle is not None  # where it is not recorded it is made
+    torque = values_at(stamped, time_s, SAME_TIME)
+    moving = [(angle, 2)] if velocity is None else [(velocity, 1), (angle, 0)]
+    lines, *apart = through * _columns(grid.transforms(moving, halves=noise and recorded))
+    first, *others = (one[0, 0] for one in grid.transforms([(one, 0) for one in (torque, *caused)]))
+    added = np.stack(others, axis=-1) if others else 0.0
+    if recorded and motion.driven_at is not None:
+        drive, omega = motion.driven_at.drive, grid.omega_rad_s
+        added = added * seen_beyond_samples(drive, torque_filter, omega, interval_s, mean_s)
+    return Lines(grid, first, lines + added, *apart)
 
 
-def spectra(grid: Grid, angle_rad: Array, velocity_rad_s: Array | None) -> Complex:
-    """Return acceleration, velocity and angle at the lines, and their noise.
+def spectra(grid: Grid, angle_rad: Array, velocity_rad_s: Array) -> Complex:
+    """Return acceleration, velocity and angle at the lines, and their noise, shape (2, m, 3)."""
+    return _columns(grid.transforms([(velocity_rad_s, 1), (angle_rad, 0)], halves=True))
 
-    Parameters
-    ----------
-    grid : Grid
-    angle_rad, velocity_rad_s : array, shape (n,)
-        Without a velocity it is that of the angle.
 
-    Returns
-    -------
-    complex array, shape (2, m, 3)
-        Motion, and half the difference of even and odd samples.
-    """
-    if velocity_rad_s is None:
-        columns = grid.transforms(angle_rad, 2)[::-1]
-    else:
-        columns = np.concatenate(
-            [grid.transforms(velocity_rad_s, 1)[::-1], grid.transforms(angle_rad, 0)]
-        )
-    return np.moveaxis(columns, 0, -1)
+def _columns(transforms: Sequence[Complex]) -> Complex:
+    """Return the highest derivative first: lines, and half differences, shape (1 or 2, m, 3)."""
+    return np.moveaxis(np.concatenate([one[::-1] for one in transforms]), 0, -1)
 
 
 def _sampled(channel: Channel | None, time_s: Array) -> Array | None:
