@@ -23,11 +23,11 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from rigidimeter.analysis.estimation.closedloop.between_finding import NAME
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
     acceleration_seen,
     phases_s,
 )
+from rigidimeter.analysis.estimation.closedloop.between_uncertainty import NAME
 from rigidimeter.analysis.estimation.found import found
 from rigidimeter.analysis.estimation.least_squares import fit_inertia_damping_stiffness
 from rigidimeter.analysis.estimation.method_record import Method, Progress

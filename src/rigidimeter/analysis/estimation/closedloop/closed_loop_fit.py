@@ -142,8 +142,8 @@ def _alone(
     observation = member.once(method.observe)
     powers = None
     if known is not None:
-        grid, first = observation.lines.grid, known.problems[0].observation.lines.grid
-        powers = [power_on(grid.omega_rad_s, first.omega_rad_s, known.powers[0])]
+        first = known.problems[0].observation.lines.grid
+        powers = [power_on(observation.lines.grid, first, known.powers[0])]
     return fit_lines([observation], method.linearise, start, powers)
 
 

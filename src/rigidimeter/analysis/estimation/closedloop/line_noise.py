@@ -20,6 +20,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.analysis.estimation.closedloop.spectral_lines import Grid
 from rigidimeter.analysis.estimation.signals import Array
 
 Complex = NDArray[np.complex128]
@@ -88,11 +89,14 @@ def smoother_for(line: NDArray[np.intp], epochs: int) -> Smoother:
     return Smoother.over(line, -(-ENOUGH_LINES // epochs) // 2, NEIGHBOURS)
 
 
-def power_on(wanted_rad_s: Array, omega_rad_s: Array, power: Array) -> Array:
-    """Return power on other lines; epochs of one layout have the same."""
-    if wanted_rad_s is omega_rad_s:
+def power_on(wanted: Grid, known: Grid, power: Array) -> Array:
+    """Return power on the lines of another epoch; epochs of one layout have the same.
+
+    Noise leaves power in proportion to the energy of the window, so to the length of an epoch.
+    """
+    if wanted.line is known.line and wanted.energy == known.energy:
         return power
-    return np.interp(wanted_rad_s, omega_rad_s, power)
+    return np.interp(wanted.omega_rad_s, known.omega_rad_s, power) * (wanted.energy / known.energy)
 
 
 def line_covariance(

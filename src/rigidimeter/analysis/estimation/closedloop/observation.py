@@ -38,7 +38,7 @@ from rigidimeter.analysis.estimation.closedloop.spectral_lines import (
     Lines,
     epoch_grid,
     epoch_lines,
-    wider_grid,
+    grid_at,
 )
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.screening import LEAST_BAND_RATIO
@@ -117,8 +117,8 @@ def observe(prepared: PreparedEpoch, motion: EpochMotion | None = None) -> Obser
     """
     perturbation = _perturbation(prepared)
     grid = _grid(prepared, None)
-    trim_s = prepared.settings.estimation.trim_s
-    wider = wider_grid(grid, prepared.epoch, _band_hz(prepared, WIDER), trim_s)
+    band_hz, trim_s = _band_hz(prepared, WIDER), prepared.settings.estimation.trim_s
+    wider = grid_at(grid.time_s, grid.rate_hz, band_hz, trim_s, prepared.epoch)
     everywhere = np.ones(grid.line.size, dtype=np.bool_)
     return _observed(prepared, perturbation, grid, everywhere, wider, motion)
 

@@ -141,21 +141,24 @@ def fit_at(problems: Sequence[Problem], powers: Sequence[Array]) -> LineFit:
 def shared_powers(problems: Sequence[Problem], values: Array) -> list[Array]:
     """Return the mean power of the residuals at the lines of each, smoothed.
 
+    It is found on the lines of the longest epoch, as that of a window of one energy.
+
     Raises
     ------
     ValueError
         If nothing is left at some lines.
     """
     grids = [problem.observation.lines.grid for problem in problems]
-    omega = grids[0].omega_rad_s
-    total = np.zeros(omega.size)
+    finest = max(grids, key=lambda grid: grid.line.size)
+    total = np.zeros(finest.line.size)
     for problem, grid in zip(problems, grids, strict=True):
         power = np.abs(problem.target - problem.regressors @ values) ** 2
-        total += power_on(omega, grid.omega_rad_s, power)
-    power = smoother_for(grids[0].line, len(problems))(total / len(problems))
+        total += power_on(finest, grid, power)
+    power = smoother_for(finest.line, len(problems))(total / len(problems))
     if not np.all(power > 0):
         raise ValueError("the fit leaves nothing at some frequencies: are the channels simulated?")
-    return [power_on(grid.omega_rad_s, omega, power) for grid in grids]
+    made = {id(grid.line): power_on(grid, finest, power) for grid in grids}
+    return [made[id(grid.line)] for grid in grids]
 
 
 def _information(problems: Sequence[Problem], weighted: Sequence[Complex]) -> Array:

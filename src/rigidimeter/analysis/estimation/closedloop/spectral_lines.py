@@ -22,7 +22,7 @@ ticks bias the fit (`drive`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -97,20 +97,19 @@ class Grid:
         return float(self.omega_rad_s[0] / (2 * np.pi)), float(self.omega_rad_s[-1] / (2 * np.pi))
 
     def transform(self, values: Array) -> Complex:
-        """Return Σ w x e^(−iωt) at the lines, free of the mean of x."""
-        return np.asarray(self.transforms([(values, 0)])[0][0, 0])
+        """Return Σ w x e^(−iωt) at the lines, free of the mean of x: (..., n) to (..., m)."""
+        return np.asarray(self.transforms(values, 0)[0, 0])
 
-    def transforms(
-        self, signals: Sequence[tuple[Array, int]], *, halves: bool = False
-    ) -> list[Complex]:
-        """Return `transform` of signals and of their derivatives, without differentiating them.
+    def transforms(self, values: Array, derivatives: int, *, halves: bool = False) -> Complex:
+        """Return `transform` of x and of its derivatives, without differentiating it.
 
         Means go, of derivatives too: ∫ w² x' dt = −∫ (w²)' x dt.
 
         Parameters
         ----------
-        signals : sequence of (array, shape (n,), int)
-            Each x, and how many of its derivatives, up to 2.
+        values : array, shape (..., n)
+        derivatives : int
+            How many, up to 2.
         halves : bool
             Also return half the difference of what the even and the odd samples give: the spectrum
             as far below half the rate as the line is above zero, which is noise where the motion is
@@ -118,50 +117,35 @@ class Grid:
 
         Returns
         -------
-        list of complex array, shape (derivatives + 1, 1 or 2, m)
-            x, x', x'' of each; the line, and half the difference.
+        complex array, shape (1 or 2, derivatives + 1, ..., m)
+            Of x, x', x''.
         """
         windows = self.window, self.window_slope_per_s, self.window_curvature_per_s2
         w, slope, _ = windows
-        share = w * w / self.energy
-        wanted = [(values, order) for values, count in signals for order in range(count + 1)]
-        lines = np.empty((len(wanted), 1 + halves, self.line.size), dtype=np.complex128)
-        products = np.empty((len(wanted), 2))
-        pair = np.empty((2, w.size))
-        # Two at a time: that takes little more than one, and little memory.
-        for first in range(0, len(wanted), 2):
-            own = wanted[first : first + 2]
-            for place, (values, order) in enumerate(own):
-                row = np.subtract(values, share @ values, out=pair[place])
-                row *= windows[order]
-                products[first + place] = w @ row, slope @ row
-            lines[first : first + 2] = self._lines(pair[: len(own)], halves)
-        products *= 2 / self.energy
-        turn, found, at = 1j * self.omega_rad_s, [], 0
-        for _, count in signals:
-            through, sums = lines[at : at + count + 1], products[at : at + count + 1]
-            made = [through[0]]
-            if count > 0:
-                made.append(turn * through[0] - through[1])
-                made[1][0] += sums[1, 0] * self.window_lines
-            if count > 1:
-                made.append(turn**2 * through[0] - 2 * turn * through[1] + through[2])
-                made[2][0] -= (sums[1, 1] + sums[2, 0]) * self.window_lines
-            found.append(np.stack(made))
-            at += count + 1
-        return found
+        centred = values - (values @ (w * w / self.energy))[..., None]
+        through = np.stack([window * centred for window in windows[: derivatives + 1]])
+        lines, turn = self._lines(through, halves), 1j * self.omega_rad_s
+        found, means = [lines[:, 0]], 2 / self.energy * (through @ w)[..., None]
+        if derivatives > 0:
+            found.append(turn * lines[:, 0] - lines[:, 1])
+            found[1][0] += means[1] * self.window_lines
+        if derivatives > 1:
+            mean = means[2] + 2 / self.energy * (through[1] @ slope)[..., None]
+            found.append(turn**2 * lines[:, 0] - 2 * turn * lines[:, 1] + lines[:, 2])
+            found[2][0] -= mean * self.window_lines
+        return np.stack(found, axis=1)
 
     def _lines(self, through: Array, halves: bool) -> Complex:
-        """Return the lines of signals through the window, (k, n), and half the differences."""
-        n, place = through.shape[1], slice(int(self.line[0]), int(self.line[-1]) + 1)
-        spectra = scipy.fft.rfft(through, axis=1)
-        found = [spectra[:, place]]
-        if halves and n % 2 == 0:
-            found.append(spectra[:, n // 2 - self.line].conj())
-        elif halves:
-            turned = through * np.where(np.arange(n) % 2, -1.0, 1.0)
-            found.append(scipy.fft.rfft(turned, axis=1)[:, place])
-        return np.stack(found, axis=1)
+        """Return the lines of signals through the window, and half the differences."""
+        n, place = through.shape[-1], slice(int(self.line[0]), int(self.line[-1]) + 1)
+        spectra = scipy.fft.rfft(through)
+        if not halves:
+            return np.asarray(spectra[None, ..., place])
+        if n % 2 == 0:
+            apart = spectra[..., n // 2 - self.line].conj()
+        else:
+            apart = scipy.fft.rfft(through * np.where(np.arange(n) % 2, -1.0, 1.0))[..., place]
+        return np.stack([spectra[..., place], apart])
 
 
 @dataclass(frozen=True)
@@ -225,32 +209,23 @@ def epoch_grid(
         used.append(epoch.channels["perturbation_nm"])
     time_s, rate_hz = _times(torque, used)
     if samples is not None:
-        n = samples(time_s.size, rate_hz)
-        time_s = time_s[time_s.size - n :]
-    else:
-        n = scipy.fft.prev_fast_len(time_s.size, real=True) if time_s.size else 0
-        time_s = time_s[:n]
-    return _grid(time_s, rate_hz, band_hz, taper_s, epoch)
+        time_s = time_s[time_s.size - samples(time_s.size, rate_hz) :]
+    elif time_s.size:
+        time_s = time_s[: scipy.fft.prev_fast_len(time_s.size, real=True)]
+    return grid_at(time_s, rate_hz, band_hz, taper_s, epoch)
 
 
-def wider_grid(grid: Grid, epoch: Epoch, band_hz: tuple[float, float], taper_s: float) -> Grid:
-    """Return the same samples with the lines of another band.
-
-    Parameters and errors are those of `epoch_grid`.
-    """
-    return _grid(grid.time_s, grid.rate_hz, band_hz, taper_s, epoch)
-
-
-def _grid(
+def grid_at(
     time_s: Array, rate_hz: float, band_hz: tuple[float, float], taper_s: float, epoch: Epoch
 ) -> Grid:
+    """Return the grid of these samples of an epoch; parameters and errors as for `epoch_grid`."""
     start_s = float(time_s[0]) if time_s.size else 0.0
     holes = tuple(
         (round(stretch.start_s - start_s, 9), round(stretch.stop_s - start_s, 9))
         for stretch in epoch.left_out
     )
-    layout = _layout(time_s.size, float(f"{rate_hz:.9g}"), band_hz, taper_s, holes)
-    return Grid(time_s, rate_hz, *layout)
+    rounded_hz = float(f"{rate_hz:.9g}")
+    return Grid(time_s, rate_hz, *_layout(time_s.size, rounded_hz, band_hz, taper_s, holes))
 
 
 @lru_cache(maxsize=32)
@@ -307,12 +282,14 @@ def epoch_lines(
         Whether `Lines.noise` is wanted.
     """
     stamped, time_s = epoch.channels["torque_nm"], grid.time_s
-    angle, velocity = (
-        _sampled(epoch.channels.get(name), time_s) for name in ("angle_rad", "velocity_rad_s")
-    )
-    recorded = angle is not None and (
-        velocity is not None or "velocity_rad_s" not in epoch.channels
-    )
+    moving = motion_channels(epoch)
+    own = {
+        one.name: one.values[place]
+        for one in moving
+        if (place := sampled(one, time_s, SAME_TIME)) is not None
+    }
+    angle, velocity = own.get("angle_rad"), own.get("velocity_rad_s")
+    recorded = angle is not None and len(own) == len(moving)
     through = filtered(torque_filter, grid.omega_rad_s)
     caused: list[Array] = []
     if motion.driven_at is not None:
@@ -332,9 +309,8 @@ def epoch_lines(
         angle, velocity = motion.beyond_at(time_s, SAME_TIME)
     assert angle is not None  # where it is not recorded it is made
     torque = values_at(stamped, time_s, SAME_TIME)
-    moving = [(angle, 2)] if velocity is None else [(velocity, 1), (angle, 0)]
-    lines, *apart = through * _columns(grid.transforms(moving, halves=noise and recorded))
-    first, *others = (one[0, 0] for one in grid.transforms([(one, 0) for one in (torque, *caused)]))
+    lines, *apart = through * spectra(grid, angle, velocity, halves=noise and recorded)
+    first, *others = grid.transform(np.stack([torque, *caused]))
     added = np.stack(others, axis=-1) if others else 0.0
     if recorded and motion.driven_at is not None:
         drive, omega = motion.driven_at.drive, grid.omega_rad_s
@@ -342,20 +318,19 @@ def epoch_lines(
     return Lines(grid, first, lines + added, *apart)
 
 
-def spectra(grid: Grid, angle_rad: Array, velocity_rad_s: Array) -> Complex:
-    """Return acceleration, velocity and angle at the lines, and their noise, shape (2, m, 3)."""
-    return _columns(grid.transforms([(velocity_rad_s, 1), (angle_rad, 0)], halves=True))
+def spectra(
+    grid: Grid, angle_rad: Array, velocity_rad_s: Array | None, *, halves: bool = True
+) -> Complex:
+    """Return acceleration, velocity and angle at the lines, shape (1 or 2, m, 3).
 
-
-def _columns(transforms: Sequence[Complex]) -> Complex:
-    """Return the highest derivative first: lines, and half differences, shape (1 or 2, m, 3)."""
-    return np.moveaxis(np.concatenate([one[::-1] for one in transforms]), 0, -1)
-
-
-def _sampled(channel: Channel | None, time_s: Array) -> Array | None:
-    """Return a channel at the times if it was sampled at just these, else None."""
-    place = None if channel is None else sampled(channel, time_s, SAME_TIME)
-    return None if place is None or channel is None else channel.values[place]
+    And half the differences, as `Grid.transforms`. Without a velocity it is that of the angle.
+    """
+    if velocity_rad_s is None:
+        found = grid.transforms(angle_rad, 2, halves=halves)[:, ::-1]
+    else:
+        fast = grid.transforms(velocity_rad_s, 1, halves=halves)[:, ::-1]
+        found = np.concatenate([fast, grid.transforms(angle_rad, 0, halves=halves)], axis=1)
+    return np.moveaxis(found, 1, -1)
 
 
 def _times(torque: Channel, used: list[Channel]) -> tuple[Array, float]:

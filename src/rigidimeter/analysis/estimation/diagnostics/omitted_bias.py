@@ -46,7 +46,7 @@ def moved(case: Case, beyond: BeyondLinear, groups: Sequence[Sequence[OmittedTer
     if case.uses_perturbation and case.prepared is not None:
         grid, here = case.prepared.once(observe).lines.grid, beyond.motion.time_s
         torques = [np.interp(grid.time_s, here, term.torque(beyond), 0.0, 0.0) for term in terms]
-        lines = np.reshape([grid.transform(torque) for torque in torques], (-1, grid.line.size))
+        lines = grid.transform(np.reshape(torques, (-1, grid.time_s.size)))
         alone = dict(zip(terms, _added(case, case.prepared, lines), strict=True))
         return [np.sum([alone[term] for term in group], axis=0)[None] for group in groups]
     low, high = case.signals.band_hz
