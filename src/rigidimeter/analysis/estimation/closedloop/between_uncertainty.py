@@ -55,7 +55,7 @@ def moved_elsewhere(problems: Sequence[Problem], powers: Sequence[Array], values
     # Another motion adds its difference to the sums.
     for problem, power, more in zip(problems, powers, moved, strict=True):
         held = len(problem.held)
-        target = -(more[:, :, :held] @ np.array(problem.held))
+        target = -(more[:, :, :held] @ np.array(problem.held)) if held else 0 * problem.target
         change = problem._replace(regressors=more[:, :, held:], target=target)
         added, more_moment, _ = sums([change], [power])
         grams[: len(more)] += added

@@ -107,7 +107,7 @@ class CommandMade:
 
     def _lines(self, *signals: Array) -> NDArray[np.complex128]:
         first, last = (int(edge * self.window.size / self.rate_hz) for edge in COMPARED_HZ)
-        spectra = scipy.fft.rfft(np.stack(signals) * self.window, axis=1)
+        spectra = scipy.fft.rfft(np.stack([one * self.window for one in signals]), axis=1)
         return np.asarray(spectra[:, first : last + 1])
 
 

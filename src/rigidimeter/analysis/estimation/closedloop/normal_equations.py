@@ -22,6 +22,9 @@ from rigidimeter.analysis.estimation.signals import Array
 
 Complex = NDArray[np.complex128]
 
+ILL_CONDITIONED = 1e10
+"""A condition number from which on rounding decides."""
+
 
 class Problem(NamedTuple):
     """The linear problem of one epoch at given parameters.
@@ -106,6 +109,11 @@ def scaled_inverse(matrix: Array) -> Array:
     if not np.all(np.isfinite(matrix)) or not np.all(scale > 0):
         raise ValueError("the perturbation did not move the joint")
     scaled = matrix / np.outer(scale, scale)
-    if np.linalg.cond(scaled) > 1e10:
+    try:
+        inverse = np.linalg.inv(scaled)
+        known = float(np.linalg.norm(scaled) * np.linalg.norm(inverse)) < ILL_CONDITIONED
+    except np.linalg.LinAlgError:
+        known = False
+    if not known:
         raise ValueError("the motion that the perturbation causes cannot distinguish J, B and K")
-    return np.asarray(np.linalg.inv(scaled) / np.outer(scale, scale), dtype=np.float64)
+    return np.asarray(inverse / np.outer(scale, scale), dtype=np.float64)

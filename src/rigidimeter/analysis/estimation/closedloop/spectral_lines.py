@@ -10,8 +10,8 @@ and once more for the acceleration where the angle alone was measured,
     ∫ w e^(−iωt) θ'' dt = −ω² ∫ w e^(−iωt) θ dt − 2iω ∫ w' e^(−iωt) θ dt + ∫ w'' e^(−iωt) θ dt
 
 so nothing is differentiated. What is left is linear in J, B and K at every line, all signals are
-treated alike, and drift and noise outside the band simply are other lines (the modulating
-functions of Shinbrot 1957; Pearson and Lee 1985).
+treated alike, and drift and noise outside the band are other lines (the modulating functions of
+Shinbrot 1957; Pearson and Lee 1985).
 
 The integrals are sums over the samples of the torque, at the stamps of the torque: a torque that
 was sampled at a point in time is held against the motion at that point. Where the command is
@@ -69,7 +69,7 @@ class Grid:
     window_slope_per_s, window_curvature_per_s2 : array, shape (n,)
         w' and w''.
     line : array of int, shape (m,)
-        Which lines of the FFT are used.
+        Which lines of the FFT are used, all from the first to the last.
     omega_rad_s : array, shape (m,)
     energy : float
         Σ w²: white noise of unit variance puts this much power into every line.
@@ -123,7 +123,9 @@ class Grid:
         windows = self.window, self.window_slope_per_s, self.window_curvature_per_s2
         w, slope, _ = windows
         centred = values - (values @ (w * w / self.energy))[..., None]
-        through = np.stack([window * centred for window in windows[: derivatives + 1]])
+        through = np.empty((derivatives + 1, *values.shape))
+        for window, row in zip(windows, through, strict=False):
+            np.multiply(window, centred, out=row)
         lines, turn = self._lines(through, halves), 1j * self.omega_rad_s
         found, means = [lines[:, 0]], 2 / self.energy * (through @ w)[..., None]
         if derivatives > 0:
@@ -139,13 +141,14 @@ class Grid:
         """Return the lines of signals through the window, and half the differences."""
         n, place = through.shape[-1], slice(int(self.line[0]), int(self.line[-1]) + 1)
         spectra = scipy.fft.rfft(through)
-        if not halves:
-            return np.asarray(spectra[None, ..., place])
-        if n % 2 == 0:
-            apart = spectra[..., n // 2 - self.line].conj()
-        else:
-            apart = scipy.fft.rfft(through * np.where(np.arange(n) % 2, -1.0, 1.0))[..., place]
-        return np.stack([spectra[..., place], apart])
+        found = [spectra[..., place]]
+        if halves and n % 2 == 0:
+            found.append(spectra[..., n // 2 - self.line].conj())
+        elif halves:
+            turned = through.copy()
+            turned[..., 1::2] *= -1
+            found.append(scipy.fft.rfft(turned)[..., place])
+        return np.stack(found)
 
 
 @dataclass(frozen=True)
@@ -272,7 +275,7 @@ def epoch_lines(
     ----------
     epoch : Epoch
     grid : Grid
-        From `epoch_grid` for this epoch or one with the same stamps.
+        Of this epoch or one with the same stamps.
     motion : EpochMotion
         That of the epoch. Where its drive is known, what the command did between the samples is
         taken into account.
@@ -321,9 +324,9 @@ def epoch_lines(
 def spectra(
     grid: Grid, angle_rad: Array, velocity_rad_s: Array | None, *, halves: bool = True
 ) -> Complex:
-    """Return acceleration, velocity and angle at the lines, shape (1 or 2, m, 3).
+    """Return acceleration, velocity and angle (of which the velocity may be made) at the lines.
 
-    And half the differences, as `Grid.transforms`. Without a velocity it is that of the angle.
+    The shape is (1 or 2, m, 3): `halves` are those of `Grid.transforms`.
     """
     if velocity_rad_s is None:
         found = grid.transforms(angle_rad, 2, halves=halves)[:, ::-1]
@@ -336,13 +339,10 @@ def spectra(
 def _times(torque: Channel, used: list[Channel]) -> tuple[Array, float]:
     """Return the torque's own stamps where every channel overlaps, or a uniform grid near them."""
     rate_hz = torque.rate_hz
-    start = max(float(channel.time_s[0]) for channel in used)
-    stop = min(float(channel.time_s[-1]) for channel in used)
-    inside = slice(
-        int(np.searchsorted(torque.time_s, start - SAME_TIME / rate_hz)),
-        int(np.searchsorted(torque.time_s, stop + SAME_TIME / rate_hz)),
-    )
-    own = torque.time_s[inside]
+    start_s = max(float(channel.time_s[0]) for channel in used) - SAME_TIME / rate_hz
+    stop_s = min(float(channel.time_s[-1]) for channel in used) + SAME_TIME / rate_hz
+    first, last = np.searchsorted(torque.time_s, [start_s, stop_s])
+    own = torque.time_s[first:last]
     if own.size > 1:
         even = own[0] + np.arange(own.size) * ((own[-1] - own[0]) / (own.size - 1))
         if np.max(np.abs(own - even)) < SAME_TIME / rate_hz:

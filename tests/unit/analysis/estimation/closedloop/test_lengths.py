@@ -1,4 +1,4 @@
-"""Epochs of one condition that differ in length: each has its own lines and counts by its length."""
+"""Epochs of one condition of several lengths: each has its own lines and counts by its length."""
 
 from dataclasses import replace
 
