@@ -22,10 +22,10 @@ NEIGHBOURS = 0.1
 """And over neighbours within this fraction of a line's own number."""
 
 
-def smoother_for(everything: Sequence[Lines]) -> Smoother:
+def smoother_for(lines: Lines, epochs: int = 1) -> Smoother:
     """Return the mean over neighbours that, with that over epochs, takes `ENOUGH_LINES`."""
-    needed = -(-ENOUGH_LINES // len(everything))
-    return Smoother.over(everything[0].grid.line, needed // 2, NEIGHBOURS)
+    needed = -(-ENOUGH_LINES // epochs)
+    return Smoother.over(lines.grid.line, needed // 2, NEIGHBOURS)
 
 
 def shared_density(
@@ -63,14 +63,14 @@ def weighted_instruments(
 def variance_bound(
     problems: Sequence[Problem], everything: Sequence[Lines], weighted: Sequence[Complex]
 ) -> Array:
-    """Return (2 Σ Re(Z^H Z) / S)⁻¹."""
+    """Return (2 Σ Re(Z^H Z) / S)⁻¹, of the samples that are not left out."""
     p = problems[0].instruments.shape[1]
     information = np.zeros((p, p))
     made: dict[int, Array] = {}
     for problem, lines, own in zip(problems, everything, weighted, strict=True):
         if id(own) not in made:
             made[id(own)] = 2 * (own.conj().T @ problem.instruments).real
-        information += made[id(own)] / lines.grid.spread
+        information += made[id(own)] * lines.grid.used_share
     return scaled_inverse(information)
 
 

@@ -12,15 +12,15 @@ known from so many lines that it need not be smoothed over neighbours that diffe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rigidimeter.analysis.estimation.closedloop.between_uncertainty import moved_elsewhere
 from rigidimeter.analysis.estimation.closedloop.line_noise import (
     Shape,
-    Smoother,
-    line_covariance,
+    Solved,
+    with_weights,
 )
 from rigidimeter.analysis.estimation.closedloop.line_weights import (
     condition_number,
@@ -148,7 +148,7 @@ def fit_single(
         iteration does not settle.
     """
     lines = observation.lines
-    smoother = smoother_for([lines])
+    smoother = smoother_for(lines)
     values = np.array(start, dtype=np.float64)
     weight_from = shape
     fixed = problem is not None
@@ -171,17 +171,18 @@ def fit_single(
     if not (fixed and shape is not None):
         _refuse_unsettled(step, scale, values)
     residual = problem.target - problem.regressors @ values
-    covariance, degrees = line_covariance(
-        inverse, weighted, residual, smoother, weight_from.at(lines)
-    )
-    spread = lines.grid.spread
-    # The epoch's own level on the common shape.
     common = weight_from.at(lines)
-    own = common * smoother(np.abs(residual) ** 2 / common)
+    solved = Solved(inverse, weighted, problem.regressors, common, lines.grid.spread)
+    if shape is None:
+        taken = solved.taken_by_weights(smoother)
+        solved = replace(solved, inverse=with_weights(inverse, taken))
+    # The epoch's own level on the common shape.
+    own = solved.density(residual, smoother)
+    covariance, degrees = solved.covariance(own, smoother)
     return LineFit(
         values,
-        spread * covariance,
-        degrees / spread,
+        covariance,
+        degrees,
         variance_bound([problem], [lines], [problem.instruments / own[:, None]]),
         condition_number([problem], [lines], weight_from),
         weight_from,
@@ -219,7 +220,7 @@ def solve_pooled(
         As `fit_pooled`.
     """
     everything = [observation.lines for observation in observations]
-    smoother = smoother_for(everything)
+    smoother = smoother_for(everything[0], len(everything))
     values = np.array(start, dtype=np.float64)
     for iteration in range(ITERATIONS):
         problems = linearise(observations, values)
@@ -268,22 +269,37 @@ def _refuse_unsettled(step: Array, scale: Array, values: Array) -> None:
 
 def _pooled_covariance(solution: PooledSolution) -> tuple[Array, Array]:
     """Return covariance and degrees of freedom."""
-    shape, inverse, values = solution.shape, solution.inverse, solution.values
+    values = solution.values
     p, count = values.size, len(solution.problems)
+    made = [
+        Solved(
+            solution.inverse,
+            weighted,
+            problem.regressors,
+            solution.shape.at(lines),
+            lines.grid.spread,
+        )
+        for problem, lines, weighted in zip(
+            solution.problems, solution.everything, solution.weighted, strict=True
+        )
+    ]
+    taken = np.zeros((p, p))
+    for solved, lines in zip(made, solution.everything, strict=True):
+        taken += solved.taken_by_weights(smoother_for(lines, count), count)
+    inverse = with_weights(solution.inverse, taken)
     moments = np.empty((count, p))
     of_lines = np.zeros((p, p))
     squares = np.zeros(p)
-    smoothers: dict[int, Smoother] = {}
-    for i, (problem, lines, weighted) in enumerate(
-        zip(solution.problems, solution.everything, solution.weighted, strict=True)
+    for i, (problem, lines, solved) in enumerate(
+        zip(solution.problems, solution.everything, made, strict=True)
     ):
-        smoother = smoothers.setdefault(id(lines.grid.line), smoother_for([lines]))
         residual = problem.target - problem.regressors @ values
-        moments[i] = (weighted.conj().T @ residual).real
-        part, degrees = line_covariance(inverse, weighted, residual, smoother, shape.at(lines))
-        spread = lines.grid.spread
-        of_lines += spread * part
-        squares += (spread * np.diag(part)) ** 2 / (degrees / spread)
+        moments[i] = (solved.weighted.conj().T @ residual).real
+        if count < ENOUGH_EPOCHS:
+            smoother, solved = smoother_for(lines), replace(solved, inverse=inverse)
+            part, degrees = solved.covariance(solved.density(residual, smoother), smoother)
+            of_lines += part
+            squares += np.diag(part) ** 2 / degrees
     between = inverse @ (moments.T @ moments) @ inverse.T * (count / max(count - 1, 1))
     if count >= ENOUGH_EPOCHS:
         return between, np.full(p, count - 1.0)

@@ -76,8 +76,8 @@ class Grid:
     window_lines : complex array, shape (m,)
         What a constant would leave at the lines.
     spread : float
-        What is left out makes neighbouring lines alike. By this factor the variance of an estimate
-        is then larger than independent lines would have it (`window.repetition`).
+        The window makes neighbouring lines alike. By this factor the variance of an estimate is
+        larger than independent lines would have it (`window.repetition`).
     """
 
     time_s: Array
@@ -90,6 +90,11 @@ class Grid:
     energy: float
     window_lines: Complex
     spread: float = 1.0
+
+    @property
+    def used_share(self) -> float:
+        """The samples that are not left out, of all."""
+        return float(np.count_nonzero(self.window) / self.window.size)
 
     @property
     def band_hz(self) -> tuple[float, float]:
@@ -240,7 +245,7 @@ def _layout(
             f"{duration_s:.3g} s hold {line.size} spectral lines from {low:g} to {high:g} Hz; "
             f"at least {FEWEST_LINES} are needed"
         )
-    whole = window = tapered_ends(n, rate_hz, taper_s)
+    window = tapered_ends(n, rate_hz, taper_s)
     for hole_s in holes_s:
         window = with_hole(window, rate_hz, taper_s, hole_s)
     energy = float(np.sum(window.value**2))
@@ -248,8 +253,7 @@ def _layout(
     omega = np.asarray(2 * np.pi * line / duration_s, dtype=np.float64)
     for part in (*window, line, omega, constant):
         part.setflags(write=False)
-    spread = repetition(window.value) / repetition(whole.value) if holes_s else 1.0
-    return *window, line, omega, energy, constant, spread
+    return *window, line, omega, energy, constant, repetition(window.value)
 
 
 def epoch_lines(

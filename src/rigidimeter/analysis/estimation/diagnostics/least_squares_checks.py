@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.closedloop.line_noise import line_covariance
+from rigidimeter.analysis.estimation.closedloop.line_noise import Solved
 from rigidimeter.analysis.estimation.closedloop.line_weights import (
     scaled_inverse,
     shared_density,
@@ -60,7 +60,7 @@ def unbiased(prepared: PreparedEpoch, fit: Fit, by_noise: bool) -> Array:
     problems, lines = direct([observation], fit.value), [observation.lines]
     if by_noise:
         values = fit.value
-        power = shared_density(lines, problems, values, smoother_for(lines)).at(lines[0])
+        power = shared_density(lines, problems, values, smoother_for(lines[0])).at(lines[0])
     else:
         values, power = least_squares(problems), np.ones(lines[0].torque_nm.size)
     return values - loop_pull(problems, [power], values)
@@ -100,11 +100,12 @@ def _unweighted(case: Case) -> _Unweighted | None:
     pull = loop_pull([problem], [np.ones(lines.torque_nm.size)], alike)
     if not np.all(np.isfinite(pull)):
         return None
-    smoother = smoother_for([lines])
+    smoother = smoother_for(lines)
     shape = shared_density([lines], [problem], alike, smoother).at(lines)
     residual = problem.target - problem.regressors @ alike
-    covariance, _ = line_covariance(inverse, problem.instruments, residual, smoother, shape)
-    chance = STANDARD_ERRORS * np.sqrt(lines.grid.spread * np.diag(covariance))
+    solved = Solved(inverse, problem.instruments, problem.regressors, shape, lines.grid.spread)
+    covariance, _ = solved.covariance(solved.density(residual, smoother), smoother)
+    chance = STANDARD_ERRORS * np.sqrt(np.diag(covariance))
     return _Unweighted(alike - pull, chance + PULL_SHARE * np.abs(pull))
 
 
