@@ -15,7 +15,7 @@ Three things make that too small in an epoch of few lines, and each is known wit
 
 The window. Neighbouring lines share noise and signal; c = n Σ w⁴ / (Σ w²)² (`window.repetition`).
 
-The residual. The fit has taken noise out of the lines it rests on: what is left of e is
+The residual. The fit has taken noise out of the lines that decide it: what is left of e is
 e − Φ C Σ Re(U^H e), so the power at a line is S times (`share_left`)
 
     1 − c (Re(Φ_k C U_k^H) − Φ_k cov p Φ_k^H / (c S_k))

@@ -38,7 +38,7 @@ def power_left(made):
 
 @pytest.mark.parametrize("weights", ["right", "none", "other instruments"])
 def test_the_power_of_the_noise_is_exact_in_expectation(weights):
-    """A steep spectrum and a parameter that rests on three lines, which lose most."""
+    """A steep spectrum and a parameter that three lines decide, which lose most."""
     rng = np.random.default_rng(1)
     shape = np.arange(1.0, LINES + 1) ** -2.0
     regressors = noise(rng, LINES, 3)
