@@ -3,7 +3,8 @@
 A sensor at the end of its range repeats its extreme value; one that hangs repeats whatever it had.
 A living signal does neither for long: it has noise. But a joint that is told to rest is at rest:
 where command and perturbation are zero, a repeated value is what Eq. 3 gives, M = K θ. And a joint
-that is told to go on at one velocity has that velocity.
+that is told to go on at one velocity has that velocity. Nor does a coarse velocity hang while the
+angle moves as it says.
 """
 
 from __future__ import annotations
@@ -103,7 +104,7 @@ def _at_extremes(
     kept = (stops - starts >= FEWEST_AT_EXTREME - 1) & _in_use(epoch, channel, starts, stops)
     kept &= (level == np.max(level)) | (level == np.min(level))
     for run in np.flatnonzero(kept):
-        kept[run] = not _as_told(epoch, channel, starts[run], stops[run], settings.max_frozen_s)
+        kept[run] = not _moves(epoch, channel, starts[run], stops[run], settings.max_frozen_s)
     return int(np.sum((stops - starts + 1)[kept])), starts[kept], stops[kept]
 
 
@@ -116,7 +117,7 @@ def _repetitions(
     kept = (stops > starts) & _in_use(epoch, channel, starts, stops)
     long = kept & (channel.time_s[stops] - channel.time_s[starts] > most_s)
     for run in np.flatnonzero(long):
-        kept[run] = not _as_told(epoch, channel, starts[run], stops[run], most_s)
+        kept[run] = not _moves(epoch, channel, starts[run], stops[run], most_s)
     return channel.time_s[starts[kept]], channel.time_s[stops[kept]]
 
 
@@ -135,6 +136,27 @@ def _in_use(
     kept = np.asarray(sound(epoch, channel.time_s), dtype=np.int64)
     before = np.concatenate(([0], np.cumsum(kept)))
     return np.asarray(before[stops + 1] > before[starts])
+
+
+def _moves(epoch: Epoch, channel: Channel, start: int, stop: int, within_s: float) -> bool:
+    """Return whether a channel repeats a value because the joint does what that value says."""
+    return _as_the_angle(epoch, channel, start, stop) or _as_told(
+        epoch, channel, start, stop, within_s
+    )
+
+
+def _as_the_angle(epoch: Epoch, channel: Channel, start: int, stop: int) -> bool:
+    """Return whether a velocity is that of the angle, within the step to what is beside it."""
+    if channel.name != "velocity_rad_s" or "angle_rad" not in epoch.channels:
+        return False
+    angle, values = epoch.channels["angle_rad"], channel.values
+    span_s = channel.time_s[[start, stop]]
+    moved_rad = np.diff(np.interp(span_s, angle.time_s, angle.values)).item()
+    if moved_rad == 0.0:
+        return False  # both may hang
+    beside = [row for row in (start - 1, stop + 1) if 0 <= row < values.size]
+    step_rad_s = np.min(np.abs(values[beside] - values[start]), initial=np.inf if beside else 0.0)
+    return bool(abs(moved_rad / np.diff(span_s).item() - values[start]) < step_rad_s)
 
 
 def _as_told(epoch: Epoch, channel: Channel, start: int, stop: int, within_s: float) -> bool:
