@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimeter.analysis.estimation.alignment import aligned_prepared, estimate_delays
+from rigidimeter.analysis.estimation.clock_error import with_clock_error
 from rigidimeter.analysis.estimation.diagnostics import checked, checked_together
+from rigidimeter.analysis.estimation.diagnostics.delay_check import with_torque_delay
 from rigidimeter.analysis.estimation.methods import choose_method, method_named
 from rigidimeter.analysis.estimation.prepared import prepare
 from rigidimeter.analysis.estimation.signals import Array
@@ -101,12 +103,14 @@ def identify(
     lacking = [name for name in chosen.needs if name not in channels]
     if lacking:
         raise ValueError(f"method {chosen.name} needs {' and '.join(lacking)}")
-    if not chosen.as_recorded:
-        prepared = aligned_prepared(prepared, estimate_delays({epoch.source: [prepared]}))
-    (fit,), _ = chosen.fit([prepared], None, lambda _: None, False)
+    delays = () if chosen.as_recorded else estimate_delays({epoch.source: [prepared]})
+    prepared = aligned_prepared(prepared, delays)
+    made = chosen.fit([prepared], None, lambda _: None, False)
+    (fit,), _ = with_clock_error(chosen.fit, [prepared], None, made, delays)
     if fit.outcome.kind == "failed":
         raise ValueError(f"method {chosen.name}: {fit.outcome.reason}")
-    together = checked_together([prepared], [checked(prepared, fit)], [], chosen)
+    fit = with_torque_delay(prepared, checked(prepared, fit), delays)
+    together = checked_together([prepared], [fit], [], chosen)
     return together.fits[0]
 
 

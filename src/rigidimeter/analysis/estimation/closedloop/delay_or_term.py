@@ -8,7 +8,8 @@ is put in the place of the delay, as one more column T beside J, B and K:
     soft cuff   Z θ / (1 + Z/k), with Z = K + iωB − ω²J, for a cuff of k N·m/rad: at some k, and to
                 the first order in 1/k about each
 
-Both models are fitted by instrumental variables to one half of the lines, in groups of neighbours,
+Both models are fitted to one half of the lines, in groups of neighbours, by instrumental variables
+or, where the perturbation was not recorded, with the measured motion as its own instrument,
 and judged by what they leave of the others; S is the smooth power of that. The sum of the
 differences of |left|²/S, over the root of the sum of their squares, is about standard normal where
 both explain as much.
@@ -24,8 +25,13 @@ import scipy
 from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother
-from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST, Problem
-from rigidimeter.analysis.estimation.closedloop.observation import Observation, observe
+from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST, Problem, direct
+from rigidimeter.analysis.estimation.closedloop.observation import (
+    Observation,
+    observe,
+    observe_motion,
+)
+from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
 from rigidimeter.analysis.estimation.closedloop.spectral_lines import Complex, Grid
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array, velocity_at
@@ -60,8 +66,8 @@ def likeliest_term(
         J, B and K with the delay.
     """
     J, B, K = np.maximum(values, LEAST).tolist()
-    with_delay = [_of_joint(epoch.once(observe), (J, B, K)) for epoch in moved]
-    plain = [_of_joint(epoch.once(observe), (J, B, K)) for epoch in epochs]
+    with_delay = [_of_joint(_observed(epoch), (J, B, K)) for epoch in moved]
+    plain = [_of_joint(_observed(epoch), (J, B, K)) for epoch in epochs]
     without = np.maximum(_solved(plain), LEAST)
     rivals = [
         dict(_rivals(epoch, problem, (J, B, K), without))
@@ -74,8 +80,13 @@ def likeliest_term(
     return max(found, key=lambda rival: rival.better_by)
 
 
+def _observed(prepared: PreparedEpoch) -> Observation:
+    return prepared.once(observe_motion if closed_loop_obstacle(prepared.epoch) else observe)
+
+
 def _of_joint(observation: Observation, joint: tuple[float, float, float]) -> Problem:
-    assert observation.excitation is not None  # `observe` gives it
+    if observation.excitation is None:
+        return direct([observation], np.array(joint))[0]
     instruments = observation.excitation.motion_lines(joint)
     return Problem(instruments, observation.lines.motion, observation.lines.torque_nm)
 
@@ -90,12 +101,13 @@ def _rivals(
 
     `without_delay` are J, B and K of the fit without delay or term.
     """
-    observation = prepared.once(observe)
-    assert observation.excitation is not None
+    observation = _observed(prepared)
     grid = observation.lines.grid
     omega = grid.omega_rad_s
     measured = velocity_at(prepared.epoch, grid.time_s) * grid.window
-    both = observation.excitation.windowed_motion(joint)[1], measured
+    excitation = observation.excitation
+    caused = measured if excitation is None else excitation.windowed_motion(joint)[1]
+    both = caused, measured
     rubbing = _pair(grid, *(grid.window * np.sign(velocity) for velocity in both))
     yield "friction", _beside(plain, rubbing)
     for side, sign in (("+", 1.0), ("-", -1.0), ("both", 0.0)):
