@@ -27,7 +27,7 @@ from benchmarks.known_joint import TRUTH, array, sessions, settings_with
 from rigidimeter.analysis.estimation import estimate_delays, fit_epochs
 from rigidimeter.analysis.estimation.closedloop.line_methods import LINE_METHODS
 from rigidimeter.analysis.estimation.closedloop.linear_problems import least_squares_start
-from rigidimeter.analysis.estimation.closedloop.refine import fit_pooled
+from rigidimeter.analysis.estimation.closedloop.refine import fit_lines
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch, Source, prepare
 from rigidimeter.core.records import Channel, Epoch, Fit
 from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE, Settings
@@ -75,7 +75,7 @@ def pooled_bias(n: int) -> list[str]:
             squares += fit_epochs(good[:3], "bandlimited", settings)[0]
         for method, observations in kept.items():
             start = least_squares_start(observations)
-            fit, _ = fit_pooled(observations, LINE_METHODS[method].linearise, start)
+            fit = fit_lines(observations, LINE_METHODS[method].linearise, start)
             error, se = fit.values / TRUTH - 1, fit.standard_errors / TRUTH
             rows.append(
                 [

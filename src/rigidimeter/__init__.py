@@ -46,7 +46,7 @@ __all__ = [
 ]
 
 _ROOMS = {
-    "identify": "rigidimeter.analysis.estimation",
+    "identify": "rigidimeter.analysis.reading",
     "read": "rigidimeter.analysis.reading",
     "estimate": "rigidimeter.analysis.study",
     "compare": "rigidimeter.analysis.study",

@@ -125,6 +125,11 @@ def late_torque(columns: Columns) -> None:
     _alone(columns, "torque_nm", "angle_rad")
 
 
+def friction(columns: Columns) -> None:
+    columns["torque_nm"] = columns["torque_nm"] + 0.05 * np.sign(columns["velocity_rad_s"])
+    _alone(columns, "torque_nm", "angle_rad")
+
+
 def active_muscle(columns: Columns) -> None:
     noise = np.random.default_rng(4).normal(size=columns["time_s"].size)
     bursts = 1.0 + 20.0 * ((columns["time_s"] % 5.0) > 3.5)
@@ -158,6 +163,7 @@ SPOILED: Mapping[str, tuple[Callable[[Columns], object], Mapping[str, object]]] 
     "three hundred times the torque": (three_hundred_times, {}),
     "an active muscle": (active_muscle, {}),
     "torque 8 ms late": (late_torque, {}),
+    "friction, torque and angle alone": (friction, {}),
     "a controller that is not the rig's": (as_it_is, {"controller": ("0.0005", "0.002")}),
     "another band": (as_it_is, {"band_hz": ("0.5", "12")}),
 }

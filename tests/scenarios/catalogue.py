@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 from tests.scenarios.limbs import LIMBS
-from tests.scenarios.plant import POSITION_LOOP, VELOCITY_PI
+from tests.scenarios.plant import POSITION_LOOP, TORQUE_MOTOR, VELOCITY_PI
 from tests.scenarios.scenario import Scenario, scenario
 
 OWN = ("voluntary_torque", "active_movement", "residual_perturbation", "tremor", "loop_bias")
@@ -26,6 +26,9 @@ DRIVE = ("between_samples", "lack_of_fit")
 CLOCK = ("velocity_delay", "torque_delay", *DRIVE)
 """Stamps, rates and filters."""
 
+STORED = ("velocity_delay", "velocity_shape")
+"""What was stored as the velocity is not that of the angle."""
+
 another = partial(scenario, other_model=True)
 """A joint that is not one J, B and K."""
 
@@ -35,6 +38,13 @@ def _subject() -> Iterator[Scenario]:
     yield scenario("relaxed, multisine", perturbation={"kind": "multisine"})
     for torque_nm in (0.05, 0.2, 0.5):
         yield scenario(f"voluntary {torque_nm} N·m", OWN, subject={"voluntary_nm": torque_nm})
+    skirts = {"voluntary_nm": 0.2, "voluntary_skirts": True}
+    yield scenario("voluntary 0.2 N·m, soft skirts", OWN, subject=skirts)
+    yield another(
+        "resists after 0.5 s, 0.5 N·m/rad",
+        (*TERM, *OWN),
+        joint={"resist_nm_rad": 0.5, "reflex_delay_s": 0.5, "reflex_hz": 2.0},
+    )
     yield scenario("voluntary bursts 0.3 N·m", OWN, subject={"bursts_nm": 0.3})
     for torque_nm in (0.1, 0.3, 1.0):
         yield scenario(f"tremor {torque_nm} N·m", OWN, subject={"tremor_nm": torque_nm})
@@ -61,6 +71,8 @@ def _stiffness() -> Iterator[Scenario]:
     yield another(
         "K 0.6, 1.2, 0.8, 1.4 by epoch", varying, subject={"between": (0.6, 1.2, 0.8, 1.4)}
     )
+    tools = {"tool_kg_m2": (0.0, 0.0, 0.0015, 0.0015)}
+    yield another("J a third larger in half the epochs", varying, subject=tools)
 
 
 def _terms() -> Iterator[Scenario]:
@@ -108,6 +120,17 @@ def _sensors() -> Iterator[Scenario]:
     yield scenario(
         "encoder 0.05°, no velocity", DRIVE, motion={"step": np.radians(0.05)}, velocity=False
     )
+    for noise_mrad in (0.2, 0.5):
+        noisy = {"noise": 1e-3 * noise_mrad}
+        yield scenario(
+            f"encoder noise {noise_mrad} mrad, no velocity", motion=noisy, velocity=False
+        )
+    for name, how in (
+        ("differenced", {"rate_differenced": True}),
+        ("behind 40 Hz", {"rate_lowpass_hz": 40.0}),
+        ("in steps of 2°/s", {"rate_step": np.radians(2.0)}),
+    ):
+        yield scenario(f"velocity {name}", STORED, motion=how)
     yield scenario("torque filter 100 Hz", CLOCK, path={"lowpass_hz": 100.0})
     yield scenario("torque stamped 4 ms late", CLOCK, torque={"late_s": 0.004})
     yield scenario(
@@ -151,6 +174,16 @@ def _drives() -> Iterator[Scenario]:
         DRIVE,
         drive={"kind": VELOCITY_PI, "bandwidth_hz": 50.0, "friction_nm": 3.0},
     )
+    motor = {"drive": {"kind": TORQUE_MOTOR}, "perturbation": {"amplitude_nm": 0.3}}
+    yield scenario("torque motor", CLOCK, **motor, velocity=False)
+    for late_s in (0.002, 0.005):
+        yield scenario(
+            f"torque motor, torque {1e3 * late_s:.0f} ms late",
+            CLOCK,
+            **motor,
+            torque={"late_s": late_s},
+            velocity=False,
+        )
     yield scenario("slow position loop 40/s", DRIVE, drive={"kind": POSITION_LOOP})
     yield scenario("2 % of ticks late, 1 ms", controller={"late": 0.02})
     yield scenario(

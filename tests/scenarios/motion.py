@@ -12,7 +12,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from scipy.signal import butter
-from tests.scenarios.plant import VELOCITY_PI, Controller, Drive, Joint, TorquePath
+from tests.scenarios.plant import (
+    TORQUE_MOTOR,
+    VELOCITY_PI,
+    Controller,
+    Drive,
+    Joint,
+    TorquePath,
+)
 
 FINE_HZ = 10_000.0
 COURSE_HZ = 1000.0
@@ -59,7 +66,7 @@ def _stretch_nm(joint, late_rad_s):
 
 
 @njit(cache=True, error_model="numpy")
-def _change(joint, drive, path, x, command, course, late_rad_s, dx):
+def _change(joint, drive, path, x, command, course, late_rad, late_rad_s, dx):
     """Write the derivative of the state, and return the torque that acts on the limb.
 
     0 angle and 1 velocity of the drive; 2 its acceleration, or the integral of its error; 3 the
@@ -75,8 +82,8 @@ def _change(joint, drive, path, x, command, course, late_rad_s, dx):
     q, w = (x[4], x[5]) if soft else (x[0], x[1])
     reflex = 0.0
     dx[6], dx[7] = 0.0, 0.0
-    if joint.reflex_nm_s_rad != 0.0:
-        reflex = _stretch_nm(joint, late_rad_s)
+    if joint.reflex_nm_s_rad != 0.0 or joint.resist_nm_rad != 0.0:
+        reflex = _stretch_nm(joint, late_rad_s) + joint.resist_nm_rad * late_rad
         if joint.reflex_hz > 0.0:
             rate = 2.0 * math.pi * joint.reflex_hz
             dx[6] = x[7]
@@ -101,6 +108,12 @@ def _change(joint, drive, path, x, command, course, late_rad_s, dx):
             dx[1] = (x[3] - rubbed - torque) / mass
         else:
             dx[1] = (x[3] - rubbed - load) / (mass + joint.inertia_kg_m2)
+    elif drive.kind == TORQUE_MOTOR:
+        dx[2], dx[3] = 0.0, 0.0
+        if soft:
+            dx[1] = (command - torque) / drive.inertia_kg_m2
+        else:
+            dx[1] = (command - load) / (drive.inertia_kg_m2 + joint.inertia_kg_m2)
     else:
         dx[3] = 0.0
         if drive.kind > VELOCITY_PI:
@@ -133,7 +146,7 @@ def _at(courses, time_s, course):
 
 @njit(cache=True, error_model="numpy")
 def _late(history, place):
-    """Return what a velocity was at a place between fine steps; at rest before the first."""
+    """Return what a motion was at a place between fine steps; at rest before the first."""
     if place <= 0.0:
         return 0.0
     k = int(place)
@@ -151,7 +164,7 @@ def _run(
     steps = ticks * ratio
     h = 1.0 / FINE_HZ
     angle, velocity, torque = np.empty(steps), np.empty(steps), np.empty(steps)
-    limb = np.zeros(steps + 1)
+    limb, limb_rad = np.zeros(steps + 1), np.zeros(steps + 1)
     commands, in_force = np.zeros(ticks), np.zeros(steps)
     tick, sent, due = 0, 0.0, 0
     course, now = np.empty(courses.shape[0]), np.empty(x.size)
@@ -162,13 +175,13 @@ def _run(
     soft = joint.cuff_nm_rad > 0.0
     for k in range(steps):
         time_s = k * h
-        limb[k] = x[5] if soft else x[1]
+        limb[k], limb_rad[k] = (x[5], x[4]) if soft else (x[1], x[0])
         before = in_force[k - 1 - behind] if k - 1 - behind >= 0 else 0.0
         _at(courses, time_s, course)
         angle[k], velocity[k] = x[0], x[1]
-        torque[k] = _change(
-            joint, drive, path, x, before, course, _late(limb[: k + 1], k - late), slopes[0]
-        )
+        late_rad = _late(limb_rad[: k + 1], k - late)
+        late_rad_s = _late(limb[: k + 1], k - late)
+        torque[k] = _change(joint, drive, path, x, before, course, late_rad, late_rad_s, slopes[0])
         while tick < ticks and runs[tick] < 0:
             tick += 1  # missed
         if tick < ticks and runs[tick] == k:
@@ -178,7 +191,8 @@ def _run(
             held_b2 = filter_b[2] * reading - filter_a[2] * smooth
             for _ in range(due, tick + 1):
                 admitted = decay * admitted + gain * (asked[tick] - smooth)
-            commands[tick] = sent = admitted + course[IMPOSED]
+            sent = asked[tick] if drive.kind == TORQUE_MOTOR else admitted + course[IMPOSED]
+            commands[tick] = sent
             tick += 1
             due = tick
         in_force[k] = sent
@@ -198,6 +212,7 @@ def _run(
                 now,
                 command,
                 course,
+                _late(limb_rad[: k + 1], k + share - late),
                 _late(limb[: k + 1], k + share - late),
                 slopes[stage],
             )

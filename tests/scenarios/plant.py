@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-SECOND_ORDER, VELOCITY_PI, POSITION_LOOP = 0, 1, 2
+SECOND_ORDER, VELOCITY_PI, POSITION_LOOP, TORQUE_MOTOR = 0, 1, 2, 3
 """Kinds of drive."""
 
 
@@ -40,8 +40,10 @@ class Joint(NamedTuple):
         Torque against a stretch, per velocity above the threshold, so much later.
     reflex_sides : float
         1: motion toward positive angle alone stretches; 2: motion either way.
+    resist_nm_rad : float
+        Torque against the displacement of the reflex's delay before.
     reflex_hz : float
-        Double pole of the muscle between reflex and torque.
+        Double pole of the muscle between these two and their torque.
     cogwheel_nm : float
         Height of the bursts that oppose the motion, whose timing is a course.
     cuff_nm_rad, cuff_nm_s_rad : float
@@ -62,6 +64,7 @@ class Joint(NamedTuple):
     reflex_delay_s: float = 0.04
     reflex_threshold_rad_s: float = 0.0
     reflex_sides: float = 1.0
+    resist_nm_rad: float = 0.0
     reflex_hz: float = 0.0
     cogwheel_nm: float = 0.0
     cuff_nm_rad: float = 0.0
@@ -76,6 +79,7 @@ class Drive(NamedTuple):
     ω and ζ, behind the lag of the current loop. The load of a stiff limb is part of the same mass.
     `POSITION_LOOP`: the command is summed to a position, and ``position_gain_per_s`` times the
     distance to it is the velocity asked of a second-order drive.
+    `TORQUE_MOTOR`: J_m v' = p − M: the perturbation p, held from tick to tick, without a loop.
 
     Attributes
     ----------

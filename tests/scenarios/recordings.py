@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import butter, lfilter
 from tests.scenarios.motion import ADDED, COURSE_HZ, DAMPING, FINE_HZ, STIFFNESS, run
 from tests.scenarios.perturbations import Perturbation, perturbation_nm
-from tests.scenarios.plant import Controller, Drive, Joint, TorquePath
+from tests.scenarios.plant import TORQUE_MOTOR, Controller, Drive, Joint, TorquePath
 from tests.scenarios.sensors import Sensor, kept, newest, recorded, stamp_errors_s, taken
 from tests.scenarios.subject import Subject, courses
 
@@ -70,8 +71,11 @@ def _epoch(setup: Setup, number: int, rng: np.random.Generator) -> tuple[Epoch, 
     added = setup.torque.noise * rng.standard_normal(torque_steps.size)
     added += np.interp(torque_steps / FINE_HZ, at_ms, course[ADDED])
     runs = ticks_run(setup.controller, ticks, rng)
+    tools = setup.subject.tool_kg_m2
+    inertia_kg_m2 = setup.joint.inertia_kg_m2 + tools[number % len(tools)]
+    joint = setup.joint._replace(inertia_kg_m2=inertia_kg_m2)
     angle, velocity, torque, command = run(
-        setup.joint,
+        joint,
         setup.drive,
         setup.path,
         setup.controller,
@@ -89,7 +93,8 @@ def _epoch(setup: Setup, number: int, rng: np.random.Generator) -> tuple[Epoch, 
     late_by = runs / FINE_HZ * tick_rate_hz - np.arange(ticks)
     late = ran & ((late_by > 0.5) | ~np.roll(ran, 1))
     tick_s = runs[ran] / FINE_HZ
-    channels.append(Channel("velocity_command_rad_s", tick_s, command[ran]))
+    if setup.drive.kind != TORQUE_MOTOR:
+        channels.append(Channel("velocity_command_rad_s", tick_s, command[ran]))
     channels.append(Channel("perturbation_nm", tick_s, perturbation[ran]))
     epoch = Epoch(
         source="simulated elsewhere",
@@ -101,7 +106,7 @@ def _epoch(setup: Setup, number: int, rng: np.random.Generator) -> tuple[Epoch, 
         virtual=True,
         ticks=Ticks(int(np.sum(ran)), int(np.sum(late)), int(np.sum(~ran))),
     )
-    J, B, K = setup.joint.inertia_kg_m2, setup.joint.damping_nm_s_rad, setup.joint.stiffness_nm_rad
+    J, B, K = joint[:3]
     return epoch, np.array([J, B * course[DAMPING].mean(), K * course[STIFFNESS].mean()])
 
 
@@ -133,8 +138,20 @@ def _motion(setup: Setup, angle: Array, velocity: Array, rng: np.random.Generato
     sensor = setup.motion
     steps = taken(sensor, setup.perturbation.duration_s, rng)
     keep, errors = kept(sensor, steps.size, rng), stamp_errors_s(sensor, steps.size, rng)
-    both = [("angle_rad", angle, sensor.step), ("velocity_rad_s", velocity, sensor.rate_step)]
+    sampled_rad, sampled_rad_s = angle[steps], velocity[steps]
+    if sensor.noise:
+        sampled_rad = sampled_rad + sensor.noise * rng.standard_normal(steps.size)
+    if sensor.rate_lowpass_hz:
+        filtered = lfilter(*butter(2, sensor.rate_lowpass_hz, fs=FINE_HZ), velocity)
+        sampled_rad_s = np.asarray(filtered)[steps]
+    if sensor.rate_differenced:
+        counted = np.round(sampled_rad / sensor.step) * sensor.step
+        sampled_rad_s = np.diff(counted, prepend=counted[0]) * sensor.rate_hz
+    both = [
+        ("angle_rad", sampled_rad, sensor.step),
+        ("velocity_rad_s", sampled_rad_s, sensor.rate_step),
+    ]
     return [
-        recorded(name, values[steps], steps, sensor, step, keep, errors)
+        recorded(name, values, steps, sensor, step, keep, errors)
         for name, values, step in both[: 2 if setup.velocity else 1]
     ]

@@ -26,6 +26,10 @@ class Sensor:
         SD of white noise of each sample, in the unit of the channel.
     step, rate_step : float
         What it resolves, of the torque or the angle, and of the velocity.
+    rate_lowpass_hz : float
+        Of a causal Butterworth filter of second order on the velocity; 0 for none.
+    rate_differenced : bool
+        The velocity is the difference of the recorded angle to the sample before.
     late_s : float
         How much later than it was taken a sample is stamped.
     stamp_noise_s : float
@@ -40,6 +44,8 @@ class Sensor:
     noise: float = 0.0
     step: float = 0.0
     rate_step: float = 0.0
+    rate_lowpass_hz: float = 0.0
+    rate_differenced: bool = False
     late_s: float = 0.0
     stamp_noise_s: float = 0.0
     lost: float = 0.0

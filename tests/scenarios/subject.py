@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from tests.scenarios.motion import (
     ADDED,
@@ -35,6 +36,8 @@ class Subject:
     ----------
     voluntary_nm : float
         SD of torque between the frequencies of `voluntary_hz`.
+    voluntary_skirts : bool
+        Whether a Butterworth band-pass of second order limits it; else it has none outside.
     bursts_nm : float
         Height of pushes either way, one about every 3 s, lasting 0.3 to 1 s.
     tremor_nm, tremor_hz : float, (float, float)
@@ -49,6 +52,8 @@ class Subject:
     stiffness_depth : float
     between : tuple of float
         Factors of K in the epochs of a recording, in turn.
+    tool_kg_m2 : tuple of float
+        What the joint carries in the epochs of a recording, in turn.
     imposed_rad, imposed_hz : float
         A sinusoidal movement that the rig adds.
     sensor_drift_nm, lateral_nm : float
@@ -58,6 +63,7 @@ class Subject:
 
     voluntary_nm: float = 0.0
     voluntary_hz: tuple[float, float] = (0.3, 4.0)
+    voluntary_skirts: bool = False
     bursts_nm: float = 0.0
     tremor_nm: float = 0.0
     tremor_hz: tuple[float, float] = (4.0, 7.0)
@@ -66,6 +72,7 @@ class Subject:
     stiffness: Literal["constant", "step", "drift", "phase"] = "constant"
     stiffness_depth: float = 0.0
     between: tuple[float, ...] = (1.0,)
+    tool_kg_m2: tuple[float, ...] = (0.0,)
     imposed_rad: float = 0.0
     imposed_hz: float = 0.5
     sensor_drift_nm: float = 0.0
@@ -78,7 +85,8 @@ def courses(subject: Subject, duration_s: float, number: int, rng: np.random.Gen
     n = found.shape[1]
     time_s = np.arange(n) / COURSE_HZ
     if subject.voluntary_nm > 0:
-        found[SUBJECT] += subject.voluntary_nm * band_noise(n, subject.voluntary_hz, rng)
+        noise = skirted_noise if subject.voluntary_skirts else band_noise
+        found[SUBJECT] += subject.voluntary_nm * noise(n, subject.voluntary_hz, rng)
     if subject.bursts_nm > 0:
         found[SUBJECT] += subject.bursts_nm * _bursts(time_s, rng)
     if subject.tremor_nm > 0:
@@ -110,6 +118,15 @@ def band_noise(n: int, band_hz: tuple[float, float], rng: np.random.Generator) -
     count = int(np.count_nonzero(inside))
     lines[inside] = rng.standard_normal(count) + 1j * rng.standard_normal(count)
     return np.asarray(np.fft.irfft(lines, longer)[:n] * longer / (2 * np.sqrt(count)))
+
+
+def skirted_noise(n: int, band_hz: tuple[float, float], rng: np.random.Generator) -> Array:
+    """Return Gaussian noise of unit variance through a Butterworth band-pass of second order."""
+    sos = scipy.signal.butter(2, band_hz, "bandpass", fs=COURSE_HZ, output="sos")
+    settled = round(10 * COURSE_HZ)
+    gain = np.sqrt(np.mean(np.abs(scipy.signal.sosfreqz(sos, 2**17)[1]) ** 2))
+    white = rng.standard_normal(settled + n)
+    return np.asarray(scipy.signal.sosfilt(sos, white)[settled:] / gain)
 
 
 def _phase(n: int, frequency_hz: tuple[float, float], rng: np.random.Generator) -> Array:

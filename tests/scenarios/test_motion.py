@@ -8,7 +8,7 @@ import scipy
 from tests.scenarios.limbs import LIMBS, setup_of
 from tests.scenarios.motion import FINE_HZ, IMPOSED, resting, run
 from tests.scenarios.perturbations import perturbation_nm
-from tests.scenarios.plant import VELOCITY_PI, Controller, Drive, TorquePath
+from tests.scenarios.plant import TORQUE_MOTOR, VELOCITY_PI, Controller, Drive, TorquePath
 from tests.scenarios.recordings import simulate
 from tests.scenarios.scenario import scenario
 
@@ -22,15 +22,23 @@ STILL = Controller(1e9, 1.0)
 """An admittance that no torque moves: only imposed motion is left."""
 
 
-def run_imposed(joint=ELBOW, drive=PLAIN, velocity=None, duration_s=1.0, **start):
-    """Run without perturbation; `velocity` gives the imposed one at times."""
+def run_imposed(joint=ELBOW, drive=PLAIN, velocity=None, duration_s=1.0, asked_nm=0.0, **start):
+    """Run with a constant perturbation; `velocity` gives the imposed one at times."""
     courses = resting(duration_s)
     if velocity is not None:
         courses[IMPOSED] = velocity(np.arange(courses.shape[1]) / 1000.0)
     ticks = round(duration_s * 1000)
     seen = np.full(ticks, -1)
     return run(
-        joint, drive, TorquePath(), STILL, courses, np.zeros(ticks), seen, np.zeros(ticks), **start
+        joint,
+        drive,
+        TorquePath(),
+        STILL,
+        courses,
+        np.full(ticks, asked_nm),
+        seen,
+        np.zeros(ticks),
+        **start,
     )
 
 
@@ -95,6 +103,29 @@ def test_a_reflex_is_the_velocity_of_before_and_only_of_a_stretch() -> None:
     _, _, torque, _ = run_imposed(joint, velocity=wave)
     late = np.concatenate((np.zeros(500), velocity[:-500]))
     assert np.allclose(torque - quiet, 0.2 * np.maximum(late, 0.0), atol=1e-9)
+
+
+def test_who_resists_does_so_against_the_displacement_of_before() -> None:
+    def wave(t):
+        return np.sin(2 * np.pi * 3 * t)
+
+    angle, _, quiet, _ = run_imposed(velocity=wave)
+    joint = ELBOW._replace(resist_nm_rad=0.5, reflex_delay_s=0.05)
+    _, _, torque, _ = run_imposed(joint, velocity=wave)
+    late = np.concatenate((np.zeros(500), angle[:-500]))
+    assert np.allclose(torque - quiet, 0.5 * late, atol=1e-9)
+
+
+def test_a_torque_motor_moves_itself_and_the_joint() -> None:
+    """(J_m + J) θ'' + B θ' + K θ = p after a step of p, and M is what the motor leaves of it."""
+    drive = Drive(TORQUE_MOTOR)
+    angle, _, torque, _ = run_imposed(drive=drive, asked_nm=0.3)
+    J, B, K = ELBOW[:3]
+    t = np.arange(angle.size) / FINE_HZ
+    both = scipy.signal.lti([1.0], [drive.inertia_kg_m2 + J, B, K])
+    assert np.allclose(angle, 0.3 * scipy.signal.step(both, T=t)[1], atol=1e-6)
+    share = scipy.signal.lti([J, B, K], [drive.inertia_kg_m2 + J, B, K])
+    assert np.allclose(torque[1:], 0.3 * scipy.signal.step(share, T=t)[1][1:], atol=1e-5)
 
 
 @pytest.mark.parametrize("limb", ["animal elbow", "ankle"])

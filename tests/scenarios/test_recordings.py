@@ -31,6 +31,30 @@ def test_voluntary_torque_has_its_sd_and_its_band() -> None:
     assert power[inside].sum() > 0.99 * power.sum()
 
 
+def test_voluntary_torque_with_skirts_has_its_sd_and_power_beyond_its_band() -> None:
+    subject = Subject(voluntary_nm=0.2, voluntary_skirts=True)
+    torque = courses(subject, 400.0, 0, rng())[SUBJECT]
+    assert abs(np.std(torque) / 0.2 - 1) < 0.05
+    power = np.abs(np.fft.rfft(torque)) ** 2
+    beyond = np.fft.rfftfreq(torque.size, 1e-3) > 8.0
+    assert 1e-3 < power[beyond].sum() / power.sum() < 0.05
+
+
+def test_a_tool_is_inertia_of_its_epochs() -> None:
+    found = SCENARIOS["J a third larger in half the epochs"].simulated(0, 4)
+    assert np.allclose(found.truth[:, 0], [0.0045, 0.0045, 0.006, 0.006])
+
+
+def test_a_velocity_is_stored_as_its_sensor_makes_it() -> None:
+    names = ("differenced", "in steps of 2°/s")
+    made = [SCENARIOS[f"velocity {name}"].simulated(0, 1).epochs[0].channels for name in names]
+    angle, velocity = (made[0][name].values for name in ("angle_rad", "velocity_rad_s"))
+    step = np.radians(0.01)
+    assert np.allclose(velocity[1:], np.diff(angle) * 1000.0, atol=0.51 * step)
+    coarse = made[1]["velocity_rad_s"].values / np.radians(2.0)
+    assert np.allclose(coarse, np.round(coarse), atol=1e-9)
+
+
 def test_tremor_has_its_amplitude_and_a_frequency_between_4_and_7_hz() -> None:
     torque = courses(Subject(tremor_nm=0.3), 60.0, 0, rng())[SUBJECT]
     assert np.max(torque) > 0.299

@@ -41,7 +41,8 @@ def compare(
     by: str = COMPARE.option("--by COLUMN", "With --value: column of conditions.", "condition"),
     session: str | None = COMPARE.further(
         "--session COLUMN",
-        "With --value: the bootstrap resamples the labels of this column. Default: rows.",
+        "With --value: the bootstrap resamples the labels of this column. Default: rows, or days "
+        "where several rows are of one.",
     ),
     seed: int = ESTIMATE.further("--seed N", "Seed of the bootstrap.", 1, min=0),
     resamples: int = ESTIMATE.further(
@@ -61,7 +62,8 @@ def compare(
     A study folder (with a study.toml) also has tests by days, the examiners' ratings, other methods
     and every exclusion; its analysis is stored in its folder `analysis`.
 
-    With --value the input is one table as CSV.
+    With --value the input is one table as CSV. Where its columns `subject` and `day` have several
+    rows of one, it is tested by days.
 
     \b
     For example:

@@ -37,7 +37,9 @@ def comparison_blocks(found: StudyResult, *, full: bool = False) -> Iterator[Blo
         yield from difference_blocks(pair)
         yield ""
         yield from statement_blocks(pair)
-    if notes := [*_left_out(found), *finding_notes(found.analysis, full)]:
+    analysis = found.analysis
+    notes = [*stiffness_notes(analysis), *_left_out(found), *finding_notes(analysis, full)]
+    if notes:
         yield ""
         yield Table((), notes, "<<", 1)
     if full:
@@ -88,6 +90,12 @@ def _left_out(found: StudyResult) -> Iterator[tuple[str, str]]:
     # A session with a row for each of its conditions is left out once.
     for path, reason in dict.fromkeys((out.path, out.reason) for out in found.left_out):
         yield "left out", f"{path}: {reason}"
+
+
+def stiffness_notes(analysis: Analysis) -> Iterator[tuple[str, str]]:
+    """Yield which K is given and at what motion, in two lines."""
+    if words := analysis.stiffness_words:
+        yield "K", two_lines(words, words.partition(", range")[0])
 
 
 def finding_notes(analysis: Analysis, full: bool) -> Iterator[tuple[str, str]]:

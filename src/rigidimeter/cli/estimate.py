@@ -30,7 +30,7 @@ def estimate(
     Sinusoidal epochs have scores. A file holds time_s, torque_nm, at least one of velocity_rad_s
     and angle_rad, and optionally velocity_command_rad_s, perturbation_nm, epoch, condition and
     task. Torque is positive when it drives the joint toward positive angles. The exit status is 1
-    if any input was bad; the others are still analysed.
+    if any input was bad, the others are still analysed, or if no epoch counts.
 
     \b
     For example:

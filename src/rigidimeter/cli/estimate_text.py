@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 
 from rigidimeter.analysis.estimation import METHODS
 from rigidimeter.analysis.study import Precision, StudyResult, condition_precisions
-from rigidimeter.cli.comparison_text import finding_notes, full_blocks, two_lines
+from rigidimeter.cli.comparison_text import finding_notes, full_blocks, stiffness_notes, two_lines
 from rigidimeter.cli.terminal_tables import ROWS, Block, Heading, Table, text_lines
-from rigidimeter.core.records import PARAMETERS, Analysis, Fit, Score
+from rigidimeter.core.records import PARAMETERS, Analysis, Fit, Score, degrees
 from rigidimeter.core.words import decimals, fixed, number, plural, scaled, short_names, with_error
 
 MOST_EPOCHS, FIRST_EPOCHS = 8, 4
@@ -29,7 +29,13 @@ def estimate_blocks(result: StudyResult, *, full: bool = False) -> Iterator[Bloc
     one screen has room for.
     """
     analysis = result.analysis
-    found = (_method(analysis), _excluded(analysis), _short_scores(result), _delays(analysis, full))
+    found = (
+        stiffness_notes(analysis),
+        _method(analysis),
+        _excluded(analysis),
+        _short_scores(result),
+        _delays(analysis, full),
+    )
     notes = [note for notes in (*found, finding_notes(analysis, full)) for note in notes]
 
     def first_screen(fits: Table) -> list[Block]:
@@ -86,22 +92,23 @@ def _fits(result: StudyResult, most: int) -> Table:
             with_error(factor * fit.value[i], factor * fit.se[i])
             for i, (factor, _) in enumerate(scales)
         ]
+        angle = degrees(fit.angle_rms_rad)
         vaf = "–" if math.isnan(fit.vaf_percent) else f"{fit.vaf_percent:.1f}"
         outcome = "" if fit.outcome.included else fit.outcome.kind
-        return (label, fit.condition, *values, vaf, outcome)
+        return (label, fit.condition, *values, angle, vaf, outcome)
 
     together = [*_together(result, [factor for factor, _ in scales])]
     rows: list[Sequence[str] | str] = []
     if len(fits) <= most:
         rows += map(row, fits)
     elif len(names) == 1 and most:
-        rows += [*map(row, fits[:FIRST_EPOCHS]), ("…", *[""] * 6), row(fits[-1])]
+        rows += [*map(row, fits[:FIRST_EPOCHS]), ("…", *[""] * 7), row(fits[-1])]
     else:
         together = together[1:]  # without the empty line
     rows += together
-    headings = ("epoch", "condition", *(f"{p.symbol}, {unit}" for p, (_, unit) in
-                zip(PARAMETERS, scales, strict=True)), "VAF, %", "")  # fmt: skip
-    return Table(headings, rows, "<<>>>>=", 1)
+    headings = ("epoch", "", *(f"{p.symbol}, {unit}" for p, (_, unit) in
+                zip(PARAMETERS, scales, strict=True)), "SD θ, °", "VAF, %", "")  # fmt: skip
+    return Table(headings, rows, "<<>>>>>=", 1)
 
 
 def _together(result: StudyResult, factors: Sequence[float]) -> Iterator[Sequence[str] | str]:
@@ -121,9 +128,9 @@ def _together(result: StudyResult, factors: Sequence[float]) -> Iterator[Sequenc
             cells.append((fixed(value, places), known, scatter))
         values, intervals, scatters = zip(*cells, strict=True)
         yield ""
-        yield ("together", condition, *values, "", "")
-        yield ("95 %", "", *intervals, "", "")
-        yield ("SD", "", *scatters, "", "")
+        yield ("together", condition, *values, "", "", "")
+        yield ("95 %", "", *intervals, "", "", "")
+        yield ("SD", "", *scatters, "", "", "")
 
 
 def _scores(result: StudyResult) -> Table:

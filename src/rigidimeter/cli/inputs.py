@@ -59,12 +59,17 @@ class Analysed(NamedTuple):
     def say(self) -> int:
         """Say what is wrong, after the result was shown; return the exit status."""
         say(self.notices)
+        outcomes = [one.outcome for one in self.result.analysis.results]
+        none_counts = bool(outcomes) and not any(outcome.included for outcome in outcomes)
         failed = [one for one in self.result.analysis.results if one.outcome.kind == "failed"]
         for one in failed:
             echo(f"error: {one.source}, epoch {one.epoch}: {one.outcome.reason}", err=True)
+        if none_counts and len(failed) < len(outcomes):
+            why = next(outcome.reason for outcome in outcomes if outcome.kind == "excluded")
+            echo(f"error: no epoch counts, so there is no estimate to use; first: {why}", err=True)
         if self.not_kept:
             echo(f"error: the analysis is not stored: {self.not_kept}", err=True)
-        return int(self.bad or bool(failed) or bool(self.not_kept))
+        return int(self.bad or bool(failed) or none_counts or bool(self.not_kept))
 
 
 def analyse_recordings(recordings: Recordings) -> tuple[Recording, Analysed]:

@@ -53,6 +53,12 @@ def simulate(
     if task is None and (condition is not None or epochs is not None):
         raise UserError("--condition and --epochs need --task prbs or --task sinusoid")
     chosen = load_settings(settings)
+    if condition is not None and condition not in chosen.subject:
+        known = ", ".join(sorted(chosen.subject))
+        raise UserError(
+            f"--condition {condition}: there is no [subject.{condition}] in the settings; known "
+            f"conditions: {known}"
+        )
     changes: dict[str, Any] = {}
     if seed is not None:
         changes["seed"] = seed

@@ -181,12 +181,15 @@ def _cluster(scheduler: str) -> Iterator[_Workers]:
 
     try:
         from distributed import Client, KilledWorker
+        from distributed.comm.addressing import get_address_host_port
     except ImportError:
         raise UserError(
             "--scheduler: needs one more package: pip install 'rigidimeter[cluster]'"
         ) from None
     connect: Callable[..., Any] = Client
+    check: Callable[..., Any] = get_address_host_port
     try:
+        check(scheduler)  # a client of an address without a port would end in a time-out
         client = connect(scheduler, timeout=_CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
         raise UserError(

@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from tests.known_joint import angle_rad, torque_nm
 from tests.unit.analysis.report.parsed_page import ParsedPage
 from tests.unit.virtual.tiny import SHORT
 
@@ -157,7 +158,10 @@ def test_a_report_of_a_foreign_recording(rigidimeter, tmp_path):
         (["simulate", "--out", "{session}"], "is not empty"),
         (["simulate", "--out", "x", "--epochs", "3"], "need --task"),
         (["simulate", "--out", "x", "--task", "dance"], "--task dance: must be prbs or sinusoid"),
-        (["simulate", "--out", "x", "--task", "prbs", "--condition", "Z"], "condition 'Z'"),
+        (
+            ["simulate", "--out", "x", "--task", "prbs", "--condition", "Z"],
+            "--condition Z: there is no [subject.Z] in the settings; known conditions: DBS, OFF",
+        ),
         (["simulate", "--out", "x", "--task", "prbs", "--epochs", "0"], "epochs = 0: Input should"),
         (["report", "{session}", "--out", "{session}/manifest.json"], "lies in a session folder"),
         (
@@ -175,6 +179,23 @@ def test_what_a_user_did_wrong_is_one_sentence_and_a_status(
     assert ran.status == 1
     assert words in ran.err
     assert ran.err.count("rigidimeter: ") == 1
+
+
+def test_a_recording_of_which_no_epoch_counts_has_no_estimate_to_use(rigidimeter, tmp_path):
+    """One epoch that is excluded is no error; every epoch is."""
+    time_s = np.arange(4000) / 200
+    torque = torque_nm(time_s)
+    for name, clipped in (("one", time_s < 10), ("all", time_s >= 0)):
+        values = np.where(clipped, np.clip(torque, -0.02, 0.02), torque)
+        np.savez(
+            tmp_path / f"{name}.npz", time_s=time_s, torque_nm=values, angle_rad=angle_rad(time_s)
+        )
+    ran = rigidimeter("estimate", tmp_path / "one.npz", "--epoch-length-s", 10)
+    assert (ran.status, ran.out.count("excluded")) == (0, 2)
+    ran = rigidimeter("estimate", tmp_path / "all.npz", "--epoch-length-s", 10)
+    assert ran.status == 1
+    assert "0 used" in ran.out
+    assert "error: no epoch counts, so there is no estimate to use; first: torque_nm" in ran.err
 
 
 def test_a_good_epoch_beside_bad_inputs_is_analysed(rigidimeter, simulate, tmp_path):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import ttest_rel
 
 from rigidimeter.analysis.statistics import holm, ranksum
 
@@ -83,6 +84,43 @@ def test_excluded_epochs_and_empty_cells_are_left_out_and_said(compared, tmp_pat
     assert found["comparisons"][0]["groups"]["OFF"]["n"] == 18
     assert any("no a in line 2; left out" in notice["text"] for notice in found["notices"])
     assert any("excluded or failed in line 3" in notice["text"] for notice in found["notices"])
+
+
+def repeated(path: Path, head: str, label) -> np.ndarray:
+    """Four scores a day and condition, alike in a day; return the means of days, shape (5, 2)."""
+    g = np.random.default_rng(1)
+    scores = g.normal([[2.5], [2.0]], 0.6, (5, 2, 1)) + 0.1 * g.standard_normal((5, 2, 4))
+    lines = [f"condition,{head},score"]
+    for (day, side, _), score in np.ndenumerate(scores):
+        lines.append(f"{('OFF', 'DBS')[side]},{label(day)},{float(score)!r}")
+    path.write_text("\n".join(lines) + "\n")
+    return scores.mean(axis=2)
+
+
+@pytest.mark.parametrize(
+    ("head", "label", "units"),
+    [
+        ("day", lambda k: k, "days"),
+        ("subject,day", lambda k: f"M1,{k}", "days"),
+        ("subject", lambda k: f"M{k}", "subjects"),
+    ],
+)
+def test_scores_of_a_day_or_a_subject_are_no_independent_values(
+    compared, tmp_path, head, label, units
+) -> None:
+    means = repeated(tmp_path / "t.csv", head, label)
+    ran, found = compared(tmp_path / "t.csv", "--value", "score")
+    (row,) = found["comparisons"]
+    assert row["days"]["p"] == pytest.approx(ttest_rel(*means.T).pvalue, rel=1e-9)
+    assert row["p"] < 0.05 < row["days"]["p"]  # forty values as if they were independent
+    assert f"Paired t-test of 5 {units}." in ran.out
+    assert "No difference between OFF and DBS is shown" in ran.out
+
+
+def test_scores_of_one_day_decide_nothing(compared, tmp_path) -> None:
+    repeated(tmp_path / "t.csv", "day", lambda k: 1)
+    ran, _ = compared(tmp_path / "t.csv", "--value", "score")
+    assert "Nothing could be tested." in ran.out
 
 
 def test_two_values_give_medians_and_no_test(compared, tmp_path) -> None:

@@ -105,7 +105,7 @@ def noisy(tmp_path: Path, monkeypatch) -> list[str]:
 def test_estimates_of_three_noisy_recordings(rigidimeter, noisy) -> None:
     """Three findings of two lines at most, and excluded epochs with their recordings."""
     ran = rigidimeter("estimate", *noisy, "--epoch-length-s", 10)
-    assert ran.status == 0, ran.err
+    assert ran.status == 1, ran.err  # no epoch counts
     assert_one_screen(ran.out.splitlines())
     assert ran.out.count("\n caution") + ran.out.count("\n exclude ") <= 3
     excluded = [line for line in ran.out.splitlines() if line.startswith(" excluded ")]

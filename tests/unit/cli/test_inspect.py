@@ -160,6 +160,18 @@ def test_a_velocity_that_is_not_the_derivative_of_the_angle_is_refused(tmp_path,
     assert "it is read as the unit that was given says" in believed.err
 
 
+def test_columns_of_trials_that_change_together_have_one_warning(tmp_path, rigidimeter):
+    columns = (TIME_S, torque_nm(TIME_S), angle_rad(TIME_S))
+    trial, half = 1 + TIME_S // 8, 1 + TIME_S // 12
+    head = "time [s],torque [Nm],angle [rad],trial,run,block,half trial"
+    path = _written(tmp_path / "r.csv", head, *columns, trial, 10 * trial, trial, half)
+    said = rigidimeter("estimate", path).err
+    assert said.count("reads each of its labels as an epoch") == 2
+    together = "column 'trial' (1, 2, 3) is not used, nor what changes with it: 'run' and 'block';"
+    assert f"{together} --column epoch=trial reads" in said
+    assert "column 'half trial' (1, 2) is not used; --column" in said
+
+
 def test_a_column_of_trials_that_is_not_used_is_named(tmp_path, rigidimeter):
     columns = (TIME_S, torque_nm(TIME_S), angle_rad(TIME_S))
     head = "time [s],torque [Nm],angle [rad],Trial No."

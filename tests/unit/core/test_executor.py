@@ -127,3 +127,13 @@ def test_a_scheduler_that_is_not_there_is_said() -> None:
     pytest.importorskip("distributed")
     with pytest.raises(UserError, match=r"--scheduler nonsense://: cannot be reached"):
         list(each(abs, [1], scheduler="nonsense://"))
+
+
+def test_nothing_is_left_of_a_scheduler_without_a_port_whose_end_fails() -> None:
+    pytest.importorskip("distributed")
+    script = "from rigidimeter.core.executor import each\nlist(each(abs, [1], scheduler='foo'))"
+    ran = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False
+    )
+    assert "UserError: --scheduler foo: cannot be reached" in ran.stderr
+    assert "Exception ignored" not in ran.stderr

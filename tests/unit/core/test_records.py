@@ -78,12 +78,12 @@ def test_the_table_has_the_columns_of_the_csv(tmp_path):
     assert only_scores.table()["work_j"].tolist() == [0.2]
 
 
-def test_the_table_that_people_read_has_twelve_columns():
+def test_the_table_that_people_read_has_thirteen_columns():
     table = analysis().table()
     assert list(table.columns) == [
         "source", "epoch", "condition", "inertia_kg_m2", "inertia_kg_m2_se", "damping_nm_s_rad",
-        "damping_nm_s_rad_se", "stiffness_nm_rad", "stiffness_nm_rad_se", "vaf_percent", "outcome",
-        "findings",
+        "damping_nm_s_rad_se", "stiffness_nm_rad", "stiffness_nm_rad_se", "angle_rms_rad",
+        "vaf_percent", "outcome", "findings",
     ]  # fmt: skip
     assert table["findings"].tolist() == ["frozen", "frozen"]
     assert table.equals(analysis().table(full=True)[table.columns[:-1]].assign(findings="frozen"))
@@ -105,6 +105,30 @@ def test_a_fit_and_an_analysis_are_printed_as_one_line():
     assert (
         "<td>1.670\xa0to\xa01.730</td>"
         in replace(fit, low=np.array([0, 0, 1.67]), high=np.array([1, 1, 1.73]))._repr_html_()
+    )
+
+
+def test_which_stiffness_it_is_and_at_what_motion_is_said_in_few_words():
+    assert analysis(fits=(), fixed_inertia=(), pooled=()).stiffness_words == ""
+    assert analysis().stiffness_words == "holds the limb's weight"
+    rad = np.pi / 180
+    swung = replace(FIT, angle_rms_rad=2 * rad, angle_range_rad=9 * rad)
+    pooled = (
+        replace(swung, epoch="pooled"),
+        replace(swung, condition="DBS", angle_rms_rad=3 * rad),
+    )
+    one = analysis(fits=(swung,), fixed_inertia=(swung,), pooled=pooled[:1])
+    assert one.stiffness_words == "holds the limb's weight; angle SD 2.00°, range up to 9.00°"
+    weighed = replace(swung, findings=(Finding("gravity", "note", 1.4, np.nan),))
+    fits = (weighed, replace(swung, angle_range_rad=12 * rad))
+    two = analysis(fits=fits, fixed_inertia=fits, pooled=pooled)
+    assert two.stiffness_words == (
+        "holds the limb's weight (note gravity: without); "
+        "angle SD 2.00° in OFF, 3.00° in DBS, range up to 12.0°"
+    )
+    assert two.stiffness_words in two._repr_html_().replace("&#x27;", "'")
+    assert "VAF 99.6 %, angle SD 2.00°; epoch 1 OFF" in repr(
+        replace(swung, vaf_percent=99.6, band_hz=(0.1, 30.0))
     )
 
 

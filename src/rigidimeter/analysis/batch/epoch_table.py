@@ -13,7 +13,7 @@ from pathlib import Path
 from rigidimeter.analysis.batch.parts import Row
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import as_read, csv_text, in_place
-from rigidimeter.core.records import Analysis, Fit, Outcome, Score
+from rigidimeter.core.records import AMPLITUDE, Analysis, Fit, Outcome, Score
 
 ENDINGS = (".parquet", ".csv")
 BATCH_SCHEMA = "rigidimeter.batch/1"
@@ -111,11 +111,12 @@ def _read_parquet(path: Path) -> Iterator[Row]:
 def _read_csv(path: Path) -> Iterator[Row]:
     with path.open(encoding="utf-8", newline="") as file:
         reader = csv.DictReader(file, strict=True)
-        if tuple(reader.fieldnames or ()) != tuple(columns()):
+        named = {name: kind for name, kind in columns().items() if name not in AMPLITUDE}
+        if [name for name in reader.fieldnames or () if name not in AMPLITUDE] != [*named]:
             raise ValueError("its columns are others")
         for row in reader:
             yield {
                 name: as_read(cell) if kind is str else kind(cell)
                 for name, kind in columns().items()
-                if (cell := row[name])
+                if (cell := row.get(name))  # older tables have no amplitude
             }

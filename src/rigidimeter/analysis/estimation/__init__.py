@@ -10,8 +10,8 @@ from rigidimeter.core.lazy_names import lazy_names
 
 if TYPE_CHECKING:
     from rigidimeter.analysis.estimation.alignment import aligned, estimate_delays
+    from rigidimeter.analysis.estimation.amplitude import amplitude_of_signals
     from rigidimeter.analysis.estimation.bandlimited import band_hz
-    from rigidimeter.analysis.estimation.from_arrays import identify
     from rigidimeter.analysis.estimation.least_squares import fit_inertia_damping_stiffness
     from rigidimeter.analysis.estimation.method_record import Method
     from rigidimeter.analysis.estimation.methods import (
@@ -39,6 +39,7 @@ __all__ = [
     "Method",
     "Signals",
     "aligned",
+    "amplitude_of_signals",
     "band_hz",
     "choose_method",
     "epoch_signals",
@@ -47,7 +48,6 @@ __all__ = [
     "fit_epoch",
     "fit_epochs",
     "fit_inertia_damping_stiffness",
-    "identify",
     "method_named",
     "method_names",
     "no_such_method",
@@ -60,8 +60,8 @@ __getattr__ = lazy_names(
     __name__,
     {
         "alignment": ("aligned", "estimate_delays"),
+        "amplitude": ("amplitude_of_signals",),
         "bandlimited": ("band_hz",),
-        "from_arrays": ("identify",),
         "least_squares": ("fit_inertia_damping_stiffness",),
         "method_record": ("Method",),
         "methods": (

@@ -2,7 +2,9 @@
 
 An amplifier's filter or a bus that stamps late shifts one channel against the other. A shift of
 10 ms takes 7 % off the work of a cycle and turns stiffness into damping, so the delay is estimated
-where that can be done (`closedloop.delay`), reported with its error, and taken out.
+where that can be done (`closedloop.delay`), reported with its error, and taken out unless friction,
+a reflex or a soft cuff explains the torque as well (`closedloop.delay_or_term`). Where the
+perturbation was not recorded, the measured motion is the instrument of all of these.
 """
 
 from __future__ import annotations
@@ -114,16 +116,10 @@ def _estimate(source: str, epochs: Sequence[PreparedEpoch]) -> Delay:
                 "(estimation.max_delay_s)",
             )
         found = Delay(source, total_s, error_s)
-        if not known:
-            return replace(
-                found,
-                remark="not corrected: without the recorded perturbation a reflex, or torque that "
-                "something but the robot adds, resembles a delay",
-            )
-        if abs(total_s) < max(SIGNIFICANT * error_s, LEAST_S):
+        if not _matters(total_s, error_s):
             return replace(found, remark="not corrected: not significantly different from zero")
         halves = [_in_half_the_band(one) for one in used]
-        half_s, half_error_s, _ = _settled(halves, motions, perturbed=True)
+        half_s, half_error_s, _ = _settled(halves, motions, perturbed=bool(known))
     except ValueError as error:
         return Delay(source, remark=f"the delay of the torque was not estimated: {error}")
     apart_s, allowed_s = abs(half_s - total_s), SIGNIFICANT * np.hypot(error_s, half_error_s)
@@ -154,8 +150,8 @@ def _settled(
     """Return the delay at which none is left, its standard error, in s, and J, B and K with it.
 
     The zero of what is left is sought by secants: between coarse samples moving the torque by what
-    is left takes only part of it away. Where the perturbation is not known, least squares gives a
-    delay without moving anything. The error of the zero is that of what is left over its slope,
+    is left takes only part of it away. Where the perturbation is not known, the measured motion is
+    its own instrument. The error of the zero is that of what is left over its slope,
     by how much a move of the torque changes it.
     """
     longest_s = epochs[0].settings.estimation.max_delay_s
@@ -173,9 +169,11 @@ def _settled(
     tried: list[tuple[float, float]] = []
     total_s = 0.0
     near: Array | None = None
-    for _ in range(ROUNDS if perturbed else 1):
+    for _ in range(ROUNDS):
         fit = left_after(total_s, near)
         left_s, error_s = float(fit.values[-1]), float(fit.standard_errors[-1])
+        if not (perturbed or tried or _matters(left_s, error_s)):
+            return left_s, error_s, fit.values[:-1]  # least squares shows it without a move
         near = fit.values if abs(left_s) < IN_VALLEY_S else None
         stretch = 1.0
         if tried and abs(left_s) < abs(tried[-1][1]):
@@ -184,7 +182,7 @@ def _settled(
         total_s += stretch * left_s
         if abs(left_s) < SETTLED_S or abs(total_s) > longest_s:
             break
-    if not perturbed or abs(total_s) > longest_s:
+    if abs(total_s) > longest_s:
         return total_s, error_s, fit.values[:-1]
     if abs(left_s) > max(error_s, LEAST_S):
         raise ValueError(
@@ -202,6 +200,10 @@ def _settled(
         stretches.append(abs(_stretch(root, beside)))
     error_s *= max(stretches)
     return total_s, error_s, fit.values[:-1]
+
+
+def _matters(delay_s: float, error_s: float) -> bool:
+    return abs(delay_s) >= max(SIGNIFICANT * error_s, LEAST_S)
 
 
 def _stretch(one: tuple[float, float], other: tuple[float, float]) -> float:

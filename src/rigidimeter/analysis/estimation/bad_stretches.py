@@ -3,7 +3,8 @@
 A sensor at the end of its range repeats its extreme value; one that hangs repeats whatever it had.
 A living signal does neither for long: it has noise. But a joint that is told to rest is at rest:
 where command and perturbation are zero, a repeated value is what Eq. 3 gives, M = K θ. And a joint
-that is told to go on at one velocity has that velocity.
+that is told to go on at one velocity has that velocity. Nor does a coarse velocity hang while the
+angle moves as it says.
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ FEWEST_AT_EXTREME = 3
 ZERO = 1e-6
 """A command below this share of its largest value is none."""
 
+Runs = tuple[NDArray[np.int64], NDArray[np.int64]]
+"""First and last rows of stretches of equal values."""
+
 NEAR = 0.1
 """A velocity no further than this share of the largest command from what it is told obeys it."""
 
@@ -39,11 +43,8 @@ def without_bad_stretches(epoch: Epoch, settings: Settings) -> Epoch:
     diagnostics, levels = settings.diagnostics, settings.diagnostics.levels
     if not any(len(channel) for channel in _fitted(epoch)):
         return epoch
-    found: list[LeftOut] = []
-    if levels.frozen == "exclude":
-        found += frozen_stretches(epoch, diagnostics)
-    if levels.saturation == "exclude":
-        found += saturated_stretches(epoch, diagnostics)
+    frozen, saturated = levels.frozen == "exclude", levels.saturation == "exclude"
+    found = bad_stretches(epoch, diagnostics, frozen=frozen, saturated=saturated)
     if not found:
         return epoch
     without = replace(epoch, left_out=(*epoch.left_out, *sorted(found)))
@@ -55,75 +56,86 @@ def without_bad_stretches(epoch: Epoch, settings: Settings) -> Epoch:
     return bridged(without)
 
 
-def frozen_stretches(epoch: Epoch, settings: DiagnosticsSettings) -> list[LeftOut]:
-    """Return where a channel repeats one value for longer than `max_frozen_s`."""
-    return [
-        LeftOut(start_s, stop_s, f"{channel.name} repeats one value", "frozen")
-        for channel in _fitted(epoch)
-        for start_s, stop_s in zip(*_repetitions(epoch, channel, settings), strict=True)
-        if stop_s - start_s > settings.max_frozen_s
-    ]
+def bad_stretches(
+    epoch: Epoch, settings: DiagnosticsSettings, *, frozen: bool = True, saturated: bool = True
+) -> list[LeftOut]:
+    """Return where a channel repeats one value for too long, or was at the end of its range.
+
+    Parameters
+    ----------
+    epoch : Epoch
+    settings : DiagnosticsSettings
+    frozen : bool
+        Return where one value is repeated for longer than `max_frozen_s`.
+    saturated : bool
+        Return where a channel that was at the end of its range too often was there.
+    """
+    found = []
+    for channel in _fitted(epoch):
+        runs = _runs(channel.values)
+        starts_s, stops_s = _repetitions(epoch, channel, runs, settings)
+        long = stops_s - starts_s > (settings.max_frozen_s if frozen else np.inf)
+        text = f"{channel.name} repeats one value"
+        spans = zip(starts_s[long], stops_s[long], strict=True)
+        found += [LeftOut(float(one), float(two), text, "frozen") for one, two in spans]
+        rows, starts, stops = _at_extremes(epoch, channel, runs, settings)
+        if saturated and 100.0 * rows / len(channel) > settings.max_saturated_percent:
+            text = f"{channel.name} repeats an extreme value"
+            spans = zip(channel.time_s[starts], channel.time_s[stops], strict=True)
+            found += [LeftOut(float(one), float(two), text, "saturation") for one, two in spans]
+    return found
 
 
 def longest_repetition(
     epoch: Epoch, channel: Channel, settings: DiagnosticsSettings
 ) -> tuple[float, float]:
     """Return how long the longest repetition of one value lasts, and when it begins, in s."""
-    starts_s, stops_s = _repetitions(epoch, channel, settings)
+    starts_s, stops_s = _repetitions(epoch, channel, _runs(channel.values), settings)
     if starts_s.size == 0:
         return 0.0, float(channel.time_s[0])
     longest = int(np.argmax(stops_s - starts_s))
     return float(stops_s[longest] - starts_s[longest]), float(starts_s[longest])
 
 
-def saturated_stretches(epoch: Epoch, settings: DiagnosticsSettings) -> list[LeftOut]:
-    """Return where a channel that was at the end of its range too often was there."""
-    found = []
-    for channel in _fitted(epoch):
-        rows, starts, stops = _at_extremes(epoch, channel, settings)
-        if 100.0 * rows / len(channel) <= settings.max_saturated_percent:
-            continue
-        text = f"{channel.name} repeats an extreme value"
-        spans = zip(channel.time_s[starts], channel.time_s[stops], strict=True)
-        found += [LeftOut(float(one), float(two), text, "saturation") for one, two in spans]
-    return found
-
-
 def share_at_extremes(epoch: Epoch, channel: Channel, settings: DiagnosticsSettings) -> float:
     """Return in which share of its samples a channel repeats an extreme value."""
-    return _at_extremes(epoch, channel, settings)[0] / len(channel)
+    return _at_extremes(epoch, channel, _runs(channel.values), settings)[0] / len(channel)
 
 
 def _at_extremes(
-    epoch: Epoch, channel: Channel, settings: DiagnosticsSettings
+    epoch: Epoch, channel: Channel, runs: Runs, settings: DiagnosticsSettings
 ) -> tuple[int, NDArray[np.int64], NDArray[np.int64]]:
     """Return how many samples repeat an extreme, and the first and last row of each such run."""
-    starts, stops = _runs(channel.values)
+    starts, stops = runs
     level = channel.values[starts]
     kept = (stops - starts >= FEWEST_AT_EXTREME - 1) & _in_use(epoch, channel, starts, stops)
-    kept &= (level == np.max(level)) | (level == np.min(level))
+    if np.any(kept):
+        kept &= (level == np.max(channel.values)) | (level == np.min(channel.values))
     for run in np.flatnonzero(kept):
-        kept[run] = not _as_told(epoch, channel, starts[run], stops[run], settings.max_frozen_s)
+        kept[run] = not _moves(epoch, channel, starts[run], stops[run], settings.max_frozen_s)
     return int(np.sum((stops - starts + 1)[kept])), starts[kept], stops[kept]
 
 
 def _repetitions(
-    epoch: Epoch, channel: Channel, settings: DiagnosticsSettings
+    epoch: Epoch, channel: Channel, runs: Runs, settings: DiagnosticsSettings
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return from when to when, in s, a channel repeats a value that nobody told it to keep."""
-    starts, stops = _runs(channel.values)
+    starts, stops = runs
     most_s = settings.max_frozen_s
-    kept = (stops > starts) & _in_use(epoch, channel, starts, stops)
+    kept = _in_use(epoch, channel, starts, stops)
     long = kept & (channel.time_s[stops] - channel.time_s[starts] > most_s)
     for run in np.flatnonzero(long):
-        kept[run] = not _as_told(epoch, channel, starts[run], stops[run], most_s)
+        kept[run] = not _moves(epoch, channel, starts[run], stops[run], most_s)
     return channel.time_s[starts[kept]], channel.time_s[stops[kept]]
 
 
-def _runs(values: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return first and last rows of the stretches of equal values."""
-    changes = np.flatnonzero(np.diff(values) != 0)
-    return np.concatenate(([0], changes + 1)), np.concatenate((changes, [values.size - 1]))
+def _runs(values: NDArray[np.float64]) -> Runs:
+    """Return first and last rows of the stretches of equal values, two rows at least."""
+    same = np.diff(values) == 0
+    if not np.any(same):
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    edges = np.flatnonzero(np.diff(same, prepend=False, append=False))
+    return edges[::2], edges[1::2]
 
 
 def _in_use(
@@ -135,6 +147,27 @@ def _in_use(
     kept = np.asarray(sound(epoch, channel.time_s), dtype=np.int64)
     before = np.concatenate(([0], np.cumsum(kept)))
     return np.asarray(before[stops + 1] > before[starts])
+
+
+def _moves(epoch: Epoch, channel: Channel, start: int, stop: int, within_s: float) -> bool:
+    """Return whether a channel repeats a value because the joint does what that value says."""
+    return _as_the_angle(epoch, channel, start, stop) or _as_told(
+        epoch, channel, start, stop, within_s
+    )
+
+
+def _as_the_angle(epoch: Epoch, channel: Channel, start: int, stop: int) -> bool:
+    """Return whether a velocity is that of the angle, within the step to what is beside it."""
+    if channel.name != "velocity_rad_s" or "angle_rad" not in epoch.channels:
+        return False
+    angle, values = epoch.channels["angle_rad"], channel.values
+    span_s = channel.time_s[[start, stop]]
+    moved_rad = np.diff(np.interp(span_s, angle.time_s, angle.values)).item()
+    if moved_rad == 0.0:
+        return False  # both may hang
+    beside = [row for row in (start - 1, stop + 1) if 0 <= row < values.size]
+    step_rad_s = np.min(np.abs(values[beside] - values[start]), initial=np.inf if beside else 0.0)
+    return bool(abs(moved_rad / np.diff(span_s).item() - values[start]) < step_rad_s)
 
 
 def _as_told(epoch: Epoch, channel: Channel, start: int, stop: int, within_s: float) -> bool:

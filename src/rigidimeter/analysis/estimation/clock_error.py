@@ -9,10 +9,16 @@ remains. It is therefore found by fitting again with the torque moved by the sta
 offset forth and back, and added in quadrature. So it is for the error of a delay that was estimated
 and taken out. All epochs of a source have the same error: it does not become smaller by pooling
 them, but by pooling sources.
+
+At the ticks the acceleration alone is late: hardly with a drive of velocity, by half a tick T/2
+with a motor that holds its torque between them. Where the drive is not known, that much of a delay
+that was taken out may have been the acceleration's. Then velocity and angle are δ too early, and
+J is B δ too high and B is K δ. Every δ from 0 to T/2 is as likely.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -20,7 +26,7 @@ import numpy as np
 import scipy
 
 from rigidimeter.analysis.estimation.method_record import FitEpochs
-from rigidimeter.analysis.estimation.prepared import PreparedEpoch
+from rigidimeter.analysis.estimation.prepared import PreparedEpoch, drive_followed
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.core.records import Delay, Fit
 
@@ -47,6 +53,7 @@ def with_clock_error(
         Where one was corrected, its standard error counts: of two clocks, in place of the offset's.
     """
     corrected = {delay.source: delay.delay_s_se for delay in delays if delay.corrected}
+    moved = [one.epoch.source in corrected for one in epochs]
     sources = [one.epoch.source for one in epochs]
     errors_s = [corrected.get(one.epoch.source, one.epoch.clock_error_s) for one in epochs]
     if not any(errors_s):
@@ -64,11 +71,34 @@ def with_clock_error(
         for sign in (1.0, -1.0)
     )
     alone, pooled = found
-    changes = [(one.value - other.value) / 2 for one, other in zip(early, late, strict=True)]
+    by_error = [(one.value - other.value) / 2 for one, other in zip(early, late, strict=True)]
+    by_drive = [
+        _of_drive(one, own) if there else np.zeros(3)
+        for one, own, there in zip(epochs, alone, moved, strict=True)
+    ]
     return (
-        [_widened(one, [change]) for one, change in zip(alone, changes, strict=True)],
-        [_widened(one, _changes_of_sources(one, alone, changes, sources)) for one in pooled],
+        [_widened(own, both) for own, *both in zip(alone, by_error, by_drive, strict=True)],
+        [
+            _widened(
+                one,
+                [
+                    change
+                    for changes in (by_error, by_drive)
+                    for change in _changes_of_sources(one, alone, changes, sources)
+                ],
+            )
+            for one in pooled
+        ],
     )
+
+
+def _of_drive(prepared: PreparedEpoch, fit: Fit) -> Array:
+    """Return what the standard error of δ changes; nothing where the drive is known."""
+    if drive_followed(prepared):
+        return np.zeros(3)
+    delay_s = 0.5 / prepared.settings.rig.tick_rate_hz / math.sqrt(3.0)
+    _, B, K = fit.value
+    return np.where(fit.se > 0, np.array([B, K, 0.0]) * delay_s, 0.0)
 
 
 def _changes_of_sources(

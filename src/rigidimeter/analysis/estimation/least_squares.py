@@ -15,11 +15,7 @@ import scipy
 from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother
 from rigidimeter.analysis.estimation.linear_solution import solve
 from rigidimeter.analysis.estimation.signals import Array, Signals
-from rigidimeter.analysis.estimation.uncertainty import (
-    Estimate,
-    cramer_rao_coloured,
-    t_interval,
-)
+from rigidimeter.analysis.estimation.uncertainty import cramer_rao_coloured, of_fit
 from rigidimeter.core.records import Fit, Outcome
 
 
@@ -60,15 +56,15 @@ def fit_inertia_damping_stiffness(signals: Signals, inertia_kg_m2: float | None 
     values = solved.values
     degrees = float(residual.size - values.size)
     covariance = float(residual @ residual) / degrees * solved.bread
-    se = np.sqrt(np.diag(covariance))
-    low, high = t_interval(values, se, degrees)
     bound = _bound(signals, regressors, residual)
-    estimate = Estimate(values, se, low, high, bound, covariance)
-    if inertia_kg_m2 is not None:
-        estimate = estimate.with_inertia(inertia_kg_m2)
     total = float(np.sum((torque - torque.mean()) ** 2))
     return Fit(
-        *("", "", "", "", Outcome(), *estimate),
+        source="",
+        epoch="",
+        condition="",
+        method="",
+        outcome=Outcome(),
+        **of_fit(values, covariance, degrees, bound, inertia_kg_m2),
         r_squared=1.0 - float(residual @ residual) / total,
         vaf_percent=100.0 * (1.0 - float(np.var(residual)) / float(np.var(torque))),
         condition_number=solved.condition_number,

@@ -137,6 +137,12 @@ def prepare(
     return [PreparedEpoch(epoch, settings, sources[epoch.source]) for epoch in everything]
 
 
+def drive_followed(prepared: PreparedEpoch) -> bool:
+    """Return whether the motion between the samples is that of a known drive and its command."""
+    known = prepared.source.drive is not None
+    return known and "velocity_command_rad_s" in prepared.epoch.channels
+
+
 def torque_earlier(epoch: Epoch, delay_s: float) -> Epoch:
     """Return the epoch with its torque this much earlier."""
     torque = epoch.channels.get("torque_nm")

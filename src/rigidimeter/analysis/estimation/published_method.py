@@ -23,11 +23,12 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from rigidimeter.analysis.estimation.closedloop.between_finding import NAME
+from rigidimeter.analysis.estimation.amplitude import amplitude_of_signals, amplitude_together
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
     acceleration_seen,
     phases_s,
 )
+from rigidimeter.analysis.estimation.closedloop.between_uncertainty import NAME
 from rigidimeter.analysis.estimation.found import found
 from rigidimeter.analysis.estimation.least_squares import fit_inertia_damping_stiffness
 from rigidimeter.analysis.estimation.method_record import Method, Progress
@@ -133,6 +134,7 @@ def fit_published(
                 method="published",
                 outcome=outcome,
                 findings=seen,
+                **amplitude_of_signals(epoch, signals)._asdict(),
             )
             fits.append(fit)
             if outcome.included:
@@ -187,6 +189,7 @@ def _pooled(
         condition=condition,
         method="published",
         findings=fits[0].findings,
+        **amplitude_together(fits, [fit.n_samples for fit in fits])._asdict(),
     )
 
 

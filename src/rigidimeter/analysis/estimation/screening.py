@@ -27,10 +27,12 @@ def before_fit(epoch: Epoch, settings: EstimationSettings) -> str:
         return "torque_nm was not recorded"
     if not motion:
         return "neither velocity_rad_s nor angle_rad was recorded"
+    ends: dict[str, tuple[float, float]] = {}
     for channel in (torque, *motion):
         if len(channel) < 2:
             return f"{channel.name} holds {len(channel)} sample(s)"
-        if not np.all(np.isfinite(channel.values)):
+        ends[channel.name] = float(np.min(channel.values)), float(np.max(channel.values))
+        if not np.all(np.isfinite(ends[channel.name])):
             bad = int(np.argmin(np.isfinite(channel.values)))
             return (
                 f"{channel.name} is {channel.values[bad]} at {channel.time_s[bad]:.4g} s; "
@@ -57,12 +59,12 @@ def before_fit(epoch: Epoch, settings: EstimationSettings) -> str:
     if reason := too_little(epoch, settings):
         return reason
     for channel in (torque, *motion):
-        largest = float(np.max(np.abs(channel.values)))
+        least, most = ends[channel.name]
+        largest = max(-least, most)
         if largest > LARGEST_VALUE:
             return f"{channel.name} reaches {largest:.3g} {channel.unit}; check its unit"
-    for channel in (torque, *motion):
         # A sensor that is connected shows its noise; one that repeats a number is not measuring.
-        if float(np.ptp(channel.values)) <= 1e-12 * float(np.max(np.abs(channel.values))):
+        if most - least <= 1e-12 * largest:
             return (
                 f"{channel.name} is constant ({channel.values[0]:g} {channel.unit}); "
                 "check that the sensor was connected and its column is the right one"

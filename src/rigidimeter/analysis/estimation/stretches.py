@@ -68,11 +68,14 @@ def bridged(epoch: Epoch) -> Epoch:
 
 def _evenly(channel: Channel, lost: list[LeftOut]) -> Channel:
     """Return a channel with samples where its own are lost, evenly between those around them."""
-    steps_s = np.diff(channel.time_s)
-    if not lost or steps_s.size == 0:
+    if not lost or len(channel) < 2:
         return channel
-    missing = np.maximum(np.rint(steps_s * channel.rate_hz).astype(np.intp) - 1, 0)
-    missing[steps_s < GAP / channel.mean_rate_hz] = 0
+    steps_s = np.diff(channel.time_s)
+    wide = steps_s >= GAP / channel.mean_rate_hz
+    if not np.any(wide):
+        return channel
+    missing = np.where(wide, np.maximum(np.rint(steps_s * channel.rate_hz) - 1, 0), 0)
+    missing = missing.astype(np.intp)
     middle_s = channel.time_s[:-1] + 0.5 * steps_s
     missing[
         ~np.any([(one.start_s < middle_s) & (middle_s < one.stop_s) for one in lost], axis=0)

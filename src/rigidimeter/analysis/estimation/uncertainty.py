@@ -16,7 +16,7 @@ J. Bus. Econ. Stat. 36:541).
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -35,26 +35,37 @@ same at 100 and at 1000 samples/s.
 FEWEST_COSINES = 6
 
 
-class Estimate(NamedTuple):
-    """Parameters and their uncertainty, in the order in which a `Fit` holds them.
+def of_fit(
+    values: Array,
+    covariance: Array,
+    degrees: Array | float,
+    bound: Array,
+    inertia_kg_m2: float | None = None,
+    away: Array | float = 0.0,
+) -> dict[str, Any]:
+    """Return what a `Fit` holds of its parameters, by name.
 
-    `value`, `se`, `low`, `high` and `bound` have shape (p,), `covariance` (p, p).
+    Parameters
+    ----------
+    values : array, shape (p,)
+    covariance : array, shape (p, p)
+    degrees : float or array, shape (p,)
+        Of freedom, for Student's t.
+    bound : array, shape (p,)
+        Least standard errors (Cramér–Rao).
+    inertia_kg_m2 : float, optional
+        J that was held, which has no error, where the parameters are B and K.
+    away : float or array, shape (p,)
+        What both ends of an interval are further out, beside noise.
     """
-
-    value: Array
-    se: Array
-    low: Array
-    high: Array
-    bound: Array
-    covariance: Array
-
-    def with_inertia(self, inertia_kg_m2: float) -> Estimate:
-        """Return the estimate of B and K with the J that was held, which has no error, before."""
-        held = (inertia_kg_m2, 0.0, inertia_kg_m2, inertia_kg_m2, 0.0)
-        value, se, low, high, bound = (
-            np.concatenate(([J], rest)) for J, rest in zip(held, self[:5], strict=True)
-        )
-        return Estimate(value, se, low, high, bound, np.pad(self.covariance, ((1, 0), (1, 0))))
+    se = np.sqrt(np.diag(covariance))
+    half = scipy.special.stdtrit(degrees, 0.975) * se + away
+    found = {"value": values, "se": se, "low": values - half, "high": values + half, "bound": bound}
+    if inertia_kg_m2 is not None:
+        held = {"value": inertia_kg_m2, "low": inertia_kg_m2, "high": inertia_kg_m2}
+        found = {name: np.append(held.get(name, 0.0), rest) for name, rest in found.items()}
+        covariance = np.pad(covariance, ((1, 0), (1, 0)))
+    return {**found, "covariance": covariance}
 
 
 class Scatter(NamedTuple):
@@ -128,14 +139,6 @@ def hac_covariance(bread: Array, scores: Array) -> Scatter:
     count = min(max(round(COSINES * independent ** (2.0 / 3.0)), FEWEST_COSINES), n - 1)
     middle = _cosine_sum(scores, count) * independent / (independent - p)
     return Scatter(bread @ middle @ bread.T, float(count))
-
-
-def t_interval(
-    values: Array, standard_errors: Array, degrees_of_freedom: float
-) -> tuple[Array, Array]:
-    """Return the ends of the 95 % t intervals: values ∓ t · standard errors."""
-    half = float(scipy.special.stdtrit(degrees_of_freedom, 0.975)) * np.asarray(standard_errors)
-    return np.asarray(values) - half, np.asarray(values) + half
 
 
 def cramer_rao_coloured(regressors: Array, density: Array, rate_hz: float) -> Array:

@@ -1,4 +1,4 @@
-"""Recordings of any laboratory, as epochs, and the files of estimates.
+"""Recordings of any laboratory, as epochs, arrays of a notebook, and the files of estimates.
 
 Each name is imported when it is first used: a program that reads estimates needs no reader of
 recordings.
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         write_estimates_json,
     )
     from rigidimeter.analysis.reading.formats import ReadOptions, read_recording
+    from rigidimeter.analysis.reading.from_arrays import identify
     from rigidimeter.analysis.reading.recording import Recording, read
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "ReadOptions",
     "Recording",
     "estimates_document",
+    "identify",
     "read",
     "read_estimates",
     "read_recording",
@@ -43,6 +45,7 @@ __getattr__ = lazy_names(
             "write_estimates_csv",
             "write_estimates_json",
         ),
+        "from_arrays": ("identify",),
         "formats": ("ReadOptions", "read_recording"),
         "recording": ("Recording", "read"),
     },

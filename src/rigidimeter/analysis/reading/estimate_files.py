@@ -11,6 +11,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import csv_text, plain_values, read_json, write_json, write_text
 from rigidimeter.core.findings import finding_from
 from rigidimeter.core.records import (
+    AMPLITUDE,
     BAND_VECTORS,
     PARAMETER_VECTORS,
     PARAMETERS,
@@ -133,6 +134,8 @@ def _fit(row: Mapping[str, Any], method: str) -> Fit:
         for vector, ending in PARAMETER_VECTORS.items()
     }
     numbers |= {name: _number(row[name]) for name in STATISTICS}
+    # Older files have no amplitude.
+    numbers |= {name: _number(row.get(name)) for name in AMPLITUDE}
     return Fit(
         source=str(row["source"]),
         epoch=str(row["epoch"]),

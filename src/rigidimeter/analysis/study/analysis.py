@@ -19,9 +19,8 @@ from rigidimeter.analysis.estimation import (
 from rigidimeter.analysis.estimation.alignment import MOST_EPOCHS, aligned_prepared
 from rigidimeter.analysis.estimation.between_epochs import between_epochs
 from rigidimeter.analysis.estimation.clock_error import with_clock_error
-from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
 from rigidimeter.analysis.estimation.diagnostics import checked, checked_together
-from rigidimeter.analysis.estimation.diagnostics.delay_check import delay_of_drive_s, torque_delay
+from rigidimeter.analysis.estimation.diagnostics.delay_check import with_torque_delay
 from rigidimeter.analysis.estimation.method_record import Progress
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch, prepare
 from rigidimeter.analysis.estimation.scores import line_shares, score_prepared
@@ -201,11 +200,7 @@ def analyse_prepared(
     fits = []
     for prepared, fit in zip(fitted, found, strict=True):
         found_fit = checked(prepared, fit, exclusions_alone=fits_alone)
-        if not fits_alone and closed_loop_obstacle(prepared.epoch):
-            diagnostics, of_drive_s = prepared.settings.diagnostics, delay_of_drive_s(prepared)
-            late = torque_delay(found_fit, delays, of_drive_s, diagnostics)
-            found_fit = replace(found_fit, findings=(*found_fit.findings, *late))
-        fits.append(found_fit)
+        fits.append(found_fit if fits_alone else with_torque_delay(prepared, found_fit, delays))
         progress(0.0 if fits_alone else costs.check)
     counted = [
         prepared.closed_as(fit.outcome)

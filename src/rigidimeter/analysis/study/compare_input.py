@@ -15,6 +15,7 @@ from rigidimeter.analysis.study.comparison import (
     against_reference,
     compare_analysis,
     compare_measures,
+    day_tests,
     measured,
     with_further,
 )
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _FEW_SESSIONS = 10
+_OF_DAY = ("subject", "day")
+"""Columns of a table that say which values belong together."""
 
 
 def compare(
@@ -70,7 +73,8 @@ def compare(
     by : str
         The table's column of conditions.
     session : str, optional
-        The table's column whose labels the bootstrap resamples; by default each row.
+        The table's column whose labels the bootstrap resamples; by default each row, or each
+        subject and day where the table's columns `subject` and `day` have several rows of one.
     key : path, optional
         The blinding key of a study folder that is stored elsewhere.
     settings : Settings, path or mapping, optional
@@ -165,6 +169,9 @@ def _compare_columns(
 ) -> StudyResult:
     """Compare two groups of a table in one column or several.
 
+    Several rows of a subject and day in one group are no independent values: they are tested by
+    days too, as the epochs of a study.
+
     Parameters
     ----------
     table : TextTable
@@ -199,15 +206,24 @@ def _compare_columns(
     )
     further = [name for name in known if name not in names] if pair[1] is None else []
     rows, notices = _kept(table, labels, [*names, *further], by)
+    days = _days(table, labels, rows, by)
+    if days:
+        dayless = [table.lines[k] for k in rows if "" in days[k]]
+        rows = [k for k in rows if "" not in days[k]]
+        if dayless:
+            notices.append(f"{table.source}: no subject or day in {lines_text(dayless)}; left out")
     comparisons = []
     for name in dict.fromkeys(values):
-        one, said = _column(table, name, labels, units, names, rows)
+        one, said = _column(table, name, labels, units, days, names, rows)
         comparisons.append(one)
         notices += said
     tested, differences = compare_measures(
         comparisons, seed=seed, resamples=resamples, progress=progress
     )
     tested, more = with_further(tested, against_reference(tested, further))
+    if days:
+        every = day_tests((*tested, *more))
+        tested, more = every[: len(tested)], every[len(tested) :]
     for each in (*tested, *more) if units is not None else ():
         count = min(len({o.unit for o in each.of(group)}) for group in each.pair)
         if count < _FEW_SESSIONS:
@@ -249,11 +265,27 @@ def _kept(
     return rows, notices
 
 
+def _days(
+    table: TextTable, labels: Sequence[str], rows: Sequence[int], by: str
+) -> list[tuple[str, str]]:
+    """Return subject and day of every row, the same for all where there is no column of it.
+
+    Nothing where no subject and day has two of the rows in one group.
+    """
+    there = [name for name in _OF_DAY if name in table.columns and name != by]
+    alike = ("1",) * len(labels)
+    subjects, days = (table.columns[name] if name in there else alike for name in _OF_DAY)
+    found = list(zip(subjects, days, strict=True))
+    seen = [(labels[row], found[row]) for row in rows]
+    return found if there and len(set(seen)) < len(seen) else []
+
+
 def _column(
     table: TextTable,
     name: str,
     labels: Sequence[str],
     units: Sequence[str] | None,
+    days: Sequence[tuple[str, str]],
     names: tuple[str, str],
     rows: Sequence[int],
 ) -> tuple[Comparison, list[str]]:
@@ -261,11 +293,15 @@ def _column(
     for row in rows:
         line = table.lines[row]
         value = table.number(name, row)
-        unit = units[row] if units is not None else f"line {line}"
+        of_day = "/".join(days[row]) if days else f"line {line}"
+        unit = units[row] if units is not None else of_day
         if value is None or not unit:
             missing.append(line)
         else:
-            observations.append(Observation(value, labels[row], epoch=f"line {line}", unit=unit))
+            subject, day = days[row] if days else ("", "")
+            observations.append(
+                Observation(value, labels[row], subject, day, epoch=f"line {line}", unit=unit)
+            )
     found = measured(Measure(name, name, "", "column"), observations, names)
     for group in names:
         if not found.summaries[group].n:

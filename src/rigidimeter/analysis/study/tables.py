@@ -26,6 +26,7 @@ from rigidimeter.analysis.study.results import StudyResult
 from rigidimeter.analysis.study.statements import lead, statements
 from rigidimeter.analysis.study.traffic_light import traffic_light
 from rigidimeter.core.files import csv_text, plain_values
+from rigidimeter.core.records import AMPLITUDE
 
 COMPARISON_SCHEMA = "rigidimeter.comparison/3"
 
@@ -193,7 +194,8 @@ def _estimates(result: StudyResult) -> Iterator[dict[str, Any]]:
         cautions = dict.fromkeys(f["name"] for f in findings if f["level"] != "note")
         # A number that does not exist is null.
         numbers = [name for name in two if isinstance(two[name], float | None)]
-        beside = {name: two[name] for name in ("outcome", "reason", *numbers) if name != "band_hz"}
+        same = ("band_hz", *AMPLITUDE)
+        beside = {name: two[name] for name in ("outcome", "reason", *numbers) if name not in same}
         yield (
             whose.get(one["source"], {})
             | one

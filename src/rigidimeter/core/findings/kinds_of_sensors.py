@@ -133,9 +133,10 @@ SENSOR_KINDS = (
     ),
     Kind(
         "velocity_delay",
-        "delay of velocity relative to angle, in ms",
+        "delay τ of velocity relative to angle, in ms; also below the key where it moves B by more "
+        "than half its interval (by K τ)",
         headline="The velocity lags the angle by {value:.2g} ms",
-        measured="velocity_rad_s lags angle_rad by {value:.2g} ms (at most {limit:g} ms either "
+        measured="velocity_rad_s lags angle_rad by {value:.2g} ms (at most {limit:.2g} ms either "
         "way).",
         meaning="A filter or a buffer moved one of them, and B and K take each other's part.",
         remedy="Correct the time stamps, or leave velocity_rad_s out: it is then made from the "

@@ -24,6 +24,7 @@ from rigidimeter.core.records.epochs import (
     readonly,
 )
 from rigidimeter.core.records.estimates import (
+    AMPLITUDE,
     BAND_VECTORS,
     FIT_NUMBERS,
     PARAMETER_VECTORS,
@@ -33,4 +34,5 @@ from rigidimeter.core.records.estimates import (
     Delay,
     Fit,
     Score,
+    degrees,
 )

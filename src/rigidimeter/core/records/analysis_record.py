@@ -17,6 +17,7 @@ from rigidimeter.core.records.estimates import (
     Delay,
     Fit,
     Score,
+    degrees,
 )
 from rigidimeter.core.words import (
     epochs_text,
@@ -45,6 +46,7 @@ _READ = (
     "epoch",
     "condition",
     *(p.name + ending for p in PARAMETERS for ending in ("", "_se")),
+    "angle_rms_rad",
     "vaf_percent",
     "outcome",
 )
@@ -57,6 +59,10 @@ WEIGHT_IN_STIFFNESS = (
     "K is the slope of all torque against the angle. Unless the axis is vertical it includes that "
     "of the weight, m g l cos θ with θ from hanging straight down"
 )
+
+
+STIFFNESS_HOLDS = "holds the limb's weight"
+"""`WEIGHT_IN_STIFFNESS` in few words, after "K"."""
 
 
 class FindingGroup(NamedTuple):
@@ -185,9 +191,41 @@ class Analysis:
         """What K holds of the limb's weight, as a sentence without its stop; empty without fits."""
         if not self.fits:
             return ""
-        if any(group.finding.name == "gravity" for group in self.findings):
+        if self._weight_known:
             return f"{WEIGHT_IN_STIFFNESS}; the note `gravity` of each epoch gives K without it"
         return f"{WEIGHT_IN_STIFFNESS}; set diagnostics.gravity_nm to have K without it too"
+
+    @property
+    def _weight_known(self) -> bool:
+        return any(group.finding.name == "gravity" for group in self.findings)
+
+    @property
+    def stiffness_words(self) -> str:
+        """Which K is given and at what motion, in few words after "K"; empty without fits.
+
+        With several conditions the SD of the angle in each, and the largest range of all.
+        """
+        if not self.fits:
+            return ""
+        without = " (note gravity: without)" if self._weight_known else ""
+        pooled = [fit for fit in self.pooled if fit.condition] or self.pooled[-1:]
+        names = " in {}" if len(pooled) > 1 else ""
+        sds = [
+            f"{rms}°{names.format(fit.condition)}"
+            for fit in pooled
+            if (rms := degrees(fit.angle_rms_rad))
+        ]
+        widest_rad = max(
+            (fit.angle_range_rad for fit in self.fits if math.isfinite(fit.angle_range_rad)),
+            default=math.nan,
+        )
+        widest = degrees(widest_rad)
+        motion = one_line(
+            f"angle SD {', '.join(sds)}" if sds else "",
+            f"range up to {widest}°" if widest else "",
+            joint=", ",
+        )
+        return one_line(f"{STIFFNESS_HOLDS}{without}", motion, joint="; ")
 
     def rows(self) -> list[dict[str, Any]]:
         """Return one row for each fitted epoch: the fit, and B and K at fixed inertia beside it.
@@ -219,8 +257,8 @@ class Analysis:
         ----------
         full : bool
             All columns of ``rigidimeter estimate --csv``. Otherwise source, epoch and condition,
-            J, B and K with their standard errors, the VAF in %, the outcome, and the names of the
-            findings that are more than a note.
+            J, B and K with their standard errors, the RMS of the angle, the VAF in %, the
+            outcome, and the names of the findings that are more than a note.
 
         Returns
         -------
@@ -333,9 +371,10 @@ class Analysis:
             heading = ["epoch", "condition"]
             heading += [f"{p.symbol}, {p.unit}" for p in PARAMETERS]
             shown = [*self.fits[:_MAX_SHOWN], *self.pooled]
-            heading += ["VAF, %", "outcome", "findings"]
+            heading += ["angle SD, °", "VAF, %", "outcome", "findings"]
             parts.append(html_table(heading, [_fit_row(fit, names) for fit in shown]))
-            parts.append("<p>J, B and K ± one standard error; all epochs: 95\xa0% intervals.</p>")
+            about = "J, B and K ± one standard error; all epochs: 95\xa0% intervals."
+            parts.append(f"<p>{about} K {escape(self.stiffness_words)}.</p>")
         if len(self.fits) > _MAX_SHOWN:
             parts.append(f"<p>The first {_MAX_SHOWN} of {len(self.fits)} epochs.</p>")
         if self.findings:
@@ -376,4 +415,5 @@ def _fit_row(fit: Fit, names: Mapping[str, str]) -> list[str]:
     name = "all epochs" if pooled else f"{names[fit.source]}, {fit.epoch}"
     outcome = f"{fit.outcome.kind} {fit.outcome.reason}"
     vaf = "–" if math.isnan(fit.vaf_percent) else f"{fit.vaf_percent:.1f}"
-    return [name, fit.condition, *numbers, vaf, outcome, ", ".join(fit.cautions)]
+    angle = degrees(fit.angle_rms_rad) or "–"
+    return [name, fit.condition, *numbers, angle, vaf, outcome, ", ".join(fit.cautions)]

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from rigidimeter.core.findings import Finding, Three
 from rigidimeter.core.records.epochs import Outcome, readonly
-from rigidimeter.core.words import html_table, interval_text, one_cell, one_line, with_error
+from rigidimeter.core.units import deg_from_rad
+from rigidimeter.core.words import html_table, interval_text, number, one_cell, one_line, with_error
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -42,17 +43,25 @@ PARAMETER_VECTORS = {"value": "", "se": "_se", "low": "_low", "high": "_high", "
 STATISTICS = ("r_squared", "vaf_percent", "condition_number", "residual_sd_nm")
 """How well a fit explains the torque, beside its parameters."""
 
+AMPLITUDE = ("angle_rms_rad", "angle_range_rad")
+"""How far the joint moved: stiffness of muscle falls with it."""
+
 FIT_NUMBERS = (
     *(p.name + ending for p in PARAMETERS for ending in PARAMETER_VECTORS.values()),
     *STATISTICS,
 )
-"""The numbers of a fit, as files and tables name them."""
+"""The numbers of a fit, as files and tables name them; beside them stands its `AMPLITUDE`."""
 
 SCORE_NUMBERS = ("impulse_nm_s", "work_j", "frequency_hz", "n_cycles")
 """The numbers of a score, as files and tables name them."""
 
 BAND_VECTORS = {"value": "", "change": "_change", "change_se": "_change_se", "p": "_p"}
 """What is known of each parameter, and how the names of it end in files and tables."""
+
+
+def degrees(angle_rad: float) -> str:
+    """Return an angle in degrees with three digits, without the sign °; empty for NaN."""
+    return "" if math.isnan(angle_rad) else number(deg_from_rad(angle_rad), 3)
 
 
 class _Entry:
@@ -103,6 +112,13 @@ class Fit:
         Samples that entered the fit, after trimming.
     band_hz : (float, float)
         The band in which the fit was made; (0, Nyquist) for the unfiltered signals of `published`.
+    angle_rms_rad : float
+        RMS of the angle about its mean, in the band of the fit. Of a pooled fit over the samples of
+        all epochs, each about its own mean.
+    angle_range_rad : float
+        Largest less smallest measured angle, of all frequencies, in the part of the epoch that was
+        fitted; NaN where the angle was not measured. Of a pooled fit that of the epoch in which it
+        is largest.
     """
 
     source: str
@@ -123,6 +139,8 @@ class Fit:
     n_samples: int = 0
     band_hz: tuple[float, float] = (math.nan, math.nan)
     findings: tuple[Finding, ...] = ()
+    angle_rms_rad: float = math.nan
+    angle_range_rad: float = math.nan
 
     inertia_kg_m2 = _Entry("value", 0)
     inertia_kg_m2_se = _Entry("se", 0)
@@ -173,15 +191,17 @@ class Fit:
 
     @property
     def words(self) -> str:
-        """Method, band, VAF, epoch, outcome and findings, as one line."""
+        """Method, band, VAF, SD of the angle, epoch, outcome and findings, as one line."""
         low, high = self.band_hz
         band = f"{low:.3g}–{high:.3g} Hz" if math.isfinite(high) else ""
         vaf = f"VAF {self.vaf_percent:.1f} %" if math.isfinite(self.vaf_percent) else ""
+        rms = degrees(self.angle_rms_rad)
+        angle = f"angle SD {rms}°" if rms else ""
         label = "all epochs" if self.epoch == "pooled" else f"epoch {self.epoch}"
         outcome = f"{self.outcome.kind}: {self.outcome.reason}" * (not self.outcome.included)
         found = f"findings: {', '.join(self.cautions)}" if self.cautions else ""
         return one_line(
-            one_line(self.method, band, vaf, joint=", "),
+            one_line(self.method, band, vaf, angle, joint=", "),
             one_line(label, self.condition, joint=" "),
             outcome,
             found,
@@ -238,7 +258,7 @@ class Fit:
 
     def row(self) -> dict[str, Any]:
         """Return the names and numbers of the fit, as files and tables have them."""
-        numbers = {name: getattr(self, name) for name in FIT_NUMBERS}
+        numbers = {name: getattr(self, name) for name in (*FIT_NUMBERS, *AMPLITUDE)}
         return _named(self) | numbers | {"n_samples": self.n_samples}
 
 

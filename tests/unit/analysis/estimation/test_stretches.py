@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.analysis.estimation.bad_stretches import (
-    frozen_stretches,
-    saturated_stretches,
+    bad_stretches,
     without_bad_stretches,
 )
 from rigidimeter.analysis.estimation.diagnostics import checked
@@ -125,10 +124,13 @@ def held(**extra):
 
 
 def found_in(epoch):
-    diagnostics = SETTINGS.diagnostics
     frozen, saturated = (
-        {stretch.reason.split()[0] for stretch in find(epoch, diagnostics)}
-        for find in (frozen_stretches, saturated_stretches)
+        {
+            stretch.reason.split()[0]
+            for stretch in bad_stretches(epoch, SETTINGS.diagnostics)
+            if stretch.check == check
+        }
+        for check in ("frozen", "saturation")
     )
     return frozen, saturated
 
@@ -156,6 +158,16 @@ def test_a_velocity_that_is_not_the_one_told_is_one():
     stuck = ramps().channels["velocity_rad_s"].values.copy()
     stuck[stuck != 0] *= 0.5
     assert found_in(ramps(velocity_rad_s=stuck)) == ({"velocity_rad_s"}, {"velocity_rad_s"})
+
+
+def test_a_coarse_velocity_is_no_broken_sensor_while_the_angle_moves_as_it_says():
+    time_s = np.arange(0.0, 20.0, 1 / RATE_HZ)
+    omega = 2 * np.pi * 0.4
+    angle, velocity = 0.4 * np.sin(omega * time_s), 0.4 * omega * np.cos(omega * time_s)
+    coarse = {"angle_rad": angle, "velocity_rad_s": np.round(velocity / 0.2) * 0.2}
+    assert found_in(an_epoch(**coarse)) == (set(), set())
+    clipped = {"angle_rad": angle, "velocity_rad_s": np.clip(velocity, -0.8, 0.8)}
+    assert found_in(an_epoch(**clipped)) == ({"velocity_rad_s"}, {"velocity_rad_s"})
 
 
 def test_a_joint_that_rests_though_something_moves_it_is_one():

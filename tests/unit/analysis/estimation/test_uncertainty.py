@@ -8,7 +8,7 @@ from rigidimeter.analysis.estimation.uncertainty import (
     correlation_samples,
     cramer_rao_coloured,
     hac_covariance,
-    t_interval,
+    of_fit,
 )
 
 JOINT = np.array([0.0045, 0.1368, 1.751])
@@ -76,10 +76,15 @@ def coverage(noise, seeds, covers):
     return 100 * np.mean(held, axis=0)
 
 
+def interval(error, covariance, degrees):
+    found = of_fit(error, covariance, degrees, np.zeros(error.size))
+    return found["low"], found["high"]
+
+
 def by_hac(A, e, rng):
     bread, error, scores = fitted(A, e)
     found = hac_covariance(bread, scores)
-    return t_interval(error, found.standard_errors, found.degrees_of_freedom)
+    return interval(error, found.covariance, found.degrees_of_freedom)
 
 
 @pytest.mark.parametrize("noise", [white, first_order, voluntary])
@@ -94,8 +99,7 @@ def test_textbook_intervals_do_not_hold():
     # So that the test above is seen to tell: σ² (AᵀA)⁻¹ takes each of 2000 samples for independent.
     def by_textbook(A, e, rng):
         bread, error, _ = fitted(A, e)
-        deviation = np.sqrt(np.diag(bread) * np.mean((e - A @ error) ** 2))
-        return t_interval(error, deviation, e.size - 3)
+        return interval(error, bread * np.mean((e - A @ error) ** 2), e.size - 3)
 
     assert np.all(coverage(voluntary, range(100), by_textbook)[1:] < 75.0)
 

@@ -42,6 +42,27 @@ def test_noise_of_the_angle_does_not_make_the_inertia_small(measured):
     assert fit.value == pytest.approx(TRUTH, rel=0.01)
 
 
+@pytest.mark.parametrize(
+    ("swing", "reason"),
+    [
+        ({"angle_rad": 0.1}, "the motion that is fitted cannot distinguish J, B and K"),
+        (
+            {"angle_rad": 0.1, "velocity_rad_s": 1e-300},
+            "nothing moved the joint in the band of the fit",
+        ),
+    ],
+    ids=["one sine", "no velocity"],
+)
+def test_a_refusal_does_not_speak_of_a_perturbation_that_is_not_used(swing, reason):
+    time_s = np.arange(5000) / 500
+    sine = np.sin(2 * np.pi * 2 * time_s)
+    torque = 0.175 * sine + 0.0137 * np.gradient(sine, time_s)
+    values = {"torque_nm": torque, **{name: size * sine for name, size in swing.items()}}
+    channels = {name: Channel(name, time_s, value) for name, value in values.items()}
+    fit = fit_epoch(Epoch("made", "1", channels, task="prbs"), "bandlimited", SETTINGS)
+    assert fit.outcome.reason == reason
+
+
 def test_torque_of_the_subject_does_not_bias_it_and_the_interval_holds_what_is_left():
     """Forty epochs of torque and angle alone: 95 % of the intervals hold each of J, B, K."""
     settings = parse_settings({"subject": {"OFF": {"voluntary_sd_nm": 0.2}}})
@@ -69,7 +90,7 @@ def test_a_drive_that_is_not_known_moves_it_as_that_of_the_settings():
     command -= np.convolve(command, np.ones(1000) / 1000, "same")
     moved = drive.held(command, interval_s)
     torque = TRUTH @ [moved.acceleration_rad_s2, moved.velocity_rad_s, moved.angle_rad]
-    torque += 1e-4 * rng.standard_normal(n)
+    torque += 5e-5 * rng.standard_normal(n)
     values = {
         "torque_nm": torque,
         "velocity_rad_s": moved.velocity_rad_s,

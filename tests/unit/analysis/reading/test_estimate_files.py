@@ -29,6 +29,7 @@ GOOD = Fit(
     high=(0.00452, 0.132, 1.74), bound=(9e-6, 9e-4, 0.019),
     r_squared=0.99, vaf_percent=99.1, condition_number=3.2, residual_sd_nm=0.004,
     n_samples=18000, band_hz=(0.15, 10.0), findings=(FOUND,),
+    angle_rms_rad=0.04, angle_range_rad=0.2,
 )  # fmt: skip
 POOLED = replace(GOOD, epoch="pooled")
 FAILED = Fit("a.csv", "2", "", "bandlimited", Outcome("failed", "torque_nm is constant"))
@@ -125,6 +126,16 @@ def test_one_condition_is_pooled_once(tmp_path):
 def test_estimates_are_read_back_equal(tmp_path):
     write_estimates_json(tmp_path / "e.json", ANALYSIS)
     assert_equal(asdict(read_estimates(tmp_path / "e.json")), asdict(ANALYSIS))
+
+
+def test_a_file_without_the_amplitude_is_read(tmp_path):
+    write_estimates_json(tmp_path / "e.json", ANALYSIS)
+    document = json.loads((tmp_path / "e.json").read_text())
+    for row in (*document["epochs"], *document["fixed_inertia"]["epochs"], document["pooled"]):
+        del row["angle_rms_rad"], row["angle_range_rad"]
+    (tmp_path / "e.json").write_text(json.dumps(document))
+    fit, _ = read_estimates(tmp_path / "e.json").fits
+    assert fit == replace(GOOD, angle_rms_rad=math.nan, angle_range_rad=math.nan)
 
 
 def test_findings_of_the_schema_before_are_read(tmp_path):

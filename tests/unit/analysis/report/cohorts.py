@@ -193,6 +193,8 @@ def _fill(
                 residual_sd_nm=0.02,
                 n_samples=4501,
                 band_hz=(0.15, 30.0),
+                angle_rms_rad=0.04,
+                angle_range_rad=0.2,
             )
         )
         epochs.append(

@@ -28,7 +28,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 import scipy
 
-from rigidimeter.analysis.estimation.closedloop.line_noise import Complex, Smoother, line_covariance
+from rigidimeter.analysis.estimation.closedloop.line_noise import Complex, Smoother, Solved
+from rigidimeter.analysis.estimation.closedloop.normal_equations import scaled_inverse
 from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.core.settings import FEWEST_LINES
@@ -96,6 +97,7 @@ class _Weighted(NamedTuple):
     instruments: Complex  # divided by the power
     smoother: Smoother
     residual: Complex
+    density: Array  # the power of the noise, without the power that the fit has taken
 
 
 def band_changes(members: Sequence[Member]) -> tuple[Array, list[BandChange]]:
@@ -108,7 +110,7 @@ def band_changes(members: Sequence[Member]) -> tuple[Array, list[BandChange]]:
 
     Raises
     ------
-    numpy.linalg.LinAlgError
+    ValueError
         If the epochs cannot distinguish J, B and K.
     """
     weighted = [_weighted(member) for member in members]
@@ -118,13 +120,14 @@ def band_changes(members: Sequence[Member]) -> tuple[Array, list[BandChange]]:
         used = one.instruments[fitted].conj().T
         gram += (used @ lines.motion[fitted]).real
         moment += (used @ lines.torque_nm[fitted]).real
-    inverse = _inverse(gram)
+    inverse = scaled_inverse(gram)
     values = inverse @ moment
-    left = [
-        one._replace(residual=one.member.lines.torque_nm - one.member.lines.motion @ values)
-        for one in weighted
-    ]
-    own = [_own(one) for one in left]
+    own = [_own(one) for one in weighted]
+    left = []
+    for one, effect in zip(weighted, own, strict=True):
+        residual = one.member.lines.torque_nm - one.member.lines.motion @ values
+        density = _solved(one, effect).density(residual, one.smoother)
+        left.append(one._replace(residual=residual, density=density))
     first = left[0].member
     changes = []
     for low, high, part in _variants(first):
@@ -142,7 +145,7 @@ def _weighted(member: Member) -> _Weighted:
     smoother = Smoother.over(lines.grid.line, SMOOTHED, NEIGHBOURS)
     least = LEAST_POWER * float(np.max(np.abs(lines.torque_nm) ** 2))
     power = np.maximum(smoother(np.abs(residual) ** 2), least)
-    return _Weighted(member, power, member.instruments / power[:, None], smoother, residual)
+    return _Weighted(member, power, member.instruments / power[:, None], smoother, residual, power)
 
 
 def _variants(member: Member) -> list[tuple[float, float, Part]]:
@@ -183,26 +186,30 @@ def _change(
             used = one.instruments[within]
             grams.append((used.conj().T @ one.member.lines.motion[within]).real)
             effects.append(_only(one.instruments, within))
-    inverse = _inverse(np.sum(grams, axis=0))
+    inverse = scaled_inverse(np.sum(grams, axis=0))
     change, variance, squares = np.zeros(3), np.zeros(3), np.zeros(3)
     for one, effect, of_epoch, gram in zip(weighted, effects, own, grams, strict=True):
         difference = (effect - of_epoch @ gram.T) @ inverse.T
         change += (difference.conj().T @ one.residual).real
-        covariance, degrees = line_covariance(
-            np.eye(3), difference, one.residual, one.smoother, one.power
-        )
-        spread = one.member.lines.grid.spread
-        variance += spread * np.diag(covariance)
-        squares += (spread * np.diag(covariance)) ** 2 / (degrees / spread)
+        solved = _solved(one, difference)
+        covariance, degrees = solved.covariance(one.density, one.smoother)
+        variance += np.diag(covariance)
+        squares += np.diag(covariance) ** 2 / degrees
     se = np.sqrt(variance)
     p = 2 * scipy.stats.t.sf(np.abs(change) / se, variance**2 / squares)
     return change, se, np.asarray(p, dtype=np.float64)
 
 
+def _solved(one: _Weighted, effect: Complex) -> Solved:
+    """Return estimates on which the lines have these effects."""
+    lines = one.member.lines
+    return Solved(np.eye(3), effect, lines.motion, one.power, lines.grid.spread)
+
+
 def _own(one: _Weighted) -> Complex:
     """Return the effects of the lines on the epoch's own estimate in the band of the fit."""
     used = _only(one.instruments, one.member.fitted)
-    return np.asarray(used @ _inverse((used.conj().T @ one.member.lines.motion).real).T)
+    return np.asarray(used @ scaled_inverse((used.conj().T @ one.member.lines.motion).real).T)
 
 
 def _only(values: Complex, within: slice) -> Complex:
@@ -225,9 +232,3 @@ def _halved_adjoint(weights: Complex, sign: int) -> Complex:
     beside[:-1] = weights[1:]
     beside[1:] -= weights[:-1]
     return np.asarray(0.5 * weights - sign * beside / 4j)
-
-
-def _inverse(gram: Array) -> Array:
-    """Invert a matrix whose columns differ by orders of magnitude."""
-    scale = np.sqrt(np.abs(np.diag(gram)))
-    return np.asarray(np.linalg.inv(gram / np.outer(scale, scale)) / np.outer(scale, scale))

@@ -17,13 +17,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.closedloop.between_finding import between_finding
-from rigidimeter.analysis.estimation.closedloop.linear_problems import Problem
+from rigidimeter.analysis.estimation.closedloop.normal_equations import (
+    Problem,
+    solution,
+    sums,
+)
 from rigidimeter.analysis.estimation.closedloop.observation import Observation
+from rigidimeter.analysis.estimation.found import found
 from rigidimeter.analysis.estimation.signals import Array
-from rigidimeter.core.findings import Finding
+from rigidimeter.core.findings import Effect, Finding
 from rigidimeter.core.records import Epoch
 from rigidimeter.core.settings import DiagnosticsSettings
+
+NAME = "between_samples"
 
 UNSETTLED = 0.1
 """A parameter that another drive changes by more than this share hangs on the drive."""
@@ -40,23 +46,21 @@ def moved_elsewhere(problems: Sequence[Problem], powers: Sequence[Array], values
     values : array, shape (p,)
         The solution of the problems.
     """
-    moved = [one.observation.otherwise if one.observation else () for one in problems]
-    p, count = values.size, max(map(len, moved))
+    moved = [problem.observation.otherwise for problem in problems]
+    count = max(map(len, moved))
     if not count:
-        return np.zeros(p)
-    grams, moments = np.zeros((count, p, p)), np.zeros((count, p))
+        return np.zeros(values.size)
+    gram, moment, _ = sums(problems, powers)
+    grams, moments = np.repeat(gram[None], count, axis=0), np.repeat(moment[None], count, axis=0)
+    # Another motion adds its difference to the sums.
     for problem, power, more in zip(problems, powers, moved, strict=True):
-        weighted, held = (problem.instruments / power[:, None]).conj().T, len(problem.held)
-        grams += (weighted @ problem.regressors).real
-        moments += (weighted @ problem.target).real
-        if len(more):
-            added = (weighted @ more).real
-            grams[: len(more)] += added[:, :, held:]
-            moments[: len(more)] -= added[:, :, :held] @ np.array(problem.held)
-    size = np.sqrt(np.abs(np.diagonal(grams, axis1=1, axis2=2)))
-    scaled = np.linalg.pinv(grams / (size[:, :, None] * size[:, None, :]))
-    found = (scaled @ (moments / size)[:, :, None])[:, :, 0] / size
-    without, *others = np.abs(found - values)
+        held = len(problem.held)
+        target = -(more[:, :, :held] @ np.array(problem.held)) if held else 0 * problem.target
+        change = problem._replace(regressors=more[:, :, held:], target=target)
+        added, more_moment, _ = sums([change], [power])
+        grams[: len(more)] += added
+        moments[: len(more)] += more_moment
+    without, *others = np.abs(solution(grams, moments) - values)
     most = np.max(others, axis=0)
     return np.asarray(
         np.where(most > UNSETTLED * np.abs(values), np.maximum(most, 2 * without), most)
@@ -80,8 +84,26 @@ def between_samples(
         The parameters, J first unless it was held, and how far they may be elsewhere.
     settings : DiagnosticsSettings
     """
+    most, known = settings.max_between_samples_percent, observation.drive_known
+    condition = epoch.condition
+    if not known and {"velocity_command_rad_s", "velocity_rad_s"} <= set(epoch.channels):
+        return (found(NAME, settings, np.nan, most, condition=condition, variant="no_drive"),)
     share = 100.0 * between / np.abs(values)
     percent = np.concatenate([np.zeros(3 - values.size), share])  # J that was held is not moved
     # Of a drive that is not known J says most: it is what the torque does not see between samples.
-    about = int(np.argmax(percent)) if observation.drive_known else 0
-    return between_finding(epoch, percent, about, observation.drive_known, settings)
+    about = int(np.argmax(percent)) if known else 0
+    if percent[about] <= most:
+        return ()
+    J, B, K = percent.tolist()
+    return (
+        found(
+            NAME,
+            settings,
+            float(percent[about]),
+            most,
+            condition=condition,
+            effect=Effect((J, B, K)),
+            facts={"symbol": "JBK"[about]},
+            variant="" if known else "of_settings",
+        ),
+    )

@@ -12,32 +12,33 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 
-from rigidimeter.analysis.estimation.closedloop.between_uncertainty import between_samples
+from rigidimeter.analysis.estimation.amplitude import amplitude_of_lines, amplitude_together
+from rigidimeter.analysis.estimation.closedloop.between_uncertainty import (
+    between_samples,
+    moved_elsewhere,
+)
+from rigidimeter.analysis.estimation.closedloop.line_noise import power_on
 from rigidimeter.analysis.estimation.closedloop.linear_problems import (
     Linearise,
-    Problem,
     holding,
     least_squares_start,
 )
+from rigidimeter.analysis.estimation.closedloop.loop_pull import loop_pull
 from rigidimeter.analysis.estimation.closedloop.observation import Observation
-from rigidimeter.analysis.estimation.closedloop.refine import (
-    SHARED_FROM,
-    LineFit,
-    fit_pooled,
-    fit_single,
-)
+from rigidimeter.analysis.estimation.closedloop.refine import LineFit, fit_at, fit_lines
 from rigidimeter.analysis.estimation.method_record import Progress
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.screening import after_fit, unusable
 from rigidimeter.analysis.estimation.signals import Array
-from rigidimeter.analysis.estimation.uncertainty import Estimate
+from rigidimeter.analysis.estimation.uncertainty import of_fit
 from rigidimeter.core.records import Epoch, Fit
-from rigidimeter.core.settings import Settings
 
 WORST_R_SQUARED = -10.0
 """A subject who pushes may turn R² negative; one far below says that a channel is wrong."""
+
+SHARED_FROM = 4
+"""From this many epochs on, they share the shape of their noise."""
 
 POOLED_SHARE = 0.9
 """The share of the work that is done once the epochs of a condition are fitted together."""
@@ -60,14 +61,6 @@ class LineMethod(NamedTuple):
     linearise: Linearise
 
 
-class _Member(NamedTuple):
-    """An epoch that could be observed, and its place among all."""
-
-    place: int
-    epoch: Epoch
-    observation: Observation
-
-
 def fit_closed_loop(
     method: LineMethod,
     epochs: Sequence[PreparedEpoch],
@@ -79,178 +72,128 @@ def fit_closed_loop(
 
     Parameters and values are those of `method_record.FitEpochs`.
     """
-    fits: dict[int, Fit] = {}
-    groups: dict[str, list[_Member]] = {}
-    for place, prepared in enumerate(epochs):
+    if inertia_kg_m2 is not None:
+        method = method._replace(linearise=holding(method.linearise, inertia_kg_m2))
+    fits: dict[PreparedEpoch, Fit] = {}
+    groups: dict[str, list[PreparedEpoch]] = {}
+    for epoch in epochs:
         try:
-            observation = prepared.once(method.observe)
+            epoch.once(method.observe)
         except ValueError as error:
-            fits[place] = _without_numbers(prepared.epoch, method.name, str(error))
+            fits[epoch] = _without_numbers(epoch.epoch, method.name, str(error))
             progress(1.0)
-            continue
-        member = _Member(place, prepared.epoch, observation)
-        groups.setdefault(prepared.epoch.condition, []).append(member)
+        else:
+            groups.setdefault(epoch.epoch.condition, []).append(epoch)
     of_conditions = []
     for condition, members in groups.items():
-        settings = epochs[members[0].place].settings
-        own, together = _fit_condition(
-            method, condition, members, settings, inertia_kg_m2, progress
-        )
-        fits |= own
-        of_conditions += together
+        good = [member for member in members if member.epoch.closed.included]
+        places = {member: place for place, member in enumerate(good)}
+        start = _start(method, good or members, inertia_kg_m2)
+        shared = _shared(method, good, start)
+        progress(POOLED_SHARE * len(members))
+        # Few epochs do not know the shape of their noise together any better than each alone.
+        known = shared if len(good) >= SHARED_FROM else None
+        for member in members:
+            try:
+                if known is not None and member in places:
+                    place = places[member]
+                    fit = fit_at([known.problems[place]], [known.powers[place]])
+                else:
+                    fit = _alone(method, member, start if shared is None else shared.values, known)
+            except ValueError as error:
+                fits[member] = _without_numbers(member.epoch, method.name, str(error))
+            else:
+                fits[member] = _fit_of(method, [member], fit, inertia_kg_m2)
+            progress(1.0 - POOLED_SHARE)
+        if pooled and shared is not None:
+            together = _fit_of(method, good, shared, inertia_kg_m2)
+            of_conditions.append(replace(together, epoch="pooled", condition=condition))
     if pooled and len(groups) > 1:
         counting = [m for members in groups.values() for m in members if m.epoch.closed.included]
-        of_conditions += _fit_all(method, counting, epochs[0].settings, inertia_kg_m2)
-    return [fits[place] for place in range(len(epochs))], of_conditions if pooled else []
+        start = _start(method, counting, inertia_kg_m2) if counting else np.empty(0)
+        everything = _shared(method, counting, start)
+        if everything is not None:
+            found = _fit_of(method, counting, everything, inertia_kg_m2)
+            of_conditions.append(replace(found, epoch="pooled", condition="", findings=()))
+    return [fits[epoch] for epoch in epochs], of_conditions
 
 
-def _fit_condition(
-    method: LineMethod,
-    condition: str,
-    members: Sequence[_Member],
-    settings: Settings,
-    inertia_kg_m2: float | None,
-    progress: Progress,
-) -> tuple[dict[int, Fit], list[Fit]]:
-    """Return the fit of each epoch of a condition, and that of all of them that count."""
-    linearise = _problems(method, inertia_kg_m2)
-    good = [member for member in members if member.epoch.closed.included]
-    start = _start(good or members, inertia_kg_m2)
-    shared: LineFit | None = None
-    made: dict[int, Problem] = {}
-    if good:
-        try:
-            shared, problems = fit_pooled([m.observation for m in good], linearise, start)
-        except ValueError:
-            pass  # each epoch will say why
-        else:
-            made = {member.place: p for member, p in zip(good, problems, strict=True)}
-    progress(POOLED_SHARE * len(members))
-    # Few epochs do not know the shape of their noise together any better than each alone.
-    share = shared if len(good) >= SHARED_FROM else None
-    fits: dict[int, Fit] = {}
-    for place, epoch, observation in members:
-        try:
-            fit = fit_single(
-                observation,
-                linearise,
-                shared.values if shared is not None else start,
-                share.shape if share is not None else None,
-                made.get(place) if share is not None else None,
-            )
-        except ValueError as error:
-            fits[place] = _without_numbers(epoch, method.name, str(error))
-        else:
-            found = _epoch_fit(epoch, method.name, fit, observation, inertia_kg_m2)
-            unsettled = between_samples(
-                epoch, observation, fit.values, fit.between, settings.diagnostics
-            )
-            fits[place] = replace(found, findings=unsettled)
-        progress(1.0 - POOLED_SHARE)
-    if shared is None:
-        return fits, []
-    together = _pooled_fit(method.name, condition, shared, good, inertia_kg_m2)
-    unsettled = between_samples(
-        good[0].epoch, good[0].observation, shared.values, shared.between, settings.diagnostics
-    )
-    return fits, [replace(together, findings=unsettled)]
-
-
-def _fit_all(
-    method: LineMethod,
-    members: Sequence[_Member],
-    settings: Settings,
-    inertia_kg_m2: float | None,
-) -> list[Fit]:
-    """Return the fit of the epochs of all conditions, if there is one."""
-    if not members:
-        return []
-    linearise, start = _problems(method, inertia_kg_m2), _start(members, inertia_kg_m2)
-    observations = [member.observation for member in members]
-    try:
-        everything, _ = fit_pooled(observations, linearise, start)
-    except ValueError:
-        return []  # the epochs have said why
-    return [_pooled_fit(method.name, "", everything, members, inertia_kg_m2)]
-
-
-def _problems(method: LineMethod, inertia_kg_m2: float | None) -> Linearise:
-    return method.linearise if inertia_kg_m2 is None else holding(method.linearise, inertia_kg_m2)
-
-
-def _start(members: Sequence[_Member], inertia_kg_m2: float | None) -> Array:
-    start = least_squares_start([member.observation for member in members])
+def _start(
+    method: LineMethod, members: Sequence[PreparedEpoch], inertia_kg_m2: float | None
+) -> Array:
+    start = least_squares_start([member.once(method.observe) for member in members])
     return start if inertia_kg_m2 is None else start[1:]
 
 
-def _estimate(fit: LineFit, inertia_kg_m2: float | None) -> Estimate:
-    """Return J, B and K with their uncertainty, as a `Fit` holds them."""
-    bound = np.sqrt(np.diag(fit.bound))
-    away = fit.between + np.nan_to_num(np.abs(fit.pulled))
-    half = scipy.special.stdtrit(fit.degrees, 0.975) * fit.standard_errors + away
-    low, high = fit.values - half, fit.values + half
-    found = Estimate(fit.values, fit.standard_errors, low, high, bound, fit.covariance)
-    return found if inertia_kg_m2 is None else found.with_inertia(inertia_kg_m2)
+def _shared(method: LineMethod, members: Sequence[PreparedEpoch], start: Array) -> LineFit | None:
+    """Return what the epochs that count share; None where there is none, as each epoch will say."""
+    if not members:
+        return None
+    observations = [member.once(method.observe) for member in members]
+    try:
+        return fit_lines(observations, method.linearise, start)
+    except ValueError:
+        return None
 
 
-def _epoch_fit(
-    epoch: Epoch,
-    method: str,
+def _alone(
+    method: LineMethod, member: PreparedEpoch, start: Array, known: LineFit | None
+) -> LineFit:
+    """Return the fit of an epoch that shares no instruments, weighted as others where these do."""
+    observation = member.once(method.observe)
+    powers = None
+    if known is not None:
+        first = known.problems[0].observation.lines.grid
+        powers = [power_on(observation.lines.grid, first, known.powers[0])]
+    return fit_lines([observation], method.linearise, start, powers)
+
+
+def _fit_of(
+    method: LineMethod,
+    members: Sequence[PreparedEpoch],
     fit: LineFit,
-    observation: Observation,
     inertia_kg_m2: float | None,
 ) -> Fit:
-    found = _estimate(fit, inertia_kg_m2)
-    lines = observation.lines
-    left = lines.torque_nm - lines.motion @ found.value
-    share = float(np.sum(np.abs(left) ** 2) / np.sum(np.abs(lines.torque_nm) ** 2))
-    grid = lines.grid
-    residual_sd = np.sqrt(2 * np.sum(np.abs(left) ** 2) / (grid.time_s.size * grid.energy))
+    """Return a fit as it is recorded, named after the first of its epochs."""
+    epoch, observations = members[0].epoch, [member.once(method.observe) for member in members]
+    between = moved_elsewhere(fit.problems, fit.powers, fit.values)
+    pulled = np.nan_to_num(np.abs(loop_pull(fit.problems, fit.powers, fit.values)))
+    numbers = of_fit(
+        fit.values,
+        fit.covariance,
+        fit.degrees,
+        np.sqrt(np.diag(fit.bound)),
+        inertia_kg_m2,
+        between + pulled,
+    )
+    moved = [
+        amplitude_of_lines(member.epoch, one.lines)
+        for member, one in zip(members, observations, strict=True)
+    ]
+    counts = [int(np.count_nonzero(one.lines.grid.window)) for one in observations]
+    left, total = np.zeros(2)
+    for one, count in zip(observations, counts, strict=True):
+        grid, torque = one.lines.grid, one.lines.torque_nm
+        per_line = 2 * count / (grid.time_s.size * grid.energy)
+        left += per_line * np.sum(np.abs(torque - one.lines.motion @ numbers["value"]) ** 2)
+        total += per_line * np.sum(np.abs(torque) ** 2)
+    r_squared = 1.0 - float(left / total)
+    diagnostics = members[0].settings.diagnostics
     return Fit(
-        source=epoch.source,
+        source=", ".join(dict.fromkeys(member.epoch.source for member in members)),
         epoch=epoch.label,
         condition=epoch.condition,
-        method=method,
-        outcome=after_fit(
-            epoch, 1.0 - share, fit.condition_number, least_r_squared=WORST_R_SQUARED
-        ),
-        r_squared=1.0 - share,
-        vaf_percent=100.0 * (1.0 - share),
+        method=method.name,
+        outcome=after_fit(epoch, r_squared, fit.condition_number, least_r_squared=WORST_R_SQUARED),
+        r_squared=r_squared,
+        vaf_percent=100.0 * r_squared,
         condition_number=fit.condition_number,
-        residual_sd_nm=float(residual_sd),
-        n_samples=int(np.count_nonzero(grid.window)),
-        band_hz=grid.band_hz,
-        **found._asdict(),
-    )
-
-
-def _pooled_fit(
-    method: str,
-    condition: str,
-    fit: LineFit,
-    members: Sequence[_Member],
-    inertia_kg_m2: float | None,
-) -> Fit:
-    """Return the estimate from all epochs of a condition; its statistics are over all of them."""
-    singles = [
-        _epoch_fit(member.epoch, method, fit, member.observation, inertia_kg_m2)
-        for member in members
-    ]
-    sources = dict.fromkeys(single.source for single in singles)
-    weight = np.array([single.n_samples for single in singles], dtype=np.float64)
-    power = np.array([single.residual_sd_nm**2 for single in singles])
-    unexplained = 1 - np.array([single.r_squared for single in singles])
-    total = power / np.maximum(unexplained, np.finfo(np.float64).tiny)
-    share = float(weight @ power / max(weight @ total, np.finfo(np.float64).tiny))
-    return replace(
-        singles[0],
-        source=", ".join(sources),
-        epoch="pooled",
-        condition=condition,
-        r_squared=1 - share,
-        vaf_percent=100 * (1 - share),
-        residual_sd_nm=float(np.sqrt(weight @ power / weight.sum())),
-        n_samples=int(weight.sum()),
+        residual_sd_nm=float(np.sqrt(left / sum(counts))),
+        n_samples=sum(counts),
+        band_hz=observations[0].lines.grid.band_hz,
+        findings=between_samples(epoch, observations[0], fit.values, between, diagnostics),
+        **numbers,
+        **amplitude_together(moved, counts)._asdict(),
     )
 
 

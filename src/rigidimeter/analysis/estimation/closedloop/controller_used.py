@@ -15,13 +15,14 @@ all the others.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
-from rigidimeter.analysis.estimation.signals import Array
+from rigidimeter.analysis.estimation.signals import Array, sampled
 from rigidimeter.analysis.estimation.window import Window, with_hole
 from rigidimeter.core.records import Epoch
 from rigidimeter.core.settings import ControllerSettings, Settings
@@ -106,7 +107,8 @@ class CommandMade:
 
     def _lines(self, *signals: Array) -> NDArray[np.complex128]:
         first, last = (int(edge * self.window.size / self.rate_hz) for edge in COMPARED_HZ)
-        return np.fft.rfft(np.stack(signals) * self.window, axis=1)[:, first : last + 1]
+        spectra = scipy.fft.rfft(np.stack([one * self.window for one in signals]), axis=1)
+        return np.asarray(spectra[:, first : last + 1])
 
 
 def command_made(epoch: Epoch, loop: Loop) -> CommandMade | None:
@@ -121,14 +123,24 @@ def command_made(epoch: Epoch, loop: Loop) -> CommandMade | None:
     """
     command = epoch.channels["velocity_command_rad_s"]
     rate_hz, n = command.mean_rate_hz, command.time_s.size
-    if float(np.ptp(np.diff(command.time_s))) > 0.5 / rate_hz:
+    steps_s = np.diff(command.time_s)
+    if np.max(steps_s) - np.min(steps_s) > 0.5 / rate_hz:
         return None
-    window = Window(np.hanning(n), np.zeros(n), np.zeros(n))
+    window = _hann(n)
     for stretch in epoch.left_out:  # there neither torque nor, where samples are lost, command is
         hole_s = (stretch.start_s - command.time_s[0], stretch.stop_s - command.time_s[0])
         window = with_hole(window, rate_hz, FORGOTTEN_S, hole_s)
     asked = _asked_nm(epoch, loop, command.time_s, rate_hz)
     return CommandMade(command.values, asked, window.value, rate_hz)
+
+
+@lru_cache(maxsize=4)
+def _hann(n: int) -> Window:
+    """Return a window of Hann, whose derivatives are not needed."""
+    window = Window(np.hanning(n), np.zeros(n), np.zeros(n))
+    for part in window:
+        part.setflags(write=False)
+    return window
 
 
 def loop_shown(prepared: PreparedEpoch) -> Loop:
@@ -169,7 +181,10 @@ def controller_shown(prepared: PreparedEpoch, loop: Loop) -> ControllerSettings 
 
 def _asked_nm(epoch: Epoch, loop: Loop, ticks_s: Array, rate_hz: float) -> Array:
     perturbation, torque = epoch.channels["perturbation_nm"], epoch.channels["torque_nm"]
-    held = np.searchsorted(perturbation.time_s, ticks_s + 0.01 / rate_hz, side="right") - 1
+    at_ticks: slice | NDArray[np.intp] | None = sampled(perturbation, ticks_s)
+    if at_ticks is None:
+        held = np.searchsorted(perturbation.time_s, ticks_s + 0.01 / rate_hz, side="right") - 1
+        at_ticks = np.maximum(held, 0)
     # The newest sample at a tick is half an interval old on average, beside the latency.
     late_s = loop.rig.torque.latency_s + max(0.5 / torque.rate_hz - 0.5 / rate_hz, 0.0)
     read = np.interp(ticks_s - late_s, torque.time_s, torque.values)
@@ -177,7 +192,7 @@ def _asked_nm(epoch: Epoch, loop: Loop, ticks_s: Array, rate_hz: float) -> Array
     if cutoff_hz < rate_hz / 2:
         b0, b1, b2, a1, a2 = butterworth_lowpass(cutoff_hz, rate_hz)
         read = scipy.signal.lfilter([b0, b1, b2], [1.0, a1, a2], read)
-    return np.asarray(perturbation.values[np.maximum(held, 0)] - read, dtype=np.float64)
+    return np.asarray(perturbation.values[at_ticks] - read, dtype=np.float64)
 
 
 def loop_of(settings: Settings, torque_rate_hz: float, drive: DriveModel | None) -> Loop:

@@ -16,19 +16,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.closedloop.linear_problems import (
+from rigidimeter.analysis.estimation.closedloop.linear_problems import Linearise, instrumental
+from rigidimeter.analysis.estimation.closedloop.normal_equations import (
     Complex,
-    Linearise,
     Problem,
-    instrumental,
+    solution,
+    sums,
 )
 from rigidimeter.analysis.estimation.closedloop.observation import Observation
-from rigidimeter.analysis.estimation.closedloop.refine import (
-    LineFit,
-    PooledSolution,
-    solve_pooled,
-    with_uncertainty,
-)
+from rigidimeter.analysis.estimation.closedloop.refine import LineFit, fit_lines
 from rigidimeter.analysis.estimation.signals import Array
 
 SCAN_STEP_S = 0.005
@@ -63,10 +59,10 @@ def delayed(linearise: Linearise) -> Linearise:
                 turned[both] = np.hstack([turn * instruments, late])
             late = slope * (problem.regressors @ parameters)[:, None]
             problems.append(
-                Problem(
-                    turned[both],
-                    np.hstack([turn * problem.regressors, late]),
-                    problem.target + late[:, 0] * delay_s,
+                problem._replace(
+                    instruments=turned[both],
+                    regressors=np.hstack([turn * problem.regressors, late]),
+                    target=problem.target + late[:, 0] * delay_s,
                 )
             )
         return problems
@@ -100,18 +96,25 @@ def estimate_delay(
         If the parameters cannot be told apart.
     """
     if near is not None:
-        return with_uncertainty(solve_pooled(observations, delayed(linearise), near))
+        return fit_lines(observations, delayed(linearise), near)
     problems = linearise(observations, start)
     delays = np.linspace(-longest_s, longest_s, 2 * max(round(longest_s / SCAN_STEP_S), 1) + 1)
     left = _unexplained(observations, problems, delays)
     # The valleys of the scan, the deepest first, and none: the subject may have dug the deepest.
     inner = np.r_[True, left[1:] < left[:-1]] & np.r_[left[:-1] < left[1:], True]
     valleys = sorted(np.flatnonzero(inner), key=lambda i: left[i])[:MOST_VALLEYS]
-    best: PooledSolution | None = None
+    best: LineFit | None = None
     for near_s in dict.fromkeys([*(float(delays[i]) for i in valleys), 0.0]):
-        near = _solved(observations, problems, near_s)
+        turned = [
+            one._replace(
+                target=one.target * np.exp(1j * one.observation.lines.grid.omega_rad_s * near_s)
+            )
+            for one in problems
+        ]
+        gram, moment, _ = sums(turned)
+        near = solution(gram, moment)  # every line with the same weight
         try:
-            found = solve_pooled(observations, delayed(linearise), np.append(near, near_s))
+            found = fit_lines(observations, delayed(linearise), np.append(near, near_s))
         except ValueError:
             continue  # nothing settles from there
         if abs(found.values[-1]) > longest_s or found.values[0] <= 0:
@@ -120,30 +123,16 @@ def estimate_delay(
             best = found
     if best is None:
         raise ValueError("no delay explains the torque")
-    return with_uncertainty(best)
+    return best
 
 
-def _unlikeliness(found: PooledSolution) -> float:
+def _unlikeliness(found: LineFit) -> float:
     """Return Σ log S over the lines: twice the Whittle log-likelihood's negative, but a constant.
 
     Every line counts by the logarithm of what is left in it, so a subject who pushes slowly and
     strongly does not outvote the lines above.
     """
-    return float(np.sum(np.log(found.shape.density)))
-
-
-def _solved(
-    observations: Sequence[Observation], problems: Sequence[Problem], delay_s: float
-) -> Array:
-    """Return J, B and K at a given delay, every line with the same weight."""
-    gram, moment = np.zeros((3, 3)), np.zeros(3)
-    for observation, problem in zip(observations, problems, strict=True):
-        turned = problem.target * np.exp(1j * observation.lines.grid.omega_rad_s * delay_s)
-        gram += (problem.instruments.conj().T @ problem.regressors).real
-        moment += (problem.instruments.conj().T @ turned).real
-    scale = np.sqrt(np.abs(np.diag(gram)))
-    solution = np.linalg.lstsq(gram / np.outer(scale, scale), moment / scale)[0]
-    return np.asarray(solution / scale, dtype=np.float64)
+    return float(np.sum(np.log(found.powers[0])))
 
 
 def _unexplained(

@@ -8,7 +8,8 @@ is put in the place of the delay, as one more column T beside J, B and K:
     soft cuff   Z θ / (1 + Z/k), with Z = K + iωB − ω²J, for a cuff of k N·m/rad: at some k, and to
                 the first order in 1/k about each
 
-Both models are fitted by instrumental variables to one half of the lines, in groups of neighbours,
+Both models are fitted to one half of the lines, in groups of neighbours, by instrumental variables
+or, where the perturbation was not recorded, with the measured motion as its own instrument,
 and judged by what they leave of the others; S is the smooth power of that. The sum of the
 differences of |left|²/S, over the root of the sum of their squares, is about standard normal where
 both explain as much.
@@ -24,8 +25,18 @@ import scipy
 from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother
-from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST, Problem
-from rigidimeter.analysis.estimation.closedloop.observation import Observation, observe
+from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST, direct
+from rigidimeter.analysis.estimation.closedloop.normal_equations import (
+    Problem,
+    solution,
+    sums,
+)
+from rigidimeter.analysis.estimation.closedloop.observation import (
+    Observation,
+    observe,
+    observe_motion,
+)
+from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
 from rigidimeter.analysis.estimation.closedloop.spectral_lines import Complex, Grid
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array, velocity_at
@@ -60,9 +71,9 @@ def likeliest_term(
         J, B and K with the delay.
     """
     J, B, K = np.maximum(values, LEAST).tolist()
-    with_delay = [_of_joint(epoch.once(observe), (J, B, K)) for epoch in moved]
-    plain = [_of_joint(epoch.once(observe), (J, B, K)) for epoch in epochs]
-    without = np.maximum(_solved(plain), LEAST)
+    with_delay = [_of_joint(_observed(epoch), (J, B, K)) for epoch in moved]
+    plain = [_of_joint(_observed(epoch), (J, B, K)) for epoch in epochs]
+    without = np.maximum(_solved(plain, [_power(problem) for problem in plain]), LEAST)
     rivals = [
         dict(_rivals(epoch, problem, (J, B, K), without))
         for epoch, problem in zip(epochs, plain, strict=True)
@@ -74,10 +85,15 @@ def likeliest_term(
     return max(found, key=lambda rival: rival.better_by)
 
 
+def _observed(prepared: PreparedEpoch) -> Observation:
+    return prepared.once(observe_motion if closed_loop_obstacle(prepared.epoch) else observe)
+
+
 def _of_joint(observation: Observation, joint: tuple[float, float, float]) -> Problem:
-    assert observation.excitation is not None  # `observe` gives it
+    if observation.excitation is None:
+        return direct([observation], np.array(joint))[0]
     instruments = observation.excitation.motion_lines(joint)
-    return Problem(instruments, observation.lines.motion, observation.lines.torque_nm)
+    return Problem(instruments, observation.lines.motion, observation.lines.torque_nm, observation)
 
 
 def _rivals(
@@ -90,12 +106,13 @@ def _rivals(
 
     `without_delay` are J, B and K of the fit without delay or term.
     """
-    observation = prepared.once(observe)
-    assert observation.excitation is not None
+    observation = _observed(prepared)
     grid = observation.lines.grid
     omega = grid.omega_rad_s
     measured = velocity_at(prepared.epoch, grid.time_s) * grid.window
-    both = observation.excitation.windowed_motion(joint)[1], measured
+    excitation = observation.excitation
+    caused = measured if excitation is None else excitation.windowed_motion(joint)[1]
+    both = caused, measured
     rubbing = _pair(grid, *(grid.window * np.sign(velocity) for velocity in both))
     yield "friction", _beside(plain, rubbing)
     for side, sign in (("+", 1.0), ("-", -1.0), ("both", 0.0)):
@@ -110,7 +127,9 @@ def _rivals(
     impedance = K + 1j * omega * B - omega**2 * J
     for ratio in CUFF_RATIOS:
         soft = (1.0 / (1.0 + impedance / (ratio * K)))[:, None]
-        through = Problem(plain.instruments * soft, plain.regressors * soft, plain.target)
+        through = plain._replace(
+            instruments=plain.instruments * soft, regressors=plain.regressors * soft
+        )
         softer = -(impedance**2 * soft[:, 0] ** 2)
         column = (plain.instruments[:, 2] * softer, plain.regressors[:, 2] * softer)
         yield f"a soft cuff,{ratio}", _beside(through, column)
@@ -118,10 +137,9 @@ def _rivals(
 
 def _beside(problem: Problem, column: tuple[Complex, Complex]) -> Problem:
     """Return the problem with one more column."""
-    return Problem(
-        np.column_stack([problem.instruments, column[0]]),
-        np.column_stack([problem.regressors, column[1]]),
-        problem.target,
+    return problem._replace(
+        instruments=np.column_stack([problem.instruments, column[0]]),
+        regressors=np.column_stack([problem.regressors, column[1]]),
     )
 
 
@@ -151,48 +169,40 @@ def _better(first: Sequence[Problem], second: Sequence[Problem]) -> float:
 def _left_out(problems: Sequence[Problem]) -> list[Array]:
     """Return |left|² at each line by the fit to the other half of the lines, of each epoch."""
     left = [np.zeros(problem.target.size) for problem in problems]
-    weights = [_weight(problem) for problem in problems]
+    powers = [_power(problem) for problem in problems]
     for half in (0, 1):
         used = [_half(problem) == half for problem in problems]
-        solution = _solved(
+        values = _solved(
             [_part(problem, rows) for problem, rows in zip(problems, used, strict=True)],
-            [weight[rows] for weight, rows in zip(weights, used, strict=True)],
+            [power[rows] for power, rows in zip(powers, used, strict=True)],
         )
         for own, problem, rows in zip(left, problems, used, strict=True):
-            residual = problem.target[~rows] - problem.regressors[~rows] @ solution
+            residual = problem.target[~rows] - problem.regressors[~rows] @ values
             own[~rows] = np.abs(residual) ** 2
     return left
 
 
-def _solved(problems: Sequence[Problem], weights: Sequence[Array] | None = None) -> Array:
+def _solved(problems: Sequence[Problem], powers: Sequence[Array] | None = None) -> Array:
     """Return the parameters by instrumental variables."""
-    p = problems[0].regressors.shape[1]
-    gram, moment = np.zeros((p, p)), np.zeros(p)
-    for place, problem in enumerate(problems):
-        weight = weights[place] if weights is not None else _weight(problem)
-        weighted = problem.instruments * weight[:, None]
-        gram += (weighted.conj().T @ problem.regressors).real
-        moment += (weighted.conj().T @ problem.target).real
-    scale = np.sqrt(np.maximum(np.abs(np.diag(gram)), np.finfo(np.float64).tiny))
-    solution = np.linalg.lstsq(gram / np.outer(scale, scale), moment / scale)[0] / scale
-    return np.asarray(solution, dtype=np.float64)
+    gram, moment, _ = sums(problems, powers)
+    return solution(gram, moment)
 
 
 def _part(problem: Problem, rows: NDArray[np.bool_]) -> Problem:
-    return Problem(problem.instruments[rows], problem.regressors[rows], problem.target[rows])
+    return problem._replace(
+        instruments=problem.instruments[rows],
+        regressors=problem.regressors[rows],
+        target=problem.target[rows],
+    )
 
 
 def _half(problem: Problem) -> NDArray[np.intp]:
     return np.asarray(np.arange(problem.target.size) // GROUP_LINES % 2)
 
 
-def _weight(problem: Problem) -> Array:
-    """Return one over the smooth power of what J, B and K leave at every line."""
+def _power(problem: Problem) -> Array:
+    """Return the smooth power of what J, B and K leave at every line."""
     motion = problem.regressors[:, :3]
-    instruments = problem.instruments[:, :3]
-    scale = np.sqrt(np.sum(np.abs(motion) ** 2, axis=0))
-    gram = (instruments.conj().T @ motion).real / np.outer(scale, scale)
-    values = np.linalg.lstsq(gram, (instruments.conj().T @ problem.target).real / scale)[0] / scale
-    power = np.abs(problem.target - motion @ values) ** 2
-    smooth = Smoother.over(np.arange(power.size), GROUP_LINES, 0.1)(power)
-    return np.asarray(1.0 / smooth)
+    joint = problem._replace(instruments=problem.instruments[:, :3], regressors=motion)
+    power = np.abs(problem.target - motion @ _solved([joint])) ** 2
+    return Smoother.over(np.arange(power.size), GROUP_LINES, 0.1)(power)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,8 +25,11 @@ class DrivenAt:
 
     def __init__(self, drive: DriveModel, command: Channel) -> None:
         self.drive, self.command = drive, command
-        self._held = HeldCommand(drive, command.values, lengths_s(command))
         self._made: list[tuple[Array, ArmMotion]] = []
+
+    @cached_property
+    def _held(self) -> HeldCommand:
+        return HeldCommand(self.drive, self.command.values, lengths_s(self.command))
 
     def __call__(self, time_s: Array) -> ArmMotion:
         """Return `driven` at the times."""

@@ -87,10 +87,10 @@ class Excitation:
 
     def _lines(self, spectra: Complex) -> Complex:
         """Return the lines of signals whose spectra on the damped circle are given."""
-        windowed = self._windowed(spectra)
-        mean = np.add.reduce(windowed * self.grid.window, axis=1) / self.grid.energy
-        windowed -= mean[:, None] * self.grid.window
-        return np.asarray(scipy.fft.rfft(windowed, axis=1)[:, self.grid.line].T)
+        windowed, grid = self._windowed(spectra), self.grid
+        mean = windowed @ grid.window / grid.energy
+        lines = scipy.fft.rfft(windowed, axis=1)[:, grid.line]
+        return np.asarray((lines - mean[:, None] * grid.window_lines).T)
 
     def _windowed(self, spectra: Complex) -> Array:
         # The inverse FFT gives only the samples that are wanted, where their number allows it.

@@ -213,7 +213,7 @@ def _without_drift(answers: Sequence[Answer]) -> list[Answer]:
         if id(grid.line) not in shapes:  # epochs of one layout have the same
             along = np.linspace(-1.0, 1.0, grid.time_s.size)
             drifts = [Legendre.basis(degree)(along) for degree in range(1, TREND + 1)]
-            shapes[id(grid.line)] = np.stack([grid.transform(drift) for drift in drifts], axis=1)
+            shapes[id(grid.line)] = grid.transform(np.stack(drifts)).T
         shape, steady = shapes[id(grid.line)], answer
         for _ in range(2):  # the drift is in the first weights
             weight = 1.0 / np.sqrt(_power(steady))

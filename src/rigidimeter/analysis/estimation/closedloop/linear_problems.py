@@ -4,7 +4,7 @@ With instruments Z, regressors Φ and target Y at the lines of an epoch, the est
 
     p = (Σ Re(Z^H Φ / S))⁻¹ Σ Re(Z^H Y / S)
 
-with S the power of the noise (`refine`). The methods differ in Z alone.
+with S the power of the noise (`normal_equations`, `refine`). The methods differ in Z alone.
 
 Least squares (``bandlimited``). Z is the measured motion. Torque u of the subject comes back by the
 loop as motion H u, and pulls the estimate by
@@ -31,35 +31,23 @@ between them hold nothing but noise and set S.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation.closedloop.excitation import Excitation
+from rigidimeter.analysis.estimation.closedloop.normal_equations import (
+    Problem,
+    solution,
+    sums,
+)
 from rigidimeter.analysis.estimation.closedloop.observation import DENSE, Observation
 from rigidimeter.analysis.estimation.signals import Array
-
-Complex = NDArray[np.complex128]
 
 LEAST = np.array([1e-5, 1e-3, 1e-2])
 """Smallest J, B and K that a response is simulated with, so that the simulated loop is stable."""
 
 T = TypeVar("T")
-
-
-class Problem(NamedTuple):
-    """The linear problem of one epoch at given parameters.
-
-    `instruments` and `regressors` have shape (m, p), `target` (m,). `observation` says how the
-    motion might be otherwise, and `held` are the values of the first parameters, which are held.
-    """
-
-    instruments: Complex
-    regressors: Complex
-    target: Complex
-    observation: Observation | None = None
-    held: tuple[float, ...] = ()
 
 
 Linearise = Callable[[Sequence[Observation], Array], list[Problem]]
@@ -109,12 +97,11 @@ def holding(linearise: Linearise, inertia_kg_m2: float) -> Linearise:
     def held(observations: Sequence[Observation], values: Array) -> list[Problem]:
         full = linearise(observations, np.concatenate(([inertia_kg_m2], values)))
         return [
-            Problem(
-                problem.instruments[:, 1:],
-                problem.regressors[:, 1:],
-                problem.target - inertia_kg_m2 * problem.regressors[:, 0],
-                problem.observation,
-                (inertia_kg_m2,),
+            problem._replace(
+                instruments=problem.instruments[:, 1:],
+                regressors=problem.regressors[:, 1:],
+                target=problem.target - inertia_kg_m2 * problem.regressors[:, 0],
+                held=(inertia_kg_m2,),
             )
             for problem in full
         ]
@@ -130,13 +117,9 @@ def least_squares_start(observations: Sequence[Observation]) -> Array:
 
 def least_squares(problems: Sequence[Problem]) -> Array:
     """Return the solution in which every line counts alike, shape (3,)."""
-    gram, moment = np.zeros((3, 3)), np.zeros(3)
-    for problem in problems:
-        gram += (problem.regressors.conj().T @ problem.regressors).real
-        moment += (problem.regressors.conj().T @ problem.target).real
-    scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(np.float64).tiny))
-    values = np.linalg.lstsq(gram / np.outer(scale, scale), moment / scale)[0] / scale
-    return np.asarray(values, dtype=np.float64)
+    own = [problem._replace(instruments=problem.regressors) for problem in problems]
+    gram, moment, _ = sums(own)
+    return solution(gram, moment)
 
 
 def _of_each(observations: Sequence[Observation], simulate: Callable[[Excitation], T]) -> list[T]:

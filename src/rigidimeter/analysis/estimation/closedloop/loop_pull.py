@@ -17,7 +17,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST, Problem
+from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST
+from rigidimeter.analysis.estimation.closedloop.normal_equations import (
+    Problem,
+    solution,
+    sums,
+)
 from rigidimeter.analysis.estimation.closedloop.spectral_lines import Grid
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.model import Loop, OpenLoop
@@ -42,34 +47,26 @@ def loop_pull(problems: Sequence[Problem], powers: Sequence[Array], values: Arra
     values : array, shape (p,)
         The solution.
     """
-    p = values.size
-    gram, bias = np.zeros((p, p)), np.zeros(p)
-    pulled: list[tuple[Problem, Array, OpenLoop]] = []
-    for problem, power in zip(problems, powers, strict=True):
-        observation = problem.observation
-        if observation is None or observation.excitation is not None:
-            continue
-        pulled.append((problem, power, _opened(observation.loop, observation.lines.grid)))
-        gram += ((problem.instruments / power[:, None]).conj().T @ problem.regressors).real
-    if not pulled:
+    bias = np.zeros(values.size)
+    if any(problem.observation.excitation is not None for problem in problems):
         return bias
-    scale = np.sqrt(np.abs(np.diag(gram)))
-    scaled = gram / np.outer(scale, scale)
+    gram, _, _ = sums(problems, powers)
+    opened = [_opened(one.observation.loop, one.observation.lines.grid) for one in problems]
     for _ in range(ITERATIONS):
-        moment = np.zeros(p)
-        for problem, power, opened in pulled:
-            held = np.array(problem.held)
-            J, B, K = np.maximum(np.concatenate([held, values - bias]), LEAST).tolist()
-            comes_back = opened.motion_per_torque((J, B, K)).real[held.size :]
+        moment = np.zeros(values.size)
+        for problem, power, loop in zip(problems, powers, opened, strict=True):
+            joint = np.concatenate([np.array(problem.held), values - bias])
+            J, B, K = np.maximum(joint, LEAST).tolist()
+            comes_back = loop.motion_per_torque((J, B, K)).real[len(problem.held) :]
             u = problem.target - problem.regressors @ (values - bias)
             moment += comes_back @ (np.abs(u) ** 2 / power)
-        step = np.linalg.solve(scaled, moment / scale) / scale - bias
+        step = solution(gram, moment) - bias
         bias = bias + DAMPING * step
         if not np.all(np.abs(bias) < DIVERGED * np.abs(values)):
             break
         if np.all(np.abs(step) < SETTLED * np.abs(values)):
             return bias
-    return np.full(p, np.nan)
+    return np.full(values.size, np.nan)
 
 
 @lru_cache(maxsize=8)

@@ -37,6 +37,7 @@ from rigidimeter.analysis.estimation.closedloop.spectral_lines import (
     Lines,
     epoch_grid,
     epoch_lines,
+    grid_at,
 )
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.screening import LEAST_BAND_RATIO
@@ -115,7 +116,8 @@ def observe(prepared: PreparedEpoch, motion: EpochMotion | None = None) -> Obser
     """
     perturbation = _perturbation(prepared)
     grid = _grid(prepared, None)
-    wider = _grid(prepared, None, WIDER)
+    band_hz, trim_s = _band_hz(prepared, WIDER), prepared.settings.estimation.trim_s
+    wider = grid_at(grid.time_s, grid.rate_hz, band_hz, trim_s, prepared.epoch)
     everywhere = np.ones(grid.line.size, dtype=np.bool_)
     return _observed(prepared, perturbation, grid, everywhere, wider, motion)
 
@@ -172,11 +174,17 @@ def _perturbation(prepared: PreparedEpoch) -> Channel:
 def _grid(
     prepared: PreparedEpoch,
     samples: Callable[[int, float], int] | None,
-    factors: tuple[float, float] = (1.0, 1.0),
     *,
     alone: bool = False,
 ) -> Grid:
-    """Return the grid in the band, its edges times these factors as far as the rate allows.
+    band_hz, trim_s = _band_hz(prepared, alone=alone), prepared.settings.estimation.trim_s
+    return epoch_grid(prepared.epoch, band_hz, trim_s, samples)
+
+
+def _band_hz(
+    prepared: PreparedEpoch, factors: tuple[float, float] = (1.0, 1.0), *, alone: bool = False
+) -> tuple[float, float]:
+    """Return the band, its edges times these factors as far as the rate allows.
 
     `alone` says whether the motion is its own instrument.
     """
@@ -189,8 +197,7 @@ def _grid(
     if alone and not prepared.source.drive:
         # Higher, noise of the motion that no half of the samples shows would count as motion.
         usable_hz = min(usable_hz, max(slowest / DENSE, LEAST_BAND_RATIO * low))
-    band = factors[0] * low, min(factors[1] * high, usable_hz)
-    return epoch_grid(epoch, band, estimation.trim_s, samples)
+    return factors[0] * low, min(factors[1] * high, usable_hz)
 
 
 def _observed(
@@ -222,7 +229,7 @@ def _observed(
         made = prepared.source.once(key, lambda: excitation(cause, loop, grid))
     torque_filter = torque_filter_of(prepared.settings.estimation)
     motion = motion_of(prepared) if motion is None else motion
-    everything = epoch_lines(epoch, wider or grid, motion, torque_filter)
+    everything = epoch_lines(epoch, wider or grid, motion, torque_filter, noise=made is None)
     lines = everything.on(grid)
     return Observation(
         lines,

@@ -84,9 +84,8 @@ def while_sampled(perturbation: Channel, torque: Channel) -> Channel:
 
 def evenly(perturbation: Channel) -> Channel:
     """Return the perturbation at every tick: the last level is held where ticks are missing."""
-    spacing = np.diff(perturbation.time_s)
-    interval_s = float(np.median(spacing))
-    if float(np.ptp(spacing)) < 0.5 * interval_s:
+    interval_s, spacing_s = 1.0 / perturbation.rate_hz, np.diff(perturbation.time_s)
+    if np.max(spacing_s) - np.min(spacing_s) < 0.5 * interval_s:
         return perturbation
     count = int((perturbation.time_s[-1] - perturbation.time_s[0]) / interval_s + 0.5) + 1
     time_s = perturbation.time_s[0] + interval_s * np.arange(count)

@@ -1,39 +1,32 @@
 """Weighted estimation from lines, iterated until weights and linearisation no longer change.
 
-Every method of the closed loop is the same linear problem at each step,
-
-    p = C Σ Re(U^H Y)      C = (Σ Re(U^H Φ))⁻¹      U = Z / S
-
-with its own instruments Z, regressors Φ and target Y at the current parameters, and S the power of
-the residual. One epoch weights itself; several epochs share their residual's power, which is then
-known from so many lines that it need not be smoothed over neighbours that differ.
+Instruments Z, regressors Φ and target Y of `normal_equations` are those at the current parameters,
+S is the power of the residual. One epoch weights itself; several epochs share their residual's
+power, which is then known from so many lines that it need not be smoothed over neighbours that
+differ.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.closedloop.between_uncertainty import moved_elsewhere
 from rigidimeter.analysis.estimation.closedloop.line_noise import (
-    Shape,
-    Smoother,
-    line_covariance,
-)
-from rigidimeter.analysis.estimation.closedloop.line_weights import (
-    condition_number,
-    scaled_inverse,
-    shared_density,
+    Solved,
+    power_on,
     smoother_for,
-    variance_bound,
-    weighted_instruments,
+    with_weights,
 )
-from rigidimeter.analysis.estimation.closedloop.linear_problems import Complex, Linearise, Problem
-from rigidimeter.analysis.estimation.closedloop.loop_pull import loop_pull
+from rigidimeter.analysis.estimation.closedloop.linear_problems import Linearise
+from rigidimeter.analysis.estimation.closedloop.normal_equations import (
+    Complex,
+    Problem,
+    scaled_inverse,
+    sums,
+)
 from rigidimeter.analysis.estimation.closedloop.observation import Observation
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines
 from rigidimeter.analysis.estimation.signals import Array
 
 ITERATIONS = 25
@@ -52,13 +45,10 @@ ENOUGH_EPOCHS = 10
 """From this many epochs on, the scatter between them alone gives the covariance of the pooled
 estimate; of fewer it is the larger of scatter and lines."""
 
-SHARED_FROM = 4
-"""From this many epochs on, they share the shape of their noise."""
-
 
 @dataclass(frozen=True)
 class LineFit:
-    """Parameters with their uncertainty.
+    """Parameters of one epoch, or that several share, with their uncertainty.
 
     Attributes
     ----------
@@ -71,11 +61,10 @@ class LineFit:
         that was found (Cramér–Rao).
     condition_number : float
         Of the whitened instruments, each scaled to unit length.
-    shape : Shape
-    between : array, shape (p,)
-        How far each parameter may be elsewhere for what is not known of the drive.
-    pulled : array, shape (p,)
-        How far the loop pulls each parameter (`loop_pull`).
+    problems : sequence of Problem
+        Of each epoch, at the solution.
+    powers : sequence of array, shape (m,)
+        S at the lines of each.
     """
 
     values: Array
@@ -83,9 +72,8 @@ class LineFit:
     degrees: Array
     bound: Array
     condition_number: float
-    shape: Shape
-    between: Array
-    pulled: Array
+    problems: Sequence[Problem]
+    powers: Sequence[Array]
 
     @property
     def standard_errors(self) -> Array:
@@ -93,53 +81,22 @@ class LineFit:
         return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=np.float64)
 
 
-@dataclass(frozen=True)
-class PooledSolution:
-    """Parameters that epochs share, where the iteration settled.
-
-    Attributes
-    ----------
-    values : array, shape (p,)
-    shape : Shape
-    bound : array, shape (p, p)
-        As in `LineFit`.
-    problems : sequence of Problem
-        At the solution.
-    everything : sequence of Lines
-    weighted : sequence of array
-        U of each epoch.
-    inverse : array, shape (p, p)
-        C.
-    """
-
-    values: Array
-    shape: Shape
-    bound: Array
-    problems: Sequence[Problem]
-    everything: Sequence[Lines]
-    weighted: Sequence[Complex]
-    inverse: Array
-
-
-def fit_single(
-    observation: Observation,
+def fit_lines(
+    observations: Sequence[Observation],
     linearise: Linearise,
     start: Array,
-    shape: Shape | None = None,
-    problem: Problem | None = None,
+    powers: Sequence[Array] | None = None,
 ) -> LineFit:
-    """Fit one epoch.
+    """Fit epochs that share their parameters; one epoch is fitted alone.
 
     Parameters
     ----------
-    observation : Observation
+    observations : sequence of Observation
     linearise : callable
         Makes the problems at given parameters.
     start : array, shape (p,)
-    shape : Shape, optional
-        Power of the noise that epochs of the same kind share; else this epoch's own is found.
-    problem : Problem, optional
-        Use this problem and do not iterate: for instruments from a pooled estimate.
+    powers : sequence of array, shape (m,), optional
+        S of each, where it is known; else it is that of the residual.
 
     Raises
     ------
@@ -147,150 +104,145 @@ def fit_single(
         If the perturbation did not move the joint enough to tell the parameters apart, or the
         iteration does not settle.
     """
-    lines = observation.lines
-    smoother = smoother_for([lines])
-    values = np.array(start, dtype=np.float64)
-    weight_from = shape
-    fixed = problem is not None
-    for iteration in range(1 if fixed and shape is not None else ITERATIONS):
-        if problem is None or not fixed:
-            (problem,) = linearise([observation], values)
-        if shape is None and iteration < UNDAMPED:
-            weight_from = shared_density([lines], [problem], values, smoother)
-        assert weight_from is not None
-        weighted = problem.instruments / weight_from.at(lines)[:, None]
-        inverse = scaled_inverse((weighted.conj().T @ problem.regressors).real)
-        step = inverse @ (weighted.conj().T @ problem.target).real - values
-        step = step * (1.0 if iteration < UNDAMPED else 0.5)
+    given, values = powers, np.array(start, dtype=np.float64)
+    for iteration in range(ITERATIONS):
+        free = iteration < UNDAMPED
+        problems = linearise(observations, values)
+        if powers is None or (given is None and free):
+            powers = shared_powers(problems, values)
+        gram, moment, weighted = sums(problems, powers)
+        inverse = scaled_inverse(gram)
+        step = (inverse @ moment - values) * (1.0 if free else 0.5)
         values = values + step
-        scale = np.sqrt(np.diag(variance_bound([problem], [lines], [weighted])))
+        scale = np.sqrt(np.diag(scaled_inverse(_information(problems, weighted))))
         if np.all(np.abs(step) < CONVERGED * scale):
             break
-    assert problem is not None
-    assert weight_from is not None
-    if not (fixed and shape is not None):
-        _refuse_unsettled(step, scale, values)
-    residual = problem.target - problem.regressors @ values
-    covariance, degrees = line_covariance(
-        inverse, weighted, residual, smoother, weight_from.at(lines)
-    )
-    spread = lines.grid.spread
-    # The epoch's own level on the common shape.
-    common = weight_from.at(lines)
-    own = common * smoother(np.abs(residual) ** 2 / common)
-    return LineFit(
-        values,
-        spread * covariance,
-        degrees / spread,
-        variance_bound([problem], [lines], [problem.instruments / own[:, None]]),
-        condition_number([problem], [lines], weight_from),
-        weight_from,
-        moved_elsewhere([problem], [common], values),
-        loop_pull([problem], [common], values),
-    )
+    if not np.all(np.abs(step) < np.maximum(SETTLED * scale, SETTLED_SHARE * np.abs(values))):
+        raise ValueError(
+            f"the estimate did not settle in {ITERATIONS} iterations: the motion tells J, B and K "
+            "apart too little, or, where the perturbation is used, it causes too little of the "
+            "motion or the controller's values are far off (--controller, per rad)"
+        )
+    assert powers is not None
+    return _with_uncertainty(problems, powers, weighted, inverse, values, found=given is None)
 
 
-def fit_pooled(
-    observations: Sequence[Observation], linearise: Linearise, start: Array
-) -> tuple[LineFit, list[Problem]]:
-    """Fit epochs that share the joint; also return their problems at the solution.
-
-    From ten epochs on the covariance comes from the scatter between them, whatever its cause: noise
-    or a joint that is not quite the same each time. With fewer, the scatter itself is poorly known,
-    and each variance is the larger of that and what the lines say.
+def fit_at(problems: Sequence[Problem], powers: Sequence[Array]) -> LineFit:
+    """Return the fit where instruments and weights are those given: for one epoch of several.
 
     Raises
     ------
     ValueError
-        If the perturbation did not move the joint enough to tell the parameters apart.
+        As `fit_lines`.
     """
-    solution = solve_pooled(observations, linearise, start)
-    return with_uncertainty(solution), list(solution.problems)
+    gram, moment, weighted = sums(problems, powers)
+    inverse = scaled_inverse(gram)
+    return _with_uncertainty(problems, powers, weighted, inverse, inverse @ moment, found=False)
 
 
-def solve_pooled(
-    observations: Sequence[Observation], linearise: Linearise, start: Array
-) -> PooledSolution:
-    """Iterate until weights and linearisation of epochs that share the joint no longer change.
+def shared_powers(problems: Sequence[Problem], values: Array) -> list[Array]:
+    """Return the mean power of the residuals at the lines of each, smoothed.
+
+    It is found on the lines of the longest epoch, as that of a window of one energy.
 
     Raises
     ------
     ValueError
-        As `fit_pooled`.
+        If nothing is left at some lines.
     """
-    everything = [observation.lines for observation in observations]
-    smoother = smoother_for(everything)
-    values = np.array(start, dtype=np.float64)
-    for iteration in range(ITERATIONS):
-        problems = linearise(observations, values)
-        if iteration < UNDAMPED:
-            shape = shared_density(everything, problems, values, smoother)
-        gram = np.zeros((values.size, values.size))
-        moment = np.zeros(values.size)
-        weighted = weighted_instruments(problems, everything, shape)
-        for problem, own in zip(problems, weighted, strict=True):
-            gram += (own.conj().T @ problem.regressors).real
-            moment += (own.conj().T @ problem.target).real
-        inverse = scaled_inverse(gram)
-        step = (inverse @ moment - values) * (1.0 if iteration < UNDAMPED else 0.5)
-        values = values + step
-        bound = variance_bound(problems, everything, weighted)
-        if np.all(np.abs(step) < CONVERGED * np.sqrt(np.diag(bound))):
-            break
-    _refuse_unsettled(step, np.sqrt(np.diag(bound)), values)
-    return PooledSolution(values, shape, bound, problems, everything, weighted, inverse)
+    grids = [problem.observation.lines.grid for problem in problems]
+    finest = max(grids, key=lambda grid: grid.line.size)
+    total = np.zeros(finest.line.size)
+    for problem, grid in zip(problems, grids, strict=True):
+        power = np.abs(problem.target - problem.regressors @ values) ** 2
+        total += power_on(finest, grid, power)
+    power = smoother_for(finest.line, len(problems))(total / len(problems))
+    if not np.all(power > 0):
+        raise ValueError("the fit leaves nothing at some frequencies: are the channels simulated?")
+    made = {id(grid.line): power_on(grid, finest, power) for grid in grids}
+    return [made[id(grid.line)] for grid in grids]
 
 
-def with_uncertainty(solution: PooledSolution) -> LineFit:
-    """Return a solution with its covariance."""
-    everything, shape, values = solution.everything, solution.shape, solution.values
-    powers = [shape.at(lines) for lines in everything]
-    covariance, degrees = _pooled_covariance(solution)
+def _information(problems: Sequence[Problem], weighted: Sequence[Complex]) -> Array:
+    """Return 2 Σ Re(U^H Z), the inverse of the least covariance (Cramér–Rao)."""
+    total: Array = np.zeros(())
+    made: dict[int, Array] = {}
+    for problem, own in zip(problems, weighted, strict=True):
+        if id(own) not in made:
+            made[id(own)] = 2 * (own.conj().T @ problem.instruments).real
+        total = total + made[id(own)] * problem.observation.lines.grid.used_share
+    return total
+
+
+def _with_uncertainty(
+    problems: Sequence[Problem],
+    powers: Sequence[Array],
+    weighted: Sequence[Complex],
+    inverse: Array,
+    values: Array,
+    *,
+    found: bool,
+) -> LineFit:
+    """Return a solution with its covariance; `found` says that the powers are of its residual.
+
+    From ten epochs on that comes from the scatter between them, whatever its cause: noise or a
+    joint that is not quite the same each time. With fewer, the scatter itself is poorly known, and
+    each variance is the larger of that and what the lines say.
+    """
+    p, count = values.size, len(problems)
+    made = [
+        Solved(inverse, own, problem.regressors, power, problem.observation.lines.grid.spread)
+        for problem, power, own in zip(problems, powers, weighted, strict=True)
+    ]
+    if found:
+        taken = np.zeros((p, p))
+        for problem, solved in zip(problems, made, strict=True):
+            line = problem.observation.lines.grid.line
+            taken += solved.taken_by_weights(smoother_for(line, count), count)
+        inverse = with_weights(inverse, taken)
+    effects, of_lines, squares = np.empty((count, p)), np.zeros((p, p)), np.zeros(p)
+    for place, (problem, solved) in enumerate(zip(problems, made, strict=True)):
+        residual = problem.target - problem.regressors @ values
+        effects[place] = inverse @ (residual @ solved.weighted.conj()).real
+        if count >= ENOUGH_EPOCHS:
+            continue
+        smoother = smoother_for(problem.observation.lines.grid.line, 1)
+        # The epoch's own level on the common shape.
+        own = replace(solved, inverse=inverse)
+        left = own.density(residual, smoother)
+        part, degrees = own.covariance(left, smoother)
+        of_lines += part
+        squares += np.diag(part) ** 2 / degrees
+    if count == 1:
+        weighted = [problem.instruments / left[:, None]]
+    covariance = effects.T @ effects * (count / max(count - 1, 1))
+    degrees = np.full(p, count - 1.0)
+    if count < ENOUGH_EPOCHS:
+        wider = np.diag(covariance) > np.diag(of_lines) if count > 1 else np.zeros(p, dtype=bool)
+        scale = np.sqrt(np.where(wider, np.diag(covariance) / np.diag(of_lines), 1.0))
+        covariance = of_lines * np.outer(scale, scale)
+        degrees = np.where(wider, degrees, np.diag(of_lines) ** 2 / squares)
     return LineFit(
         values,
         covariance,
         degrees,
-        solution.bound,
-        condition_number(solution.problems, everything, shape),
-        shape,
-        moved_elsewhere(solution.problems, powers, values),
-        loop_pull(solution.problems, powers, values),
+        scaled_inverse(_information(problems, weighted)),
+        _condition_number(problems[0], powers[0]),
+        problems,
+        powers,
     )
 
 
-def _refuse_unsettled(step: Array, scale: Array, values: Array) -> None:
-    if not np.all(np.abs(step) < np.maximum(SETTLED * scale, SETTLED_SHARE * np.abs(values))):
-        raise ValueError(
-            f"the estimate did not settle in {ITERATIONS} iterations: the perturbation causes too "
-            "little of the motion, or the controller's values are far off (--controller, per rad)"
-        )
+def _condition_number(problem: Problem, power: Array) -> float:
+    """Return that of the whitened instruments, each scaled to unit length.
 
-
-def _pooled_covariance(solution: PooledSolution) -> tuple[Array, Array]:
-    """Return covariance and degrees of freedom."""
-    shape, inverse, values = solution.shape, solution.inverse, solution.values
-    p, count = values.size, len(solution.problems)
-    moments = np.empty((count, p))
-    of_lines = np.zeros((p, p))
-    squares = np.zeros(p)
-    smoothers: dict[int, Smoother] = {}
-    for i, (problem, lines, weighted) in enumerate(
-        zip(solution.problems, solution.everything, solution.weighted, strict=True)
-    ):
-        smoother = smoothers.setdefault(id(lines.grid.line), smoother_for([lines]))
-        residual = problem.target - problem.regressors @ values
-        moments[i] = (weighted.conj().T @ residual).real
-        part, degrees = line_covariance(inverse, weighted, residual, smoother, shape.at(lines))
-        spread = lines.grid.spread
-        of_lines += spread * part
-        squares += (spread * np.diag(part)) ** 2 / (degrees / spread)
-    between = inverse @ (moments.T @ moments) @ inverse.T * (count / max(count - 1, 1))
-    if count >= ENOUGH_EPOCHS:
-        return between, np.full(p, count - 1.0)
-    degrees_of_lines = np.diag(of_lines) ** 2 / squares
-    wider = np.diag(between) > np.diag(of_lines)
-    if count == 1 or not np.any(wider):
-        return of_lines, degrees_of_lines
-    scale = np.sqrt(np.maximum(np.diag(between) / np.diag(of_lines), 1.0))
-    covariance = of_lines * np.outer(scale, scale)
-    return covariance, np.where(wider, count - 1.0, degrees_of_lines)
+    Of least squares that of the motion itself: lines that hold noise alone tell J, B and K apart
+    where they are whitened, and show nothing of the joint.
+    """
+    whitened = problem.observation.excitation is not None
+    gram = sums([problem._replace(regressors=problem.instruments)], [power] if whitened else None)[
+        0
+    ]
+    size = np.sqrt(np.diag(gram))
+    least, *_, most = np.linalg.eigvalsh(gram / np.outer(size, size))
+    return float(np.sqrt(most / least)) if least > 0 else np.inf

@@ -10,8 +10,8 @@ and once more for the acceleration where the angle alone was measured,
     ∫ w e^(−iωt) θ'' dt = −ω² ∫ w e^(−iωt) θ dt − 2iω ∫ w' e^(−iωt) θ dt + ∫ w'' e^(−iωt) θ dt
 
 so nothing is differentiated. What is left is linear in J, B and K at every line, all signals are
-treated alike, and drift and noise outside the band simply are other lines (the modulating
-functions of Shinbrot 1957; Pearson and Lee 1985).
+treated alike, and drift and noise outside the band are other lines (the modulating functions of
+Shinbrot 1957; Pearson and Lee 1985).
 
 The integrals are sums over the samples of the torque, at the stamps of the torque: a torque that
 was sampled at a point in time is held against the motion at that point. Where the command is
@@ -69,15 +69,15 @@ class Grid:
     window_slope_per_s, window_curvature_per_s2 : array, shape (n,)
         w' and w''.
     line : array of int, shape (m,)
-        Which lines of the FFT are used.
+        Which lines of the FFT are used, all from the first to the last.
     omega_rad_s : array, shape (m,)
     energy : float
         Σ w²: white noise of unit variance puts this much power into every line.
     window_lines : complex array, shape (m,)
         What a constant would leave at the lines.
     spread : float
-        What is left out makes neighbouring lines alike. By this factor the variance of an estimate
-        is then larger than independent lines would have it (`window.repetition`).
+        The window makes neighbouring lines alike. By this factor the variance of an estimate is
+        larger than independent lines would have it (`window.repetition`).
     """
 
     time_s: Array
@@ -92,58 +92,67 @@ class Grid:
     spread: float = 1.0
 
     @property
+    def used_share(self) -> float:
+        """The samples that are not left out, of all."""
+        return float(np.count_nonzero(self.window) / self.window.size)
+
+    @property
     def band_hz(self) -> tuple[float, float]:
         """The first and the last line."""
         return float(self.omega_rad_s[0] / (2 * np.pi)), float(self.omega_rad_s[-1] / (2 * np.pi))
 
     def transform(self, values: Array) -> Complex:
-        """Return Σ w x e^(−iωt) at the lines, free of the mean of x."""
+        """Return Σ w x e^(−iωt) at the lines, free of the mean of x: (..., n) to (..., m)."""
         return np.asarray(self.transforms(values, 0)[0, 0])
 
-    def transforms(self, values: Array, derivatives: int) -> Complex:
+    def transforms(self, values: Array, derivatives: int, *, halves: bool = False) -> Complex:
         """Return `transform` of x and of its derivatives, without differentiating it.
 
-        Means go, of derivatives too: ∫ w² x' dt = −∫ (w²)' x dt. Beside each stands half the
-        difference of what the even and the odd samples give: the spectrum as far below half the
-        rate as the line is above zero, which is noise where the motion is slow.
+        Means go, of derivatives too: ∫ w² x' dt = −∫ (w²)' x dt.
 
         Parameters
         ----------
-        values : array, shape (n,)
+        values : array, shape (..., n)
         derivatives : int
             How many, up to 2.
+        halves : bool
+            Also return half the difference of what the even and the odd samples give: the spectrum
+            as far below half the rate as the line is above zero, which is noise where the motion is
+            slow.
 
         Returns
         -------
-        complex array, shape (derivatives + 1, 2, m)
-            x, x', x''; the line, and half the difference.
+        complex array, shape (1 or 2, derivatives + 1, ..., m)
+            Of x, x', x''.
         """
-        w, slope, curvature = self.window, self.window_slope_per_s, self.window_curvature_per_s2
-        centred = values - float(np.add.reduce(w**2 * values)) / self.energy
-        half, turn = values.size // 2, 1j * self.omega_rad_s
-
-        def lines(window: Array) -> Complex:
-            windowed = window * centred
-            spectrum = scipy.fft.rfft(windowed)
-            if values.size % 2 == 0:
-                apart = spectrum[half - self.line].conj()
-            else:
-                windowed[1::2] *= -1
-                apart = scipy.fft.rfft(windowed)[self.line]
-            return np.stack([spectrum[self.line], apart])
-
-        def without_mean(derivative: Complex, by_parts: Array) -> Complex:
-            mean = float(np.add.reduce(by_parts * centred)) / self.energy
-            return np.stack([derivative[0] - mean * self.window_lines, derivative[1]])
-
-        through = lines(w)
-        found = [through]
+        windows = self.window, self.window_slope_per_s, self.window_curvature_per_s2
+        w, slope, _ = windows
+        centred = values - (values @ (w * w / self.energy))[..., None]
+        through = np.empty((derivatives + 1, *values.shape))
+        for window, row in zip(windows, through, strict=False):
+            np.multiply(window, centred, out=row)
+        lines, turn = self._lines(through, halves), 1j * self.omega_rad_s
+        found, means = [lines[:, 0]], 2 / self.energy * (through @ w)[..., None]
         if derivatives > 0:
-            through_slope = lines(slope)
-            found.append(without_mean(turn * through - through_slope, -2 * w * slope))
+            found.append(turn * lines[:, 0] - lines[:, 1])
+            found[1][0] += means[1] * self.window_lines
         if derivatives > 1:
-            twice = turn**2 * through - 2 * turn * through_slope + lines(curvature)
-            found.append(without_mean(twice, 2 * (slope**2 + w * curvature)))
+            mean = means[2] + 2 / self.energy * (through[1] @ slope)[..., None]
+            found.append(turn**2 * lines[:, 0] - 2 * turn * lines[:, 1] + lines[:, 2])
+            found[2][0] -= mean * self.window_lines
+        return np.stack(found, axis=1)
+
+    def _lines(self, through: Array, halves: bool) -> Complex:
+        """Return the lines of signals through the window, and half the differences."""
+        n, place = through.shape[-1], slice(int(self.line[0]), int(self.line[-1]) + 1)
+        spectra = scipy.fft.rfft(through)
+        found = [spectra[..., place]]
+        if halves and n % 2 == 0:
+            found.append(spectra[..., n // 2 - self.line].conj())
+        elif halves:
+            turned = through.copy()
+            turned[..., 1::2] *= -1
+            found.append(scipy.fft.rfft(turned)[..., place])
         return np.stack(found)
 
 
@@ -159,7 +168,7 @@ class Lines:
         Acceleration, velocity and angle.
     noise : complex array, shape (m, 3), or None
         Half the difference of what the even and the odd samples of the motion give, whose noise is
-        independent; None where the motion lies between its samples.
+        independent; None where that was not wanted, or the motion lies between its samples.
     """
 
     grid: Grid
@@ -208,18 +217,23 @@ def epoch_grid(
         used.append(epoch.channels["perturbation_nm"])
     time_s, rate_hz = _times(torque, used)
     if samples is not None:
-        n = samples(time_s.size, rate_hz)
-        time_s = time_s[time_s.size - n :]
-    else:
-        n = scipy.fft.prev_fast_len(time_s.size, real=True) if time_s.size else 0
-        time_s = time_s[:n]
-    if n == 0:
-        return Grid(time_s, rate_hz, *_layout(n, float(f"{rate_hz:.9g}"), band_hz, taper_s, ()))
+        time_s = time_s[time_s.size - samples(time_s.size, rate_hz) :]
+    elif time_s.size:
+        time_s = time_s[: scipy.fft.prev_fast_len(time_s.size, real=True)]
+    return grid_at(time_s, rate_hz, band_hz, taper_s, epoch)
+
+
+def grid_at(
+    time_s: Array, rate_hz: float, band_hz: tuple[float, float], taper_s: float, epoch: Epoch
+) -> Grid:
+    """Return the grid of these samples of an epoch; parameters and errors as for `epoch_grid`."""
+    start_s = float(time_s[0]) if time_s.size else 0.0
     holes = tuple(
-        (round(stretch.start_s - float(time_s[0]), 9), round(stretch.stop_s - float(time_s[0]), 9))
+        (round(stretch.start_s - start_s, 9), round(stretch.stop_s - start_s, 9))
         for stretch in epoch.left_out
     )
-    return Grid(time_s, rate_hz, *_layout(n, float(f"{rate_hz:.9g}"), band_hz, taper_s, holes))
+    rounded_hz = float(f"{rate_hz:.9g}")
+    return Grid(time_s, rate_hz, *_layout(time_s.size, rounded_hz, band_hz, taper_s, holes))
 
 
 @lru_cache(maxsize=32)
@@ -240,7 +254,7 @@ def _layout(
             f"{duration_s:.3g} s hold {line.size} spectral lines from {low:g} to {high:g} Hz; "
             f"at least {FEWEST_LINES} are needed"
         )
-    whole = window = tapered_ends(n, rate_hz, taper_s)
+    window = tapered_ends(n, rate_hz, taper_s)
     for hole_s in holes_s:
         window = with_hole(window, rate_hz, taper_s, hole_s)
     energy = float(np.sum(window.value**2))
@@ -248,8 +262,7 @@ def _layout(
     omega = np.asarray(2 * np.pi * line / duration_s, dtype=np.float64)
     for part in (*window, line, omega, constant):
         part.setflags(write=False)
-    spread = repetition(window.value) / repetition(whole.value) if holes_s else 1.0
-    return *window, line, omega, energy, constant, spread
+    return *window, line, omega, energy, constant, repetition(window.value)
 
 
 def epoch_lines(
@@ -257,6 +270,8 @@ def epoch_lines(
     grid: Grid,
     motion: EpochMotion,
     torque_filter: TorqueFilter | None = None,
+    *,
+    noise: bool = False,
 ) -> Lines:
     """Return torque and motion at the lines.
 
@@ -264,86 +279,74 @@ def epoch_lines(
     ----------
     epoch : Epoch
     grid : Grid
-        From `epoch_grid` for this epoch or one with the same stamps.
+        Of this epoch or one with the same stamps.
     motion : EpochMotion
         That of the epoch. Where its drive is known, what the command did between the samples is
         taken into account.
     torque_filter : TorqueFilter or None
         That the torque went through; the motion is sent through it too.
+    noise : bool
+        Whether `Lines.noise` is wanted.
     """
-    torque = grid.transform(values_at(epoch.channels["torque_nm"], grid.time_s, SAME_TIME))
-    angle, velocity = (
-        _sampled(epoch.channels.get(name), grid.time_s) for name in ("angle_rad", "velocity_rad_s")
-    )
+    stamped, time_s = epoch.channels["torque_nm"], grid.time_s
+    moving = motion_channels(epoch)
+    own = {
+        one.name: one.values[place]
+        for one in moving
+        if (place := sampled(one, time_s, SAME_TIME)) is not None
+    }
+    angle, velocity = own.get("angle_rad"), own.get("velocity_rad_s")
+    recorded = angle is not None and len(own) == len(moving)
     through = filtered(torque_filter, grid.omega_rad_s)
-    at_stamps = [_sampled(one, grid.time_s) is not None for one in motion_channels(epoch)]
-    if motion.driven_at is None:
-        if angle is not None and all(at_stamps):
-            return Lines(grid, torque, *(through * spectra(grid, angle, velocity)))
-        between = spectra(grid, *motion.beyond_at(grid.time_s, SAME_TIME))
-        return Lines(grid, torque, through * between[0])
-    command = motion.driven_at.command
-    tick, after_s = since_ticks(command, grid.time_s, 0.0)
-    interval_s = 1.0 / command.mean_rate_hz
-    if angle is not None and velocity is not None and in_step(tick, after_s, interval_s):
-        beyond = seen_beyond_samples(
-            motion.driven_at.drive,
-            torque_filter,
-            grid.omega_rad_s,
-            interval_s,
-            float(np.mean(after_s)),
-        )
-        lines, noise = through * spectra(grid, angle, velocity)
-        sent = grid.transform(command.values[tick])
-        return Lines(grid, torque, lines + beyond * sent[:, None], noise)
-    lines = through * spectra(grid, *motion.beyond_at(grid.time_s, SAME_TIME))[0]
-    # At the stamps of the torque, and from there like the torque.
-    stamped = epoch.channels["torque_nm"]
-    for column, part in enumerate(driven_behind(motion.driven_at, torque_filter, stamped)):
-        there = Channel(stamped.name, stamped.time_s, part)
-        lines[:, column] += grid.transform(values_at(there, grid.time_s, SAME_TIME))
-    return Lines(grid, torque, lines)
+    caused: list[Array] = []
+    if motion.driven_at is not None:
+        command = motion.driven_at.command
+        tick, after_s = since_ticks(command, time_s, 0.0)
+        interval_s, mean_s = 1.0 / command.mean_rate_hz, float(np.mean(after_s))
+        recorded &= velocity is not None and in_step(tick, after_s, interval_s)
+        if recorded:
+            caused = [command.values[tick]]
+        else:
+            # At the stamps of the torque, and from there like the torque.
+            caused = [
+                values_at(Channel(stamped.name, stamped.time_s, part), time_s, SAME_TIME)
+                for part in driven_behind(motion.driven_at, torque_filter, stamped)
+            ]
+    if not recorded:
+        angle, velocity = motion.beyond_at(time_s, SAME_TIME)
+    assert angle is not None  # where it is not recorded it is made
+    torque = values_at(stamped, time_s, SAME_TIME)
+    lines, *apart = through * spectra(grid, angle, velocity, halves=noise and recorded)
+    first, *others = grid.transform(np.stack([torque, *caused]))
+    added = np.stack(others, axis=-1) if others else 0.0
+    if recorded and motion.driven_at is not None:
+        drive, omega = motion.driven_at.drive, grid.omega_rad_s
+        added = added * seen_beyond_samples(drive, torque_filter, omega, interval_s, mean_s)
+    return Lines(grid, first, lines + added, *apart)
 
 
-def spectra(grid: Grid, angle_rad: Array, velocity_rad_s: Array | None) -> Complex:
-    """Return acceleration, velocity and angle at the lines, and their noise.
+def spectra(
+    grid: Grid, angle_rad: Array, velocity_rad_s: Array | None, *, halves: bool = True
+) -> Complex:
+    """Return acceleration, velocity and angle (of which the velocity may be made) at the lines.
 
-    Parameters
-    ----------
-    grid : Grid
-    angle_rad, velocity_rad_s : array, shape (n,)
-        Without a velocity it is that of the angle.
-
-    Returns
-    -------
-    complex array, shape (2, m, 3)
-        Motion, and half the difference of even and odd samples.
+    The shape is (1 or 2, m, 3): `halves` are those of `Grid.transforms`.
     """
     if velocity_rad_s is None:
-        columns = grid.transforms(angle_rad, 2)[::-1]
+        found = grid.transforms(angle_rad, 2, halves=halves)[:, ::-1]
     else:
-        columns = np.concatenate(
-            [grid.transforms(velocity_rad_s, 1)[::-1], grid.transforms(angle_rad, 0)]
-        )
-    return np.moveaxis(columns, 0, -1)
-
-
-def _sampled(channel: Channel | None, time_s: Array) -> Array | None:
-    """Return a channel at the times if it was sampled at just these, else None."""
-    place = None if channel is None else sampled(channel, time_s, SAME_TIME)
-    return None if place is None or channel is None else channel.values[place]
+        fast = grid.transforms(velocity_rad_s, 1, halves=halves)[:, ::-1]
+        found = np.concatenate([fast, grid.transforms(angle_rad, 0, halves=halves)], axis=1)
+    return np.moveaxis(found, 1, -1)
 
 
 def _times(torque: Channel, used: list[Channel]) -> tuple[Array, float]:
     """Return the torque's own stamps where every channel overlaps, or a uniform grid near them."""
     rate_hz = torque.rate_hz
-    start = max(float(channel.time_s[0]) for channel in used)
-    stop = min(float(channel.time_s[-1]) for channel in used)
-    inside = slice(
-        int(np.searchsorted(torque.time_s, start - SAME_TIME / rate_hz)),
-        int(np.searchsorted(torque.time_s, stop + SAME_TIME / rate_hz)),
-    )
-    own = torque.time_s[inside]
+    start_s = max(float(channel.time_s[0]) for channel in used) - SAME_TIME / rate_hz
+    stop_s = min(float(channel.time_s[-1]) for channel in used) + SAME_TIME / rate_hz
+    first, last = np.searchsorted(torque.time_s, [start_s, stop_s])
+    own = torque.time_s[first:last]
     if own.size > 1:
         even = own[0] + np.arange(own.size) * ((own[-1] - own[0]) / (own.size - 1))
         if np.max(np.abs(own - even)) < SAME_TIME / rate_hz:

@@ -18,15 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.closedloop.line_noise import line_covariance
-from rigidimeter.analysis.estimation.closedloop.line_weights import (
-    scaled_inverse,
-    shared_density,
-    smoother_for,
-)
+from rigidimeter.analysis.estimation.closedloop.line_noise import Solved, smoother_for
 from rigidimeter.analysis.estimation.closedloop.linear_problems import direct, least_squares
 from rigidimeter.analysis.estimation.closedloop.loop_pull import loop_pull
+from rigidimeter.analysis.estimation.closedloop.normal_equations import scaled_inverse, sums
 from rigidimeter.analysis.estimation.closedloop.observation import observe_motion
+from rigidimeter.analysis.estimation.closedloop.refine import shared_powers
 from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look, too_biased
 from rigidimeter.analysis.estimation.found import half_widths
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
@@ -57,13 +54,12 @@ def unbiased(prepared: PreparedEpoch, fit: Fit, by_noise: bool) -> Array:
         Or all lines count alike.
     """
     observation = prepared.once(observe_motion)
-    problems, lines = direct([observation], fit.value), [observation.lines]
+    problems = direct([observation], fit.value)
     if by_noise:
-        values = fit.value
-        power = shared_density(lines, problems, values, smoother_for(lines)).at(lines[0])
+        values, powers = fit.value, shared_powers(problems, fit.value)
     else:
-        values, power = least_squares(problems), np.ones(lines[0].torque_nm.size)
-    return values - loop_pull(problems, [power], values)
+        values, powers = least_squares(problems), [np.ones(observation.lines.torque_nm.size)]
+    return values - loop_pull(problems, powers, values)
 
 
 def loop_bias(
@@ -94,17 +90,19 @@ def _unweighted(case: Case) -> _Unweighted | None:
     if case.uses_perturbation:
         return None
     observation = case.prepared.once(observe_motion)
-    (problem,), lines = direct([observation], case.parameters), observation.lines
-    inverse = scaled_inverse((problem.instruments.conj().T @ problem.regressors).real)
-    alike = inverse @ (problem.instruments.conj().T @ problem.target).real
-    pull = loop_pull([problem], [np.ones(lines.torque_nm.size)], alike)
+    problems, grid = direct([observation], case.parameters), observation.lines.grid
+    gram, moment, (instruments,) = sums(problems)
+    inverse = scaled_inverse(gram)
+    alike = inverse @ moment
+    pull = loop_pull(problems, [np.ones(grid.line.size)], alike)
     if not np.all(np.isfinite(pull)):
         return None
-    smoother = smoother_for([lines])
-    shape = shared_density([lines], [problem], alike, smoother).at(lines)
-    residual = problem.target - problem.regressors @ alike
-    covariance, _ = line_covariance(inverse, problem.instruments, residual, smoother, shape)
-    chance = STANDARD_ERRORS * np.sqrt(lines.grid.spread * np.diag(covariance))
+    (shape,) = shared_powers(problems, alike)
+    residual = problems[0].target - problems[0].regressors @ alike
+    smoother = smoother_for(grid.line, 1)
+    solved = Solved(inverse, instruments, problems[0].regressors, shape, grid.spread)
+    covariance, _ = solved.covariance(solved.density(residual, smoother), smoother)
+    chance = STANDARD_ERRORS * np.sqrt(np.diag(covariance))
     return _Unweighted(alike - pull, chance + PULL_SHARE * np.abs(pull))
 
 

@@ -16,7 +16,6 @@ from the angle alone and from the velocity alone; the torque says which of them 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +23,7 @@ import numpy as np
 from rigidimeter.analysis.estimation.bandlimited import bandlimited_signals, zero_phase_band
 from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look, at_most
 from rigidimeter.analysis.estimation.least_squares import fit_inertia_damping_stiffness
+from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import (
     Array,
     grid_rate_hz,
@@ -32,6 +32,7 @@ from rigidimeter.analysis.estimation.signals import (
     values_and_slopes,
 )
 from rigidimeter.analysis.estimation.stretches import sound
+from rigidimeter.core.findings import Effect
 from rigidimeter.core.records import Epoch
 from rigidimeter.core.settings import DiagnosticsSettings, EstimationSettings
 
@@ -82,11 +83,20 @@ def velocity_scale(fitted: tuple[float, float], settings: DiagnosticsSettings) -
     return at_most(value, settings.max_velocity_scale_percent, scale=fitted[0])
 
 
-def velocity_delay(fitted: tuple[float, float], settings: DiagnosticsSettings) -> Look:
-    """Return how late the velocity is against the angle, in ms; negative where it is early."""
-    scale, delay_s = fitted
-    value, most = 1e3 * delay_s / scale, settings.max_velocity_delay_ms
-    return Look(value, most, not abs(value) <= most)
+def velocity_delay(case: Case) -> Look | None:
+    """Return how late the velocity is against the angle, in ms; negative where it is early.
+
+    With the torque in time with the velocity B is K τ too low, which half its interval must hold.
+    """
+    scale, delay_s = _fitted(case)
+    if not np.isfinite([scale, delay_s]).all():
+        return None
+    late_s = delay_s / scale
+    bias = np.array([0.0, -case.parameters[2] * late_s, 0.0])
+    held_ms = 1e3 * abs(late_s) * case.half_widths[1] / max(abs(bias[1]), 1e-300)
+    most = min(case.settings.max_velocity_delay_ms, float(held_ms))
+    effect = Effect.of(bias, case.parameters, case.half_widths)
+    return Look(1e3 * late_s, most, not abs(1e3 * late_s) <= most, effect=effect)
 
 
 def velocity_shape(
@@ -148,31 +158,30 @@ def _r_squared(epoch: Epoch, band_hz: tuple[float, float], without: str) -> floa
         return float("nan")  # that motion cannot tell J, B and K apart
 
 
-def _velocity_fit(case: Case) -> tuple[float, float]:
-    return velocity_fit(case.epoch)
+def _fitted(case: Case) -> tuple[float, float]:
+    if case.prepared is None:
+        return velocity_fit(case.epoch)
+    return case.prepared.once(_velocity_fit)
 
 
-def _velocity(
-    case: Case, check: Callable[[tuple[float, float], DiagnosticsSettings], Look]
-) -> Look | None:
-    fitted = case.once(_velocity_fit)
+def _velocity_fit(prepared: PreparedEpoch) -> tuple[float, float]:
+    return velocity_fit(prepared.epoch)
+
+
+def _velocity_scale(case: Case) -> Look | None:
+    fitted = _fitted(case)
     # What does not move is found by other checks.
-    return check(fitted, case.settings) if np.isfinite(fitted).all() else None
+    return velocity_scale(fitted, case.settings) if np.isfinite(fitted).all() else None
 
 
 MOTION_CHECKS = (
     Check(
         "velocity_scale",
         ("angle_rad", "velocity_rad_s"),
-        lambda c: _velocity(c, velocity_scale),
+        _velocity_scale,
         of_fit=False,
     ),
-    Check(
-        "velocity_delay",
-        ("angle_rad", "velocity_rad_s"),
-        lambda c: _velocity(c, velocity_delay),
-        of_fit=False,
-    ),
+    Check("velocity_delay", ("angle_rad", "velocity_rad_s"), velocity_delay),
     Check(
         "velocity_shape",
         ("angle_rad", "velocity_rad_s"),

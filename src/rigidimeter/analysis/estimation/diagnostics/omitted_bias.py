@@ -17,9 +17,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother
-from rigidimeter.analysis.estimation.closedloop.linear_problems import Problem, instrumental
+from rigidimeter.analysis.estimation.closedloop.linear_problems import instrumental
+from rigidimeter.analysis.estimation.closedloop.normal_equations import solution, sums
 from rigidimeter.analysis.estimation.closedloop.observation import observe
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import Grid
 from rigidimeter.analysis.estimation.diagnostics.check_record import Case
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array
@@ -44,22 +44,16 @@ def moved(case: Case, beyond: BeyondLinear, groups: Sequence[Sequence[OmittedTer
     """
     terms = dict.fromkeys(term for group in groups for term in group)
     if case.uses_perturbation and case.prepared is not None:
-        weighted, problem, grid = _weighted(case, case.prepared)
-        here = beyond.motion.time_s
-        alone = {
-            term: _added(
-                weighted,
-                problem.regressors,
-                grid.transform(np.interp(grid.time_s, here, term.torque(beyond), 0.0, 0.0)),
-            )
-            for term in terms
-        }
+        grid, here = case.prepared.once(observe).lines.grid, beyond.motion.time_s
+        torques = [np.interp(grid.time_s, here, term.torque(beyond), 0.0, 0.0) for term in terms]
+        lines = grid.transform(np.reshape(torques, (-1, grid.time_s.size)))
+        alone = dict(zip(terms, _added(case, case.prepared, lines), strict=True))
         return [np.sum([alone[term] for term in group], axis=0)[None] for group in groups]
     low, high = case.signals.band_hz
     first, last = np.searchsorted(beyond.frequency_hz, (low, np.nextafter(high, np.inf))).tolist()
     inside = slice(first, last)
     motion = beyond.linear[inside]
-    alone = {term: _added(motion, motion, term.lines(beyond)[inside]) for term in terms}
+    alone = {term: _fitted(motion, term.lines(beyond)[inside]) for term in terms}
     refit = _Refit(beyond, [term.name for term in terms], inside)
     return [
         np.stack([case.parameters - refit.joint(group), np.sum([alone[t] for t in group], axis=0)])
@@ -71,26 +65,24 @@ def moved_by_linear(case: Case, beyond: BeyondLinear, term: LinearTerm) -> Array
     """Return what a linear term adds to J, B and K while it is left out, shape (1, 3)."""
     if not case.uses_perturbation or case.prepared is None:
         return (case.parameters - term.joint)[None]
-    weighted, problem, grid = _weighted(case, case.prepared)
-    lines = term.torque(problem.regressors, grid.omega_rad_s)
-    return _added(weighted, problem.regressors, lines)[None]
+    lines = case.prepared.once(observe).lines
+    torque = term.torque(lines.motion, lines.grid.omega_rad_s)
+    return _added(case, case.prepared, torque)[None]
 
 
-def _weighted(case: Case, prepared: PreparedEpoch) -> tuple[Complex, Problem, Grid]:
-    """Return the instruments over the power of the residual, the problem, and its lines."""
-    observation = prepared.once(observe)
-    grid = observation.lines.grid
-    (problem,) = instrumental([observation], case.parameters)
+def _added(case: Case, prepared: PreparedEpoch, torque: Complex) -> Array:
+    """Return (Σ Re U^H Φ)⁻¹ Σ Re U^H T for each torque, of shape (..., m); shape (..., 3)."""
+    (problem,) = instrumental([prepared.once(observe)], case.parameters)
     residual = problem.target - problem.regressors @ case.parameters
-    power = Smoother.over(grid.line, 4, 0.1)(np.abs(residual) ** 2)
-    return problem.instruments / np.maximum(power, 1e-300)[:, None], problem, grid
+    power = Smoother.over(problem.observation.lines.grid.line, 4, 0.1)(np.abs(residual) ** 2)
+    gram, moment, _ = sums([problem._replace(target=torque)], [np.maximum(power, 1e-300)])
+    return solution(gram, moment)
 
 
-def _added(weighted: Complex, regressors: Complex, torque: Complex) -> Array:
-    """Return (Σ Re U^H Φ)⁻¹ Σ Re U^H T, shape (3,)."""
-    scale = np.linalg.norm(regressors, axis=0)
-    gram = (weighted.conj().T @ (regressors / scale)).real
-    return np.asarray(np.linalg.solve(gram, (weighted.conj().T @ torque).real) / scale)
+def _fitted(columns: Complex, torque: Complex) -> Array:
+    """Return the columns' parts in a torque by least squares."""
+    upper = triangle(columns, torque)
+    return explained(upper[:, :-1], upper[:, -1]).values
 
 
 class _Refit:
@@ -121,5 +113,4 @@ class _Refit:
         signal, gains = self._beyond.reflexes(name)
         late = Filtered(signal[self._inside], gains.part(self._inside, slice(None)))
         best = late.column(strongest(columns, late, self._torque))
-        upper = triangle(np.column_stack([columns, best]), self._torque)
-        return explained(upper[:, :-1], upper[:, -1]).values[:3]
+        return _fitted(np.column_stack([columns, best]), self._torque)[:3]

@@ -28,6 +28,11 @@ from rigidimeter.analysis.estimation.closedloop.lack_of_fit import (
     same_sequence,
 )
 from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST
+from rigidimeter.analysis.estimation.closedloop.normal_equations import (
+    Problem,
+    solution,
+    sums,
+)
 from rigidimeter.analysis.estimation.closedloop.observation import (
     Observation,
     observe,
@@ -147,7 +152,7 @@ def in_bands(observed: Sequence[Observed]) -> tuple[Array, list[BandChange]]:
     ]
     try:
         return band_changes(members) if members else (np.full(3, np.nan), [])
-    except np.linalg.LinAlgError:
+    except ValueError:
         return np.full(3, np.nan), []  # the fits say why
 
 
@@ -247,16 +252,16 @@ def _in_half_the_band(observed: Sequence[Observed]) -> Array:
     """Return by how many % J, B and K change if only the lower half of the band is fitted."""
     both = []
     for share in (1.0, 0.5):
-        gram, moment = np.zeros((3, 3)), np.zeros(3)
+        problems, powers = [], []
         for member in observed:
             lines = member.observation.lines
             part = slice(0, int(share * lines.torque_nm.size))
-            power = np.abs(lines.torque_nm[part] - lines.motion[part] @ member.values) ** 2
-            weighted = member.caused[part] / np.mean(power)
-            gram += (weighted.conj().T @ lines.motion[part]).real
-            moment += (weighted.conj().T @ lines.torque_nm[part]).real
-        scale = np.sqrt(np.abs(np.diag(gram)))
-        both.append(np.linalg.lstsq(gram / np.outer(scale, scale), moment / scale)[0] / scale)
+            motion, torque = lines.motion[part], lines.torque_nm[part]
+            problems.append(Problem(member.caused[part], motion, torque, member.observation))
+            power = np.mean(np.abs(torque - motion @ member.values) ** 2)
+            powers.append(np.full(torque.size, power))
+        gram, moment, _ = sums(problems, powers)
+        both.append(solution(gram, moment))
     return np.asarray(100 * (both[1] / both[0] - 1))
 
 

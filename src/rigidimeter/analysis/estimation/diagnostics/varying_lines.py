@@ -15,8 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother
-from rigidimeter.analysis.estimation.closedloop.line_weights import ENOUGH_LINES, NEIGHBOURS
+from rigidimeter.analysis.estimation.closedloop.line_noise import smoother_for
 from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST
 from rigidimeter.analysis.estimation.closedloop.observation import (
     Observation,
@@ -131,7 +130,7 @@ def varying_lines(prepared: PreparedEpoch, parameters: Array) -> VaryingLines:
     below = int(grid.line[0]) - 1
     torque, motion = observation.lines.torque_nm, observation.lines.motion
     power = np.abs(torque - motion @ parameters) ** 2
-    noise = Smoother.over(grid.line, ENOUGH_LINES // 2, NEIGHBOURS)(power)
+    noise = smoother_for(grid.line, 1)(power)
     if not np.all(noise > 0):
         raise ValueError("the fit leaves nothing at some frequencies: are the channels simulated?")
     motion = np.concatenate([_low_motion(grid, wide.omega_rad_s[:below], angle, velocity), motion])

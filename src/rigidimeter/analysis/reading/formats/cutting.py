@@ -21,6 +21,7 @@ from rigidimeter.analysis.reading.formats.table import Table, label_text
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import MAX_EPOCHS
 from rigidimeter.core.records import Notice
+from rigidimeter.core.words import series
 
 ROWS_A_LABEL = 100
 """A column whose label changes more often, on average, is no column of trials."""
@@ -114,7 +115,9 @@ def by_length(source: str, clock: Rows, length_s: float) -> tuple[list[Stretch],
 
 
 def unused_labels(table: Table, used: Collection[str], n_rows: int) -> list[Notice]:
-    """Return a warning for each column that numbers trials by its name and values, and is unused.
+    """Return a warning for each unused column that numbers trials by its name and values.
+
+    Columns whose labels change at the same rows have one warning.
 
     Parameters
     ----------
@@ -123,19 +126,25 @@ def unused_labels(table: Table, used: Collection[str], n_rows: int) -> list[Noti
         Columns that are used.
     n_rows : int
     """
-    notices = []
+    alike: dict[tuple[int, ...], dict[str, list[str]]] = {}
     for name in (one for one in table.columns if one not in used and names_epochs(one)):
         column = table.columns[name]
         runs = _runs(column, n_rows // ROWS_A_LABEL) if column.size == n_rows else []
         labels = [label for label, _, _ in runs if label]
         if len(runs) > 1 and labels:
-            shown = ", ".join(labels[:3]) + (", …" if labels[3:] else "")
-            option = shlex.quote(f"epoch={name}")
-            text = (
-                f"{table.source}: column {name!r} ({shown}) is not used; --column {option} reads "
-                "each of its labels as an epoch"
-            )
-            notices.append(Notice("warning", text))
+            alike.setdefault(tuple(start for _, start, _ in runs), {})[name] = labels
+    notices = []
+    for columns in alike.values():
+        name, labels = next(iter(columns.items()))
+        shown = ", ".join(labels[:3]) + (", …" if labels[3:] else "")
+        others = [repr(other) for other in columns if other != name]
+        too = f", nor what changes with it: {series(others)}" if others else ""
+        option = shlex.quote(f"epoch={name}")
+        text = (
+            f"{table.source}: column {name!r} ({shown}) is not used{too}; --column {option} reads "
+            "each of its labels as an epoch"
+        )
+        notices.append(Notice("warning", text))
     return notices
 
 

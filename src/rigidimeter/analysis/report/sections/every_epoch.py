@@ -13,7 +13,8 @@ from rigidimeter.analysis.report.methods_prose import method_of
 from rigidimeter.analysis.report.sections.what_was_done import longest_s
 from rigidimeter.analysis.study import StudyResult, split_pooled
 from rigidimeter.analysis.study.drawing import channel_facts
-from rigidimeter.core.records import PARAMETER_VECTORS, PARAMETERS, Fit
+from rigidimeter.core.records import AMPLITUDE, PARAMETER_VECTORS, PARAMETERS, Fit
+from rigidimeter.core.units import deg_from_rad
 from rigidimeter.core.words import INTERVAL, Column, Table, number
 
 ALL_CONDITIONS = "(all)"
@@ -36,6 +37,13 @@ def _parameters(prefix: str = "") -> tuple[Column, ...]:
         )
         for p in PARAMETERS
     )
+
+
+AMPLITUDE_SHOWN = tuple(
+    Column(name, f"Angle {of} (°)", page_factor=deg_from_rad(1.0), digits=3)
+    for name, of in zip(AMPLITUDE, ("SD", "range"), strict=True)
+)
+"""How far the joint moved, beside K: in the band of the fit, and at all frequencies."""
 
 
 def _quality(prefix: str = "") -> tuple[Column, ...]:
@@ -68,7 +76,7 @@ def pooled_table(result: StudyResult, note: str) -> Table:
     return Table(
         "pooled",
         f"All epochs of a condition together{in_which}",
-        (WHO[2], *_parameters(), *_quality(), *band),
+        (WHO[2], *_parameters(), *AMPLITUDE_SHOWN, *_quality(), *band),
         [{"condition": condition} | _pooled_row(fit) for condition, fit in named],
         note=note,
         empty="No condition has a fit to all of its epochs.",
@@ -77,7 +85,7 @@ def pooled_table(result: StudyResult, note: str) -> Table:
 
 def _pooled_row(fit: Fit) -> dict[str, Any]:
     names = [f"{p.name}{ending}" for p in PARAMETERS for ending in PARAMETER_VECTORS.values()]
-    names += [*(column.name for column in _quality()), "n_samples"]
+    names += [*(column.name for column in _quality()), *AMPLITUDE, "n_samples"]
     low, high = fit.band_hz
     return (
         {"method": fit.method}
@@ -104,7 +112,7 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
         result,
         "estimates",
         f"Inertia, damping and stiffness, epoch by epoch{in_which}",
-        *(*WHO, *HOW, *_parameters(), *_quality(), *band, *counts, cautions),
+        *(*WHO, *HOW, *_parameters(), *AMPLITUDE_SHOWN, *_quality(), *band, *counts, cautions),
         empty="No epoch was fitted.",
         folding=True,
     )

@@ -51,10 +51,18 @@ def rubbing(epoch, friction_nm):
     return replace(epoch, channels={**epoch.channels, "torque_nm": more})
 
 
+def without_perturbation(epoch):
+    kept = {k: c for k, c in epoch.channels.items() if k != "perturbation_nm"}
+    return replace(epoch, channels=kept)
+
+
+@pytest.mark.parametrize("recorded", [True, False])
 @pytest.mark.parametrize("voluntary_sd_nm", [0.0, 0.1])
-def test_friction_is_not_taken_for_a_delay(simulated, voluntary_sd_nm):
+def test_friction_is_not_taken_for_a_delay(simulated, voluntary_sd_nm, recorded):
     settings, epochs = simulated(2, voluntary_sd_nm=voluntary_sd_nm)
     rubbed = [rubbing(epoch, 0.1) for epoch in epochs]
+    if not recorded:
+        rubbed = [without_perturbation(epoch) for epoch in rubbed]
     (found,) = estimate_delays({"file": prepare(rubbed, settings)})
     assert not found.corrected
     if not voluntary_sd_nm:
@@ -62,14 +70,13 @@ def test_friction_is_not_taken_for_a_delay(simulated, voluntary_sd_nm):
         assert "not corrected: friction explains it better" in found.remark
 
 
-def test_without_the_perturbation_it_is_said_and_not_corrected(simulated):
-    settings, (epoch,) = simulated()
-    kept = {k: c for k, c in epoch.channels.items() if k != "perturbation_nm"}
-    moved = prepare([late(replace(epoch, channels=kept), 0.004)], settings)
-    (found,) = estimate_delays({"file": moved})
-    assert found.delay_s == pytest.approx(0.004, abs=5e-4)
-    assert not found.corrected
-    assert "without the recorded perturbation" in found.remark
+@pytest.mark.parametrize("voluntary_sd_nm", [0.0, 0.1])
+def test_without_the_perturbation_the_motion_tells_it(simulated, voluntary_sd_nm):
+    settings, epochs = simulated(2, voluntary_sd_nm=voluntary_sd_nm)
+    moved = [late(without_perturbation(epoch), 0.004) for epoch in epochs]
+    (found,) = estimate_delays({"file": prepare(moved, settings)})
+    assert found.delay_s == pytest.approx(0.004, abs=2e-4)
+    assert found.corrected
 
 
 def test_a_source_without_perturbation_epochs_says_so():

@@ -5,12 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.scenarios.catalogue import SCENARIOS
 
 from rigidimeter.analysis.estimation.diagnostics.motion_checks import (
     velocity_fit,
     velocity_shape,
 )
 from rigidimeter.analysis.estimation.stretches import bridged
+from rigidimeter.analysis.study import estimate
 from rigidimeter.core.records import Channel, Epoch, LeftOut
 from rigidimeter.core.settings import DiagnosticsSettings
 
@@ -67,6 +69,22 @@ def test_a_ripple_in_one_of_them_is_found_and_the_torque_says_in_which(worse, va
     assert look.value == pytest.approx(15.0, rel=0.1)
     assert look.variant == variant
     assert (look.facts["by_angle"] > look.facts["by_velocity"]) == (worse == "velocity_rad_s")
+
+
+@pytest.mark.parametrize("name", ["velocity differenced", "velocity behind 40 Hz", "relaxed"])
+def test_a_late_velocity_is_said_where_it_moves_damping_beyond_its_interval(name):
+    """B is K τ too low, also where τ is far below the largest delay of the settings."""
+    (epoch,), truth = SCENARIOS[name].simulated(0, 1)
+    (fit,) = estimate([epoch], "iv", settings=SCENARIOS[name].analysed_with()).fits
+    said = [finding for finding in fit.findings if finding.name == "velocity_delay"]
+    if name == "relaxed":
+        assert said == []
+        return
+    (finding,) = said
+    assert finding.level == "caution"
+    assert finding.limit < 0.2
+    assert fit.high[1] < truth[0, 1]
+    assert 1e-3 * finding.value * truth[0, 2] == pytest.approx(truth[0, 1] - fit.value[1], rel=0.3)
 
 
 @pytest.mark.parametrize("worse", [None, "velocity_rad_s"])

@@ -6,6 +6,7 @@ from tests.scenarios.catalogue import SCENARIOS
 from tests.scenarios.recordings import measured_alone
 
 from rigidimeter.analysis.estimation.closedloop.between_samples import acceleration_late_s
+from rigidimeter.analysis.reading import identify
 from rigidimeter.analysis.study import estimate
 from rigidimeter.model import DriveModel
 
@@ -21,7 +22,8 @@ def test_the_acceleration_of_a_slow_drive_is_late_at_the_ticks(bandwidth_hz):
 @pytest.mark.parametrize(
     ("name", "late_ms", "recording", "epochs"),
     [
-        ("torque stamped 4 ms late", 4.0, 0, 1),
+        ("friction in the joint 0.02 N·m", 1.43, 0, 1),
+        ("torque stamped 4 ms late", 0.0, 0, 1),
         ("relaxed", 0.0, 0, 1),
         # 0.04 ms, at 3.1 standard errors and 1.02 times what B bears; ζ ω₀ T²/6 is 0.037 ms.
         ("ankle, relaxed", 0.0, 1, 4),
@@ -41,6 +43,30 @@ def test_a_delay_that_is_not_corrected_is_said_where_it_matters(name, late_ms, r
     # B τ off J is less than half its interval below that delay.
     J = analysis.fits[0]
     assert finding.limit <= 1e3 * 0.5 * (J.high[0] - J.low[0]) / J.value[1] * 1.001
+
+
+def test_of_arrays_it_is_said_as_of_a_file():
+    scenario = SCENARIOS["friction in the joint 0.02 N·m"]
+    (epoch,), _ = scenario.simulated(0, 1)
+    channels = measured_alone(epoch).channels
+    arrays = {name: channel.values for name, channel in channels.items()}
+    fit = identify(**arrays, rate_hz=1000.0, settings=scenario.analysed_with())
+    assert "torque_delay" in {finding.name for finding in fit.findings}
+
+
+@pytest.mark.parametrize("method", ["iv", "bandlimited"])
+def test_a_motor_that_holds_its_torque_is_within_the_intervals_of_a_late_torque(method):
+    """There the acceleration alone is late, by half a tick: J is 1.5 % high and B 0.6 %."""
+    scenario = SCENARIOS["torque motor, torque 2 ms late"]
+    epochs, truth = scenario.simulated(0, 2)
+    if method == "bandlimited":
+        epochs = [measured_alone(epoch) for epoch in epochs]
+    analysis = estimate(epochs, method, settings=scenario.analysed_with())
+    assert analysis.delays[0].corrected
+    assert analysis.delays[0].delay_s == pytest.approx(0.0025, abs=1e-4)
+    for fit in (*analysis.fits, analysis.pooled[-1]):
+        assert np.all((fit.low <= truth[0]) & (truth[0] <= fit.high))
+        np.testing.assert_allclose(fit.value, truth[0], rtol=0.02)
 
 
 @pytest.mark.parametrize("name", ["drive PI 20 Hz with load", "drive PI 30 Hz, 500/s"])

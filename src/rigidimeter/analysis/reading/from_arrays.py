@@ -12,11 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimeter.analysis.estimation.alignment import aligned_prepared, estimate_delays
+from rigidimeter.analysis.estimation.clock_error import with_clock_error
 from rigidimeter.analysis.estimation.diagnostics import checked, checked_together
+from rigidimeter.analysis.estimation.diagnostics.delay_check import with_torque_delay
 from rigidimeter.analysis.estimation.methods import choose_method, method_named
 from rigidimeter.analysis.estimation.prepared import prepare
 from rigidimeter.analysis.estimation.signals import Array
-from rigidimeter.core.records import Channel, Epoch, Fit, readonly
+from rigidimeter.analysis.reading.channels.looks import look
+from rigidimeter.analysis.reading.channels.readings import confusions, doubts
+from rigidimeter.core.records import CHANNEL_UNITS, Channel, Epoch, Fit, readonly
 from rigidimeter.core.settings import Settings, settings_from
 
 
@@ -31,6 +35,7 @@ def identify(
     time_s: ArrayLike | None = None,
     method: str = "auto",
     settings: Settings | str | Path | Mapping[str, Any] | None = None,
+    check_units: bool = True,
 ) -> Fit:
     """Estimate inertia J, damping B and stiffness K from one stretch of recording.
 
@@ -54,6 +59,8 @@ def identify(
     method : str
         The name of an estimator, or ``auto``: ``iv`` with the perturbation, else ``bandlimited``.
     settings : Settings, path or mapping, optional
+    check_units : bool
+        Refuse arrays whose numbers contradict their units, as a file is refused.
 
     Returns
     -------
@@ -64,7 +71,8 @@ def identify(
     Raises
     ------
     ValueError
-        If an array has the wrong shape or numbers that are not finite, if there is no such method
+        If an array has the wrong shape, numbers that are not finite or, by its numbers, another
+        unit (an angle in degrees), if there is no such method
         or it lacks a channel, or if nothing could be estimated; the text says why.
 
     Examples
@@ -94,6 +102,8 @@ def identify(
         if values.size != size:
             raise ValueError(f"{name} has {values.size} samples, but torque_nm has {size}")
     stamps = _stamps(size, rate_hz, time_s)
+    if check_units:
+        _refuse_units(stamps, arrays)
     channels = {name: Channel(name, stamps, values) for name, values in arrays.items()}
     epoch = Epoch("arrays", "1", channels, task="prbs")
     (prepared,) = prepare([epoch], settings)
@@ -101,13 +111,35 @@ def identify(
     lacking = [name for name in chosen.needs if name not in channels]
     if lacking:
         raise ValueError(f"method {chosen.name} needs {' and '.join(lacking)}")
-    if not chosen.as_recorded:
-        prepared = aligned_prepared(prepared, estimate_delays({epoch.source: [prepared]}))
-    (fit,), _ = chosen.fit([prepared], None, lambda _: None, False)
+    delays = () if chosen.as_recorded else estimate_delays({epoch.source: [prepared]})
+    prepared = aligned_prepared(prepared, delays)
+    made = chosen.fit([prepared], None, lambda _: None, False)
+    (fit,), _ = with_clock_error(chosen.fit, [prepared], None, made, delays)
     if fit.outcome.kind == "failed":
         raise ValueError(f"method {chosen.name}: {fit.outcome.reason}")
-    together = checked_together([prepared], [checked(prepared, fit)], [], chosen)
+    fit = with_torque_delay(prepared, checked(prepared, fit), delays)
+    together = checked_together([prepared], [fit], [], chosen)
     return together.fits[0]
+
+
+def _refuse_units(time_s: Array, arrays: Mapping[str, Array]) -> None:
+    """Refuse units that the numbers contradict, as for a file that states the same units."""
+    motion = [name for name in ("angle_rad", "velocity_rad_s") if name in arrays]
+    if not motion or time_s.size < 2:
+        return
+    beside = (time_s, arrays["velocity_rad_s"]) if len(motion) == 2 else None
+    seen = look(
+        (time_s, arrays["torque_nm"]),
+        (time_s, arrays[motion[0]]),
+        beside,
+        is_angle=motion[0] == "angle_rad",
+    )
+    for doubt in doubts(seen) or confusions(seen, dict.fromkeys(arrays, 1.0)):
+        unit = CHANNEL_UNITS.get(doubt.standard, "s")
+        raise ValueError(
+            f"{doubt.standard} is taken to be in {unit}, but {doubt.text}; give it in {unit}, or "
+            "say check_units=False if it is"
+        )
 
 
 def _array(name: str, values: ArrayLike) -> Array:

@@ -6,12 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimation import METHODS, fit_epoch, from_arrays, identify, methods
+from rigidimeter.analysis.estimation import METHODS, fit_epoch, methods
+from rigidimeter.analysis.reading import from_arrays, identify
 from rigidimeter.core.records import Channel, Epoch
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.virtual.batch import simulate_epochs
 
 RATE_HZ = 1000.0
+MOTION = ("angle_rad", "velocity_rad_s", "velocity_command_rad_s")
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +52,22 @@ def test_identify_gives_the_numbers_of_estimate(arrays, csv_file, rigidimeter, t
         value = list(fit.band_hz) if name == "band_hz" else getattr(fit, name)
         assert value == row[name], name
     assert [found.name for found in fit.findings] == [found["name"] for found in row["findings"]]
+
+
+def test_degrees_are_refused_as_on_the_command_line(arrays, rigidimeter, tmp_path):
+    motion = {name: np.degrees(v) for name, v in arrays.items() if name in MOTION}
+    wrong = {**arrays, **motion}
+    path, table = tmp_path / "deg.csv", np.column_stack(list(wrong.values()))
+    np.savetxt(path, table, "%.17g", ",", header=",".join(wrong), comments="")
+    ran = rigidimeter("estimate", path, "--rate-hz", 1000, "--task", "prbs")
+    assert ran.status != 0
+    with pytest.raises(ValueError, match="angle_rad is taken to be in rad, but") as refused:
+        identify(**wrong, rate_hz=RATE_HZ)
+    reason = str(refused.value).partition("but ")[2].partition(";")[0]
+    assert reason in ran.err
+    fit = identify(**wrong, rate_hz=RATE_HZ, check_units=False)
+    right = identify(**arrays, rate_hz=RATE_HZ)
+    assert fit.stiffness_nm_rad == pytest.approx(right.stiffness_nm_rad * np.pi / 180, rel=0.05)
 
 
 def test_time_stamps_serve_as_well_as_a_rate(arrays):
