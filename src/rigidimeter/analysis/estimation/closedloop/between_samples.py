@@ -15,6 +15,7 @@ keep step with the ticks, and its samples are taken as they are.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -66,31 +67,61 @@ def filtered(torque_filter: TorqueFilter | None, omega_rad_s: Array) -> Complex:
     return lowpass(np.asarray(1j * omega_rad_s), *torque_filter)[:, None]
 
 
-def seen_beyond_samples(
+class Beyond(NamedTuple):
+    """What the torque sees beyond the samples, and the velocity's samples, for each command.
+
+    Attributes
+    ----------
+    seen : complex array, shape (m, 3)
+        What stands before C above.
+    velocity : complex array, shape (m, 1)
+        F H*.
+    """
+
+    seen: Complex
+    velocity: Complex
+
+
+def beyond_samples(
     drive: DriveModel,
     torque_filter: TorqueFilter | None,
     omega_rad_s: Array,
     interval_s: float,
     after_s: float,
-) -> Complex:
-    """Return what stands before C above, shape (m, 3).
+) -> Beyond:
+    """Return what the torque sees beyond the samples; epochs of one layout share it.
 
     Parameters
     ----------
     drive : DriveModel
     torque_filter : TorqueFilter or None
     omega_rad_s : array, shape (m,)
+        Of lines that follow each other.
     interval_s : float
         Of the ticks.
     after_s : float
         How long after each tick torque and motion were sampled.
     """
+    lines = float(omega_rad_s[0]), float(omega_rad_s[-1]), omega_rad_s.size
+    return _beyond(drive, torque_filter, lines, float(f"{interval_s:.9g}"), round(after_s, 9))
+
+
+@lru_cache(maxsize=128)
+def _beyond(
+    drive: DriveModel,
+    torque_filter: TorqueFilter | None,
+    lines: tuple[float, float, int],
+    interval_s: float,
+    after_s: float,
+) -> Beyond:
+    omega_rad_s = np.linspace(*lines)
     z = np.exp(1j * omega_rad_s * interval_s)
     seen = motion = drive.transfer(z, interval_s, after_s)
     if torque_filter is not None:
         seen = behind(drive, torque_filter).transfer(z, interval_s, after_s)
-    sampled = np.stack([1j * omega_rad_s * motion[1], motion[1], motion[2]])
-    return np.asarray(seen.T - filtered(torque_filter, omega_rad_s) * sampled.T)
+    through = filtered(torque_filter, omega_rad_s)
+    sampled = through * np.stack([1j * omega_rad_s * motion[1], motion[1], motion[2]]).T
+    return Beyond(seen.T - sampled, sampled[:, 1:2])
 
 
 def without_driven(epoch: Epoch, driven_at: DrivenAt) -> Epoch:
@@ -180,6 +211,8 @@ def step_kept_s(command: Channel, time_s: Array) -> float | None:
     """
     interval_s = 1.0 / command.mean_rate_hz
     _, after_s = since_ticks(command, time_s, 0.0)
+    if np.ptp(after_s) < ON_EDGE * interval_s:
+        return None
     turns = np.exp(2j * np.pi * after_s / interval_s)
     mean = complex(np.mean(turns))
     if abs(mean) > 1.0 - ON_EDGE**2 or abs(mean) < SCATTERED / np.sqrt(time_s.size):

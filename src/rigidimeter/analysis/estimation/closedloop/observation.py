@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
     INEXACT,
+    Beyond,
     acceleration_beyond_slope,
-    filtered,
+    beyond_samples,
     phases_s,
-    seen_beyond_samples,
     step_kept_s,
     torque_filter_of,
 )
@@ -23,7 +23,6 @@ from rigidimeter.analysis.estimation.closedloop.controller_used import (
     controller_used,
     loop_shown,
 )
-from rigidimeter.analysis.estimation.closedloop.drive_motion import since_ticks
 from rigidimeter.analysis.estimation.closedloop.epoch_motion import EpochMotion
 from rigidimeter.analysis.estimation.closedloop.excitation import Excitation, excitation
 from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import (
@@ -249,34 +248,25 @@ def _otherwise(prepared: PreparedEpoch, lines: Lines) -> list[Complex]:
     One that tells a little less, the rivals, samples that kept step with the ticks where it may be
     the stamps that did not, and motion that the command does not cause as if it did.
     """
-    epoch, found, grid = prepared.epoch, prepared.source.drive, lines.grid
-    command, omega = epoch.channels.get("velocity_command_rad_s"), grid.omega_rad_s
+    epoch, found, sent = prepared.epoch, prepared.source.drive, lines.sent
+    omega = lines.grid.omega_rad_s
     torque_filter = torque_filter_of(prepared.settings.estimation)
-    if found is None or command is None:
+    if found is None or sent is None:
         beyond = acceleration_beyond_slope(prepared.settings.rig, torque_filter, omega)
         change = np.zeros_like(lines.motion)
         change[:, 0] = beyond * lines.motion[:, 1]
         return [np.zeros_like(change), change]
-    stamps_s, interval_s = epoch.channels["torque_nm"].time_s, 1.0 / command.mean_rate_hz
-    tick, after = since_ticks(command, grid.time_s, 0.0)
-    mean_s, drive = float(np.mean(after)), found.model
 
-    def seen(drive: DriveModel, after_s: float = mean_s) -> Complex:
-        return seen_beyond_samples(drive, torque_filter, omega, interval_s, after_s)
+    def seen(drive: DriveModel, after_s: float = sent.after_s) -> Beyond:
+        return beyond_samples(drive, torque_filter, omega, sent.interval_s, after_s)
 
-    def made() -> tuple[Complex, list[Complex]]:
-        ours = seen(drive)
-        velocity = drive.transfer(np.exp(1j * omega * interval_s), interval_s, mean_s)[1]
-        velocity *= filtered(torque_filter, omega)[:, 0]
-        others = [seen(rival) - ours for rival in found.rivals]
-        return ours / velocity[:, None], [-ours, -INEXACT * ours, *others]
-
-    key = omega.size, omega[0], omega[-1], round(1e12 * interval_s), round(1e12 * mean_s)
-    share, changes = prepared.source.once(key, made)
+    ours, velocity = seen(found.model)
+    changes = [-ours, -INEXACT * ours, *(seen(rival).seen - ours for rival in found.rivals)]
+    command = epoch.channels["velocity_command_rad_s"]
+    stamps_s = epoch.channels["torque_nm"].time_s
     kept_s = step_kept_s(command, stamps_s)
     if kept_s is not None:
-        there = [seen(drive, after_s) for after_s in phases_s(command, stamps_s).tolist()]
-        changes = [*changes, seen(drive, kept_s) - np.mean(there, axis=0)]
-    sent = grid.transform(command.values[tick])[:, None]
-    more = share * lines.motion[:, 1:2] + changes[0] * sent
-    return [*(np.asarray(change * sent) for change in changes), more]
+        there = [seen(found.model, late_s).seen for late_s in phases_s(command, stamps_s).tolist()]
+        changes.append(seen(found.model, kept_s).seen - np.mean(there, axis=0))
+    more = ours * (lines.motion[:, 1:2] / velocity - sent.command)
+    return [*(np.asarray(change * sent.command) for change in changes), more]

@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -32,10 +33,10 @@ from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
     TorqueFilter,
+    beyond_samples,
     driven_behind,
     filtered,
     in_step,
-    seen_beyond_samples,
 )
 from rigidimeter.analysis.estimation.closedloop.drive_motion import since_ticks
 from rigidimeter.analysis.estimation.closedloop.epoch_motion import EpochMotion
@@ -156,6 +157,24 @@ class Grid:
         return np.stack(found)
 
 
+class Sent(NamedTuple):
+    """The command of a drive that is known.
+
+    Attributes
+    ----------
+    command : complex array, shape (m, 1)
+        At the lines, as it was in force at the samples.
+    interval_s : float
+        Of the ticks.
+    after_s : float
+        How long after a tick the samples came, on average.
+    """
+
+    command: Complex
+    interval_s: float
+    after_s: float
+
+
 @dataclass(frozen=True)
 class Lines:
     """Torque and motion of one epoch at the lines of its grid.
@@ -169,12 +188,14 @@ class Lines:
     noise : complex array, shape (m, 3), or None
         Half the difference of what the even and the odd samples of the motion give, whose noise is
         independent; None where that was not wanted, or the motion lies between its samples.
+    sent : Sent or None
     """
 
     grid: Grid
     torque_nm: Complex
     motion: Complex
     noise: Complex | None = None
+    sent: Sent | None = None
 
     def on(self, grid: Grid) -> Lines:
         """Return the lines of a grid of the same samples within this one."""
@@ -183,7 +204,8 @@ class Lines:
         first = int(grid.line[0] - self.grid.line[0])
         part = slice(first, first + grid.line.size)
         noise = None if self.noise is None else self.noise[part]
-        return Lines(grid, self.torque_nm[part], self.motion[part], noise)
+        sent = None if self.sent is None else self.sent._replace(command=self.sent.command[part])
+        return Lines(grid, self.torque_nm[part], self.motion[part], noise, sent)
 
 
 def epoch_grid(
@@ -304,11 +326,10 @@ def epoch_lines(
         tick, after_s = since_ticks(command, time_s, 0.0)
         interval_s, mean_s = 1.0 / command.mean_rate_hz, float(np.mean(after_s))
         recorded &= velocity is not None and in_step(tick, after_s, interval_s)
-        if recorded:
-            caused = [command.values[tick]]
-        else:
+        caused = [command.values[tick]]
+        if not recorded:
             # At the stamps of the torque, and from there like the torque.
-            caused = [
+            caused += [
                 values_at(Channel(stamped.name, stamped.time_s, part), time_s, SAME_TIME)
                 for part in driven_behind(motion.driven_at, torque_filter, stamped)
             ]
@@ -317,12 +338,17 @@ def epoch_lines(
     assert angle is not None  # where it is not recorded it is made
     torque = values_at(stamped, time_s, SAME_TIME)
     lines, *apart = through * spectra(grid, angle, velocity, halves=noise and recorded)
+    noises = apart[0] if apart else None
     first, *others = grid.transform(np.stack([torque, *caused]))
-    added = np.stack(others, axis=-1) if others else 0.0
-    if recorded and motion.driven_at is not None:
-        drive, omega = motion.driven_at.drive, grid.omega_rad_s
-        added = added * seen_beyond_samples(drive, torque_filter, omega, interval_s, mean_s)
-    return Lines(grid, first, lines + added, *apart)
+    if motion.driven_at is None:
+        return Lines(grid, first, lines, noises)
+    sent = Sent(others[0][:, None], interval_s, mean_s)
+    if recorded:
+        at = grid.omega_rad_s, interval_s, mean_s
+        lines += sent.command * beyond_samples(motion.driven_at.drive, torque_filter, *at).seen
+    else:
+        lines += np.stack(others[1:], axis=-1)
+    return Lines(grid, first, lines, noises, sent)
 
 
 def spectra(
