@@ -24,6 +24,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from rigidimeter.analysis.estimation.closedloop.grid import Complex, Grid
 from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother
 from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST, direct
 from rigidimeter.analysis.estimation.closedloop.normal_equations import (
@@ -37,7 +38,6 @@ from rigidimeter.analysis.estimation.closedloop.observation import (
     observe_motion,
 )
 from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import Complex, Grid
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array, velocity_at
 

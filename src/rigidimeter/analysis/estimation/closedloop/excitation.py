@@ -24,7 +24,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import SAME_TIME, Grid
+from rigidimeter.analysis.estimation.closedloop.grid import SAME_TIME, Grid
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.core.records import Channel
 from rigidimeter.model import Loop, Parameters, on_circle

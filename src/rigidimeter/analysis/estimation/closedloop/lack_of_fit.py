@@ -34,8 +34,8 @@ import scipy
 from numpy.polynomial import Legendre
 from numpy.typing import NDArray
 
+from rigidimeter.analysis.estimation.closedloop.grid import Grid
 from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import Grid
 from rigidimeter.analysis.estimation.signals import Array
 
 Complex = NDArray[np.complex128]

@@ -41,7 +41,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import Grid
+from rigidimeter.analysis.estimation.closedloop.grid import Grid
 from rigidimeter.analysis.estimation.signals import Array
 
 Complex = NDArray[np.complex128]

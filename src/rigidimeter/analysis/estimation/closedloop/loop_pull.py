@@ -17,13 +17,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from rigidimeter.analysis.estimation.closedloop.grid import Grid
 from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST
 from rigidimeter.analysis.estimation.closedloop.normal_equations import (
     Problem,
     solution,
     sums,
 )
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import Grid
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.model import Loop, OpenLoop
 

@@ -25,19 +25,14 @@ from rigidimeter.analysis.estimation.closedloop.controller_used import (
 )
 from rigidimeter.analysis.estimation.closedloop.epoch_motion import EpochMotion
 from rigidimeter.analysis.estimation.closedloop.excitation import Excitation, excitation
+from rigidimeter.analysis.estimation.closedloop.grid import Grid, epoch_grid, grid_at
 from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import (
     closed_loop_obstacle,
     evenly,
     while_sampled,
     whole_periods,
 )
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import (
-    Grid,
-    Lines,
-    epoch_grid,
-    epoch_lines,
-    grid_at,
-)
+from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines, epoch_lines
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.screening import LEAST_BAND_RATIO
 from rigidimeter.analysis.estimation.signals import motion_channels

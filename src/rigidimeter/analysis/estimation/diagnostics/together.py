@@ -19,6 +19,7 @@ from rigidimeter.analysis.estimation.closedloop.band_sensitivity import (
     Member,
     band_changes,
 )
+from rigidimeter.analysis.estimation.closedloop.grid import Complex
 from rigidimeter.analysis.estimation.closedloop.lack_of_fit import (
     Answer,
     Misfit,
@@ -39,7 +40,6 @@ from rigidimeter.analysis.estimation.closedloop.observation import (
     observe_periods,
 )
 from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import Complex
 from rigidimeter.analysis.estimation.diagnostics.band_check import band_estimates, band_finding
 from rigidimeter.analysis.estimation.diagnostics.least_squares_checks import (
     loop_bias,

@@ -15,6 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from rigidimeter.analysis.estimation.closedloop.grid import Grid
 from rigidimeter.analysis.estimation.closedloop.line_noise import smoother_for
 from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST
 from rigidimeter.analysis.estimation.closedloop.observation import (
@@ -23,7 +24,6 @@ from rigidimeter.analysis.estimation.closedloop.observation import (
     observe_motion,
 )
 from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import Grid
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.core.records import Epoch

@@ -9,7 +9,8 @@ import pytest
 from scipy import stats
 
 from rigidimeter.analysis.estimation.closedloop.band_sensitivity import Member, band_changes
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines, epoch_grid
+from rigidimeter.analysis.estimation.closedloop.grid import epoch_grid
+from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines
 from rigidimeter.core.records import Channel, Epoch
 
 TIME_S = np.arange(2000) / 100.0

@@ -8,6 +8,7 @@ import pytest
 from scipy import signal, stats
 
 from rigidimeter.analysis.estimation import fit_epochs, method_named
+from rigidimeter.analysis.estimation.closedloop.grid import epoch_grid
 from rigidimeter.analysis.estimation.closedloop.lack_of_fit import (
     Answer,
     periodic,
@@ -15,7 +16,6 @@ from rigidimeter.analysis.estimation.closedloop.lack_of_fit import (
     repeated,
     same_sequence,
 )
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import epoch_grid
 from rigidimeter.analysis.estimation.diagnostics.together import checked_together, misfits
 from rigidimeter.analysis.estimation.prepared import prepare
 from rigidimeter.core.records import Channel, Epoch

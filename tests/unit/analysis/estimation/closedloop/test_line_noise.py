@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rigidimeter.analysis.estimation.closedloop.grid import epoch_grid
 from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother, Solved, with_weights
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import epoch_grid
 from rigidimeter.core.records import Channel, Epoch
 
 LINES = 24

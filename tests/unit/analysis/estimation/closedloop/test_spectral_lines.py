@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import epoch_grid
+from rigidimeter.analysis.estimation.closedloop.grid import epoch_grid
 from rigidimeter.core.records import Channel, Epoch, LeftOut
 
 RATE_HZ = 500.0

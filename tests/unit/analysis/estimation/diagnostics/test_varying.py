@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.analysis.estimation import fit_epochs
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import Grid
+from rigidimeter.analysis.estimation.closedloop.grid import Grid
 from rigidimeter.analysis.estimation.diagnostics import checked
 from rigidimeter.analysis.estimation.diagnostics.varying_lines import VaryingLines
 from rigidimeter.analysis.estimation.diagnostics.varying_shapes import imposed_period_s
