@@ -31,7 +31,7 @@ def fits_of(rig: DriveRig, epochs: int = 2):
         DriveRig("PI", 500.0, edge_s=0.0004),
         DriveRig("PI with lag", 200.0, lowpass_hz=100.0),
         DriveRig("position loop", 333.0),
-        DriveRig("friction", 333.0),
+        DriveRig("friction", 1000.0),
         DriveRig("PI", 200.0, lowpass_hz=30.0),
     ],
     ids=str,
@@ -42,7 +42,11 @@ def test_the_drive_is_found_and_the_joint_with_it(rig):
         assert "between_samples" not in {finding.name for finding in fit.findings}
 
 
-@pytest.mark.parametrize("rig", [DriveRig("friction", 200.0), DriveRig("PI", 100.0)], ids=str)
+@pytest.mark.parametrize(
+    "rig",
+    [DriveRig("friction", 200.0), DriveRig("friction", 333.0), DriveRig("PI", 100.0)],
+    ids=str,
+)
 def test_what_cannot_be_known_is_doubted_with_an_interval_that_covers(rig):
     for fit in fits_of(rig):
         (finding,) = (one for one in fit.findings if one.name == "between_samples")
@@ -51,13 +55,13 @@ def test_what_cannot_be_known_is_doubted_with_an_interval_that_covers(rig):
         assert np.all((fit.low <= TRUTH) & (fit.high >= TRUTH))
 
 
-def test_what_friction_does_between_the_samples_is_half_taken_and_half_doubted():
-    """None of it makes J 2.2 % too large, all of it 1.4 % too small; the drive sticks between."""
+def test_what_friction_does_between_the_samples_is_in_the_interval():
+    """The estimate takes none of it, which makes J 2.2 % too large; the drive sticks between."""
     fits = fits_of(DriveRig("friction", 200.0), 4)
     errors = np.array([fit.value[0] for fit in fits]) / TRUTH[0] - 1
-    assert abs(np.mean(errors)) < 0.01
+    assert abs(np.mean(errors)) < 0.025
     half = np.array([fit.high[0] - fit.low[0] for fit in fits]) / 2 / TRUTH[0]
-    assert np.all((half > 0.0175) & (half < 0.03))
+    assert np.all((half > np.abs(errors)) & (half < 0.06))
 
 
 def test_rounding_does_not_decide_which_drives_are_tried():

@@ -118,10 +118,15 @@ def _estimate(source: str, epochs: Sequence[PreparedEpoch]) -> Delay:
         found = Delay(source, total_s, error_s)
         if not _matters(total_s, error_s):
             return replace(found, remark="not corrected: not significantly different from zero")
-        halves = [_in_half_the_band(one) for one in used]
-        half_s, half_error_s, _ = _settled(halves, motions, perturbed=bool(known))
     except ValueError as error:
         return Delay(source, remark=f"the delay of the torque was not estimated: {error}")
+    halves = [_in_half_the_band(one) for one in used]
+    try:
+        half_s, half_error_s, _ = _settled(
+            halves, motions, perturbed=bool(known), near=(total_s, values)
+        )
+    except ValueError as error:
+        return replace(found, remark=f"not corrected: of the lower half of the band, {error}")
     apart_s, allowed_s = abs(half_s - total_s), SIGNIFICANT * np.hypot(error_s, half_error_s)
     if apart_s > max(allowed_s, SAME_S + SAME_SHARE * abs(total_s)):
         return replace(
@@ -145,14 +150,18 @@ def _estimate(source: str, epochs: Sequence[PreparedEpoch]) -> Delay:
 
 
 def _settled(
-    epochs: Sequence[PreparedEpoch], motions: Sequence[EpochMotion], *, perturbed: bool
+    epochs: Sequence[PreparedEpoch],
+    motions: Sequence[EpochMotion],
+    *,
+    perturbed: bool,
+    near: tuple[float, Array] | None = None,
 ) -> tuple[float, float, Array]:
     """Return the delay at which none is left, its standard error, in s, and J, B and K with it.
 
     The zero of what is left is sought by secants: between coarse samples moving the torque by what
     is left takes only part of it away. Where the perturbation is not known, the measured motion is
     its own instrument. The error of the zero is that of what is left over its slope,
-    by how much a move of the torque changes it.
+    by how much a move of the torque changes it. The search begins `near` a delay and J, B and K.
     """
     longest_s = epochs[0].settings.estimation.max_delay_s
 
@@ -167,14 +176,13 @@ def _settled(
         return estimate_delay(observations, start, longest_s, linearise, near)
 
     tried: list[tuple[float, float]] = []
-    total_s = 0.0
-    near: Array | None = None
+    total_s, begin = (0.0, None) if near is None else (near[0], np.append(near[1], 0.0))
     for _ in range(ROUNDS):
-        fit = left_after(total_s, near)
+        fit = left_after(total_s, begin)
         left_s, error_s = float(fit.values[-1]), float(fit.standard_errors[-1])
-        if not (perturbed or tried or _matters(left_s, error_s)):
+        if near is None and not (perturbed or tried or _matters(left_s, error_s)):
             return left_s, error_s, fit.values[:-1]  # least squares shows it without a move
-        near = fit.values if abs(left_s) < IN_VALLEY_S else None
+        begin = fit.values if abs(left_s) < IN_VALLEY_S else None
         stretch = 1.0
         if tried and abs(left_s) < abs(tried[-1][1]):
             stretch = _stretch((total_s, left_s), tried[-1])

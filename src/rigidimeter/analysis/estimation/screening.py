@@ -28,7 +28,8 @@ def before_fit(epoch: Epoch, settings: EstimationSettings) -> str:
     if not motion:
         return "neither velocity_rad_s nor angle_rad was recorded"
     ends: dict[str, tuple[float, float]] = {}
-    for channel in (torque, *motion):
+    sent = (epoch.channels.get(name) for name in ("velocity_command_rad_s", "perturbation_nm"))
+    for channel in (torque, *motion, *(one for one in sent if one is not None and len(one) > 1)):
         if len(channel) < 2:
             return f"{channel.name} holds {len(channel)} sample(s)"
         ends[channel.name] = float(np.min(channel.values)), float(np.max(channel.values))

@@ -201,11 +201,11 @@ class Analysis:
 
     @property
     def stiffness_words(self) -> str:
-        """Which K is given and at what motion, in few words after "K"; empty without fits.
+        """Which K is given and at what motion, in few words after "K"; empty without a K.
 
         With several conditions the SD of the angle in each, and the largest range of all.
         """
-        if not self.fits:
+        if not any(math.isfinite(fit.stiffness_nm_rad) for fit in self.fits):
             return ""
         without = " (note gravity: without)" if self._weight_known else ""
         pooled = [fit for fit in self.pooled if fit.condition] or self.pooled[-1:]

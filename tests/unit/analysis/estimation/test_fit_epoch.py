@@ -78,6 +78,14 @@ def test_edges_are_trimmed_after_filtering():
             lambda t, n: {"torque_nm": Channel("torque_nm", t, np.where(t > 3, np.nan, t))},
             "finite numbers",
         ),
+        (
+            lambda t, n: {
+                "velocity_command_rad_s": Channel(
+                    "velocity_command_rad_s", t, np.where(t > 3, np.inf, t)
+                )
+            },
+            "velocity_command_rad_s is inf",
+        ),
     ],
 )
 def test_an_epoch_that_cannot_be_fitted_says_why(change, words):

@@ -24,7 +24,7 @@ from rigidimeter.analysis.estimation.closedloop.normal_equations import (
     sums,
 )
 from rigidimeter.analysis.estimation.closedloop.observation import Observation
-from rigidimeter.analysis.estimation.closedloop.refine import LineFit, fit_lines
+from rigidimeter.analysis.estimation.closedloop.refine import LineFit, fit_lines, shared_powers
 from rigidimeter.analysis.estimation.signals import Array
 
 SCAN_STEP_S = 0.005
@@ -32,6 +32,10 @@ SCAN_STEP_S = 0.005
 50 Hz, so that the nearest valley is the right one."""
 
 MOST_VALLEYS = 3
+
+REWEIGHTED = 3
+"""So often each line is weighted by its noise before the search: torque of the subject decides a
+solution in which all lines count alike."""
 
 SCAN_HIGH_HZ = 20.0
 """And is made below this frequency."""
@@ -111,8 +115,9 @@ def estimate_delay(
             )
             for one in problems
         ]
-        gram, moment, _ = sums(turned)
-        near = solution(gram, moment)  # every line with the same weight
+        near = solution(*sums(turned)[:2])  # every line with the same weight
+        for _ in range(REWEIGHTED):
+            near = solution(*sums(turned, shared_powers(turned, near))[:2])
         try:
             found = fit_lines(observations, delayed(linearise), np.append(near, near_s))
         except ValueError:

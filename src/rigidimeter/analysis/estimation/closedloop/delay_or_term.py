@@ -5,8 +5,8 @@ is put in the place of the delay, as one more column T beside J, B and K:
 
     friction    sgn θ'
     reflex      θ', max(θ', 0) or max(−θ', 0), later by 30, 45 or 60 ms
-    soft cuff   Z θ / (1 + Z/k), with Z = K + iωB − ω²J, for a cuff of k N·m/rad: at some k, and to
-                the first order in 1/k about each
+    soft cuff   Z θ / (1 + Z/(k (1 + iωτ))), with Z = K + iωB − ω²J, for a cuff of k N·m/rad and k τ
+                N·m·s/rad: at some k and τ, and to the first order in 1/k about each
 
 Both models are fitted to one half of the lines, in groups of neighbours, by instrumental variables
 or, where the perturbation was not recorded, with the measured motion as its own instrument,
@@ -17,6 +17,7 @@ both explain as much.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -44,6 +45,10 @@ from rigidimeter.analysis.estimation.signals import Array, velocity_at
 REFLEX_DELAYS_S = (0.03, 0.045, 0.06)
 CUFF_RATIOS = (5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0)
 """Stiffness of a cuff over that of the joint."""
+
+CUFF_LAGS_S = (0.0, 0.005, 0.01)
+"""Damping over stiffness of the cuff: one that is damped looks like a delay. Where the perturbation
+was recorded, `lack_of_fit` tells it."""
 
 GROUP_LINES = 8
 
@@ -125,14 +130,16 @@ def _rivals(
             )
     J, B, K = without_delay.tolist()
     impedance = K + 1j * omega * B - omega**2 * J
-    for ratio in CUFF_RATIOS:
-        soft = (1.0 / (1.0 + impedance / (ratio * K)))[:, None]
+    lags_s = CUFF_LAGS_S if excitation is None else CUFF_LAGS_S[:1]
+    for ratio, lag_s in itertools.product(CUFF_RATIOS, lags_s):
+        gives = 1.0 + 1j * omega * lag_s
+        soft = (1.0 / (1.0 + impedance / (ratio * K * gives)))[:, None]
         through = plain._replace(
             instruments=plain.instruments * soft, regressors=plain.regressors * soft
         )
-        softer = -(impedance**2 * soft[:, 0] ** 2)
+        softer = -(impedance**2 * soft[:, 0] ** 2) / gives
         column = (plain.instruments[:, 2] * softer, plain.regressors[:, 2] * softer)
-        yield f"a soft cuff,{ratio}", _beside(through, column)
+        yield f"a soft cuff,{ratio},{lag_s}", _beside(through, column)
 
 
 def _beside(problem: Problem, column: tuple[Complex, Complex]) -> Problem:

@@ -86,7 +86,7 @@ class Samples:
         return known[1]
 
 
-class Answer(NamedTuple):
+class FittedDrive(NamedTuple):
     """The drive at a place, with the numerator that explains the velocity best.
 
     Attributes
@@ -127,7 +127,7 @@ class Answer(NamedTuple):
         return math.exp(-fastest * self.samples.interval_s) > FORGOTTEN
 
 
-def answer(samples: Samples, place: Array, zeros: int) -> Answer:
+def answer(samples: Samples, place: Array, zeros: int) -> FittedDrive:
     """Return the drive at a place, with the numerator that explains the velocity best."""
     degrees = np.resize([1.0, 2.0], place.size - 1)
     if degrees.size % 2:
@@ -141,7 +141,9 @@ def answer(samples: Samples, place: Array, zeros: int) -> Answer:
     scaled = table / size[:, None]
     gram, along = scaled @ scaled.T, scaled @ samples.measured
     numerator = np.linalg.lstsq(gram, along)[0] / size
-    return Answer(samples, place, zeros, numerator, table, numerator @ table - samples.measured)
+    return FittedDrive(
+        samples, place, zeros, numerator, table, numerator @ table - samples.measured
+    )
 
 
 def drive_at(samples: Samples, place: Array, numerator: Array) -> DriveModel:

@@ -15,8 +15,7 @@ Its rivals are the others that do, and its own neighbours (`drive_search`).
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -24,8 +23,9 @@ import numpy as np
 
 from rigidimeter.analysis.estimation.closedloop.drive_answer import (
     TINY,
-    Answer,
+    FittedDrive,
     Samples,
+    answer,
     coordinates,
     velocities,
 )
@@ -39,8 +39,12 @@ from rigidimeter.analysis.estimation.closedloop.drive_search import (
 )
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.analysis.estimation.stretches import sound
+from rigidimeter.analysis.estimation.uncertainty import correlation_samples
 from rigidimeter.core.records import Channel, Epoch
 from rigidimeter.model import DriveModel
+
+BANDWIDTHS = tuple(2.0**-n for n in range(6))
+"""Of the drive that the search begins at, in times that of the settings."""
 
 MOST_POLES = 4
 """A velocity PI has two; a lag and a position loop add one each."""
@@ -54,8 +58,12 @@ WORTH = 0.02
 AS_GOOD = 1.05
 """A drive that leaves no more than this many times the power of the best explains as well."""
 
+RIVAL, COLOURED = 4.0, 2.0
+"""If what the best leaves is not noise, alike over so many samples, one that leaves so many times
+its power might be there."""
+
 UNSEEN = 2e-5
-"""Drives whose misfits differ by less than this share of the velocity's SD are alike."""
+"""Drives that leave no more than this share of the velocity's SD are alike."""
 
 QUIET, RUBS = 3e-4, 0.8
 """What is left below this share of the velocity's SD needs no friction, which must bring its power
@@ -87,14 +95,11 @@ class FoundDrive(NamedTuple):
     ----------
     model : DriveModel
         From command to velocity.
-    misfit : float
-        What it leaves of the velocity, as a share of its SD.
     rivals : tuple of DriveModel
         Others that explain the velocity as well.
     """
 
     model: DriveModel
-    misfit: float
     rivals: tuple[DriveModel, ...]
 
 
@@ -117,6 +122,7 @@ def fit_drive(epoch: Epoch, start: DriveModel) -> FoundDrive | None:
     samples = _samples(epoch)
     if samples is None:
         return None
+    start = _as_fast(samples, start)
     samples, found = _with_friction(samples, _climbed(samples, [start]), start)
     found = [one for one in found if one.seen]
     if not found:
@@ -127,21 +133,45 @@ def fit_drive(epoch: Epoch, start: DriveModel) -> FoundDrive | None:
     if slowly and _power_between_lines(samples, start) < STAIRS * least:
         return None
     times = AS_GOOD if samples.sign is None else RUBBED
-    chosen, *others = (one for one in found if one.power <= times * least + UNSEEN**2)
-    misfit = math.sqrt(chosen.power)
-    if misfit > LARGEST_MISFIT or not 0.5 < chosen.model.gain < 2.0:
+    chosen = next(one for one in found if one.power <= times * least + UNSEEN**2)
+    if chosen.power > LARGEST_MISFIT**2 or not 0.5 < chosen.model.gain < 2.0:
         return None
-    rivals = (*(one.model for one in others), *neighbours(chosen))
-    return FoundDrive(chosen.model, misfit, rivals)
+    left = min(found, key=power_of).left
+    noise = correlation_samples(left[:, None]).item() < COLOURED
+    most = (times if noise else RIVAL) * least + UNSEEN**2
+    rivals = [one.model for one in found if one is not chosen and one.power <= most]
+    rivals += neighbours(chosen)
+    if not noise:
+        rivals += _of_halves(chosen)
+    return FoundDrive(chosen.model, tuple(rivals))
 
 
-def _climbed(samples: Samples, starts: Sequence[DriveModel]) -> list[Answer]:
+def _of_halves(one: FittedDrive) -> Iterator[DriveModel]:
+    """Yield the drive as each half of the samples has it: where it is not linear they differ."""
+    samples, middle = one.samples, one.left.size // 2
+    for part in (slice(middle), slice(middle, None)):
+        half = replace(samples, time_s=samples.time_s[part], measured=samples.measured[part])
+        yield searched(half, one.place, one.zeros, delayed=one.place[-1] > 0.0).model
+
+
+def _as_fast(samples: Samples, start: DriveModel) -> DriveModel:
+    """Return the drive of the bandwidth, up to that of `start`, that explains most."""
+    models = [
+        DriveModel(tuple(share * pole for pole in start.poles_rad_s), start.residues)
+        for share in BANDWIDTHS
+    ]
+    places = [np.append(coordinates(one, samples.interval_s, 2), 0.0) for one in models]
+    powers = [answer(samples, place, 0).power for place in places]
+    return models[int(np.argmin(powers))]
+
+
+def _climbed(samples: Samples, starts: Sequence[DriveModel]) -> list[FittedDrive]:
     """Return ever larger drives, up to where past commands explain no more of what is left.
 
     One pole more where the best has a delay: a lag looks like it at the samples. The search begins
     at the poles of `starts`, and then also at those of the drives before.
     """
-    found: list[Answer] = []
+    found: list[FittedDrive] = []
     enough = False
     for poles in range(2, MOST_POLES + 1):
         models = (*starts, *(one.model for one in found[-2:]))
@@ -161,8 +191,8 @@ def _climbed(samples: Samples, starts: Sequence[DriveModel]) -> list[Answer]:
 
 
 def _with_friction(
-    samples: Samples, found: list[Answer], start: DriveModel
-) -> tuple[Samples, list[Answer]]:
+    samples: Samples, found: list[FittedDrive], start: DriveModel
+) -> tuple[Samples, list[FittedDrive]]:
     """Return samples and drives with dry friction, where that explains what the others leave."""
     least = min(one.power for one in found)
     if least < QUIET**2:
@@ -178,7 +208,7 @@ def _with_friction(
     return (samples, found) if first.power > RUBS * least else (rubbed, _climbed(rubbed, starts))
 
 
-def _sign(samples: Samples, left: Array, one: Answer | None = None) -> Channel:
+def _sign(samples: Samples, left: Array, one: FittedDrive | None = None) -> Channel:
     """Return the mean sign of the velocity in parts of a tick.
 
     The velocity is what a drive makes there, and straight between the samples what it leaves.
@@ -199,7 +229,7 @@ def _finer(ticks_s: Array) -> Array:
     return np.interp(place, np.arange(ticks_s.size), ticks_s)
 
 
-def _explainable(one: Answer) -> float:
+def _explainable(one: FittedDrive) -> float:
     """Return how much of what is left any linear drive might explain, as a share of its power.
 
     Whatever its poles, it adds up past commands: so do their means over `LAGS_TICKS`. What chance

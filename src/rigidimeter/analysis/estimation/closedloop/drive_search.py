@@ -21,7 +21,7 @@ import scipy
 from rigidimeter.analysis.estimation.closedloop.drive_answer import (
     LONGEST_S,
     LONGEST_TICKS,
-    Answer,
+    FittedDrive,
     Samples,
     answer,
     drive_at,
@@ -52,12 +52,12 @@ RUBBED = 4.0
 bent to what the law of friction leaves."""
 
 
-def power_of(one: Answer) -> float:
+def power_of(one: FittedDrive) -> float:
     """Return what a drive leaves, to compare drives by."""
     return one.power
 
 
-def best_drive(samples: Samples, begins: Sequence[Array], zeros: int) -> Answer:
+def best_drive(samples: Samples, begins: Sequence[Array], zeros: int) -> FittedDrive:
     """Return the drive that explains the velocity best, with a delay only where one is shown.
 
     `begins` are coordinates of poles at which the search starts.
@@ -80,11 +80,11 @@ def best_drive(samples: Samples, begins: Sequence[Array], zeros: int) -> Answer:
     return late if late.place[-1] > 0.0 and late.power < shown * still.power else still
 
 
-def searched(samples: Samples, begin: Array, zeros: int, *, delayed: bool) -> Answer:
+def searched(samples: Samples, begin: Array, zeros: int, *, delayed: bool) -> FittedDrive:
     """Return the best drive near a place, whose delay is searched too or stays."""
     free = begin.size if delayed else begin.size - 1
 
-    def at(x: Array) -> Answer:
+    def at(x: Array) -> FittedDrive:
         return answer(samples, np.append(x, begin[free:]), zeros)
 
     def left(x: Array) -> Array:
@@ -102,7 +102,7 @@ def searched(samples: Samples, begin: Array, zeros: int, *, delayed: bool) -> An
     return at(found)
 
 
-def _scatter(one: Answer) -> tuple[Array, Array]:
+def _scatter(one: FittedDrive) -> tuple[Array, Array]:
     """Return the slopes of the velocity along place and numerator, and the covariance of these."""
     explained = one.numerator @ one.table
     steps = STEP * np.eye(one.place.size)
@@ -123,7 +123,7 @@ def _lengths(matrix: Array) -> Array:
     return np.asarray(np.where(lengths > 0, lengths, 1.0))
 
 
-def neighbours(one: Answer) -> list[DriveModel]:
+def neighbours(one: FittedDrive) -> list[DriveModel]:
     """Return the drive moved by two standard errors either way along each axis of its covariance.
 
     A move is halved until it changes the velocity about as its slopes say, and leaves no delay

@@ -2,6 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.scenarios.recordings import measured_alone
+from tests.scenarios.scenario import scenario
 
 from rigidimeter.analysis.estimation import aligned, estimate_delays
 from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import period_s
@@ -77,6 +79,25 @@ def test_without_the_perturbation_the_motion_tells_it(simulated, voluntary_sd_nm
     (found,) = estimate_delays({"file": prepare(moved, settings)})
     assert found.delay_s == pytest.approx(0.004, abs=2e-4)
     assert found.corrected
+
+
+@pytest.mark.parametrize(("cuff_nm_rad", "damping_nm_s_rad"), [(100.0, 0.5), (40.0, 0.4)])
+def test_without_the_perturbation_a_damped_cuff_is_not_taken_for_a_delay(
+    cuff_nm_rad, damping_nm_s_rad
+):
+    cuff = {"cuff_nm_rad": cuff_nm_rad, "cuff_nm_s_rad": damping_nm_s_rad}
+    soft = scenario("damped cuff", joint=cuff)
+    alone = [measured_alone(epoch) for epoch in soft.simulated(0, 2).epochs]
+    (found,) = estimate_delays({alone[0].source: prepare(alone, soft.analysed_with())})
+    assert "a soft cuff explains it" in found.remark
+
+
+def test_a_subject_who_pushes_hard_does_not_hide_a_late_torque():
+    """The search begins where each line counts by its noise."""
+    pushes = scenario("pushes", subject={"voluntary_nm": 0.5}, torque={"late_s": 0.004})
+    alone = [measured_alone(epoch) for epoch in pushes.simulated(0, 4).epochs]
+    (found,) = estimate_delays({alone[0].source: prepare(alone, pushes.analysed_with())})
+    assert found.delay_s == pytest.approx(0.004, abs=2e-4)
 
 
 def test_a_source_without_perturbation_epochs_says_so():

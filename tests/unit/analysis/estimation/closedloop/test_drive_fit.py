@@ -71,6 +71,19 @@ def test_the_drive_is_found_from_command_and_velocity(delay_s):
     assert found.model.delay_s == pytest.approx(delay_s, abs=1e-5)
 
 
+@pytest.mark.parametrize("bandwidth_hz", [5.0, 10.0, 20.0])
+def test_a_drive_far_slower_than_that_of_the_settings_is_found(bandwidth_hz):
+    """At 100/s the drive of the settings, 50 Hz, is nearly too fast to be seen."""
+    commands = smooth_commands(2000)
+    command = Channel("velocity_command_rad_s", np.arange(2000) / 100.0, commands)
+    model = DriveModel.second_order(bandwidth_hz, 0.7)
+    velocity = driven(model, command, command.time_s).velocity_rad_s
+    velocity = velocity + 1e-4 * np.std(velocity) * np.random.default_rng(8).standard_normal(2000)
+    found = fit_drive(recorded(commands, velocity, 0.01), SECOND_ORDER)
+    (pole,) = found.model.poles_rad_s
+    assert pole == pytest.approx(model.poles_rad_s[0], rel=2e-3)
+
+
 def test_a_velocity_that_the_command_does_not_explain_gives_no_drive():
     rng = np.random.default_rng(4)
     t = np.arange(2000) / 1000.0
@@ -176,7 +189,6 @@ def test_what_leaves_more_than_noise_is_no_rival():
     velocity = driven(model, command, command.time_s).velocity_rad_s
     velocity = velocity + 3e-3 * np.std(velocity) * rng.standard_normal(3000)
     found = fit_drive(recorded(commands, velocity, 0.001), DriveModel.second_order(20.0, 0.7071))
-    assert found.misfit == pytest.approx(3e-3, rel=0.05)
     assert max(drive.delay_s for drive in found.rivals) < 3e-4
 
 
