@@ -202,3 +202,11 @@ def test_one_group_and_two_tables_are_refused(rigidimeter, tmp_path) -> None:
     assert "needs two conditions" in rigidimeter("compare", path, "--value", "a").err
     path.write_text("condition,a\nOFF,1\nDBS,\n")
     assert "a has no value in DBS" in rigidimeter("compare", path, "--value", "a").err
+
+
+def test_a_value_whose_square_is_no_number_is_refused_with_its_line(rigidimeter, tmp_path) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text("condition,day,a\nOFF,1,1\nOFF,1,2e200\nOFF,2,3\nDBS,1,1\nDBS,2,2\n")
+    ran = rigidimeter("compare", path, "--value", "a")
+    assert ran.status == 1
+    assert "t.csv, line 3: a is 2e+200; values up to 1e+100 can be compared" in ran.err

@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _FEW_SESSIONS = 10
+_LARGEST = 1e100
+"""The square of a larger value is hardly a number any more."""
 _OF_DAY = ("subject", "day")
 """Columns of a table that say which values belong together."""
 
@@ -293,6 +295,11 @@ def _column(
     for row in rows:
         line = table.lines[row]
         value = table.number(name, row)
+        if value is not None and abs(value) > _LARGEST:
+            raise UserError(
+                f"{table.source}, line {line}: {name} is {value:g}; values up to {_LARGEST:g} can "
+                "be compared"
+            )
         of_day = "/".join(days[row]) if days else f"line {line}"
         unit = units[row] if units is not None else of_day
         if value is None or not unit:
