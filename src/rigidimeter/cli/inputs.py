@@ -66,7 +66,10 @@ class Analysed(NamedTuple):
             echo(f"error: {one.source}, epoch {one.epoch}: {one.outcome.reason}", err=True)
         if none_counts and len(failed) < len(outcomes):
             why = next(outcome.reason for outcome in outcomes if outcome.kind == "excluded")
-            echo(f"error: no epoch counts, so there is no estimate to use; first: {why}", err=True)
+            echo(
+                f"error: no epoch counts, so there is no estimate to use. The first: {why}",
+                err=True,
+            )
         if self.not_kept:
             echo(f"error: the analysis is not stored: {self.not_kept}", err=True)
         return int(self.bad or bool(failed) or none_counts or bool(self.not_kept))

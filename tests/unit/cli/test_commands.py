@@ -195,7 +195,7 @@ def test_a_recording_of_which_no_epoch_counts_has_no_estimate_to_use(rigidimeter
     ran = rigidimeter("estimate", tmp_path / "all.npz", "--epoch-length-s", 10)
     assert ran.status == 1
     assert "0 used" in ran.out
-    assert "error: no epoch counts, so there is no estimate to use; first: torque_nm" in ran.err
+    assert "error: no epoch counts, so there is no estimate to use. The first: torque_nm" in ran.err
 
 
 def test_a_good_epoch_beside_bad_inputs_is_analysed(rigidimeter, simulate, tmp_path):

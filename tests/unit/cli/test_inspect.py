@@ -167,7 +167,9 @@ def test_columns_of_trials_that_change_together_have_one_warning(tmp_path, rigid
     path = _written(tmp_path / "r.csv", head, *columns, trial, 10 * trial, trial, half)
     said = rigidimeter("estimate", path).err
     assert said.count("reads each of its labels as an epoch") == 2
-    together = "column 'trial' (1, 2, 3) is not used, nor what changes with it: 'run' and 'block';"
+    together = (
+        "column 'trial' (1, 2, 3) is not used, nor are 'run' and 'block', which change with it;"
+    )
     assert f"{together} --column epoch=trial reads" in said
     assert "column 'half trial' (1, 2) is not used; --column" in said
 

@@ -111,6 +111,10 @@ def test_a_fit_and_an_analysis_are_printed_as_one_line():
 def test_which_stiffness_it_is_and_at_what_motion_is_said_in_few_words():
     assert analysis(fits=(), fixed_inertia=(), pooled=()).stiffness_words == ""
     assert analysis().stiffness_words == "holds the limb's weight"
+    failed = replace(FIT, value=np.full(3, np.nan))
+    none = analysis(fits=(failed,), fixed_inertia=(failed,), pooled=())
+    assert none.stiffness_words == ""
+    assert " K ." not in none._repr_html_()
     rad = np.pi / 180
     swung = replace(FIT, angle_rms_rad=2 * rad, angle_range_rad=9 * rad)
     pooled = (

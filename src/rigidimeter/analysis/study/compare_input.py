@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 _FEW_SESSIONS = 10
 _LARGEST = 1e100
-"""The square of a larger value is hardly a number any more."""
+"""Squares of larger values overflow in the tests."""
 _OF_DAY = ("subject", "day")
 """Columns of a table that say which values belong together."""
 

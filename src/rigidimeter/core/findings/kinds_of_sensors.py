@@ -133,8 +133,8 @@ SENSOR_KINDS = (
     ),
     Kind(
         "velocity_delay",
-        "delay τ of velocity relative to angle, in ms; also below the key where it moves B by more "
-        "than half its interval (by K τ)",
+        "delay τ of velocity relative to angle, in ms; a shorter one too that moves B, by K τ, by "
+        "more than half its interval",
         headline="The velocity lags the angle by {value:.2g} ms",
         measured="velocity_rad_s lags angle_rad by {value:.2g} ms (at most {limit:.2g} ms either "
         "way).",

@@ -374,7 +374,8 @@ class Analysis:
             heading += ["angle SD, °", "VAF, %", "outcome", "findings"]
             parts.append(html_table(heading, [_fit_row(fit, names) for fit in shown]))
             about = "J, B and K ± one standard error; all epochs: 95\xa0% intervals."
-            parts.append(f"<p>{about} K {escape(self.stiffness_words)}.</p>")
+            which = f" K {escape(self.stiffness_words)}." if self.stiffness_words else ""
+            parts.append(f"<p>{about}{which}</p>")
         if len(self.fits) > _MAX_SHOWN:
             parts.append(f"<p>The first {_MAX_SHOWN} of {len(self.fits)} epochs.</p>")
         if self.findings:

@@ -130,8 +130,6 @@ class FittedDrive(NamedTuple):
 def answer(samples: Samples, place: Array, zeros: int) -> FittedDrive:
     """Return the drive at a place, with the numerator that explains the velocity best."""
     degrees = np.resize([1.0, 2.0], place.size - 1)
-    if degrees.size % 2:
-        degrees[-1] = 1.0
     longest = max(LONGEST_S / samples.interval_s, LONGEST_TICKS)
     lower = np.append(degrees * math.log(SLOWEST), 0.0)
     upper = np.append(degrees * math.log(FASTEST), longest)

@@ -203,8 +203,6 @@ def _observed(
     motion: EpochMotion | None = None,
 ) -> Observation:
     epoch = prepared.epoch
-    found = prepared.source.drive
-    drive = found.model if found is not None else None
     if perturbation is None:
         made, loop = None, controller_used(prepared)
     else:
@@ -231,7 +229,7 @@ def _observed(
         made,
         loop,
         excited,
-        drive is not None,
+        lines.sent is not None,
         everything if wider is not None else None,
         partial(_otherwise, prepared, lines),
     )

@@ -240,9 +240,8 @@ def _condition_number(problem: Problem, power: Array) -> float:
     where they are whitened, and show nothing of the joint.
     """
     whitened = problem.observation.excitation is not None
-    gram = sums([problem._replace(regressors=problem.instruments)], [power] if whitened else None)[
-        0
-    ]
+    alone = problem._replace(regressors=problem.instruments)
+    gram, _, _ = sums([alone], [power] if whitened else None)
     size = np.sqrt(np.diag(gram))
     least, *_, most = np.linalg.eigvalsh(gram / np.outer(size, size))
     return float(np.sqrt(most / least)) if least > 0 else np.inf

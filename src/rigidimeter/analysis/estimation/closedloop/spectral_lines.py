@@ -1,10 +1,10 @@
 """Torque and motion of an epoch at the lines of its grid.
 
-The integrals are sums over the samples of the torque, at the stamps of the torque: a torque that
-was sampled at a point in time is held against the motion at that point. Where the command is
-recorded and explains the velocity, the motion at those points is the motion that the command
-causes, plus what the sensors saw beyond it; so neither slow sensors nor the ripple between the
-ticks bias the fit (`drive`).
+The integrals of `grid` are sums over the samples of the torque, at the stamps of the torque: a
+torque that was sampled at a point in time is held against the motion at that point. Where the
+command is recorded and explains the velocity, the motion at those points is the motion that the
+command causes, plus what the sensors saw beyond it; so neither slow sensors nor the ripple between
+the ticks bias the fit (`drive_fit`).
 """
 
 from __future__ import annotations

@@ -4,10 +4,10 @@ Torque that is stamped τ late makes of J s² + B s + K, to the first order in �
 
     (J − B τ) s² + (B − K τ) s + K
 
-Where it is told from a reflex, friction and a soft cuff it is corrected (`alignment`). Where it is
-not, and the perturbation was not recorded, its cause is not known. Where the drive is not known
-either, a delay as short as that of the acceleration at the ticks may be the drive's, which is in
-the interval of J.
+It is corrected unless a reflex, friction or a soft cuff explains the torque as well (`alignment`).
+Where it is not, and the perturbation was not recorded, its cause is not known. Where the drive is
+not known either, a delay as short as that of the acceleration at the ticks may be the drive's,
+which is in the interval of J.
 """
 
 from __future__ import annotations

@@ -138,7 +138,7 @@ def unused_labels(table: Table, used: Collection[str], n_rows: int) -> list[Noti
         name, labels = next(iter(columns.items()))
         shown = ", ".join(labels[:3]) + (", …" if labels[3:] else "")
         others = [repr(other) for other in columns if other != name]
-        too = f", nor what changes with it: {series(others)}" if others else ""
+        too = f", nor are {series(others)}, which change with it" if others else ""
         option = shlex.quote(f"epoch={name}")
         text = (
             f"{table.source}: column {name!r} ({shown}) is not used{too}; --column {option} reads "
