@@ -21,7 +21,7 @@ import numpy as np
 from scipy import signal
 
 from rigidimeter.analysis.estimation import method_named
-from rigidimeter.analysis.estimation.diagnostics.band_check import band_finding
+from rigidimeter.analysis.estimation.closedloop.band_sensitivity import band_finding
 from rigidimeter.analysis.estimation.diagnostics.together import in_bands, lack_of_fit, misfits
 from rigidimeter.analysis.estimation.prepared import prepare
 from rigidimeter.core.records import Channel, Epoch

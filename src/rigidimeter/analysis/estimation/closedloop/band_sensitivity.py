@@ -16,8 +16,14 @@ with R = Y − Φ p of any p. With one epoch this is p_b − p exactly. The chan
 error, from ½ Σ Re(Dᴴ D) S: what the noise does to both alike is not counted. Where Z is Φ without
 noise and one band holds the other this is the difference of the two variances (Hausman 1978).
 
+Of a band Z is zero at the other lines; all are problems of `normal_equations`.
+
 A half of an epoch is its window times ½ (1 ± sin 2πt/T), which adds up neighbouring lines:
 X_k becomes ½ X_k ± (X_{k−1} − X_{k+1})/4i. No signal is transformed again.
+
+An estimate has the finding where another band moves a parameter by more than chance, over all bands
+and parameters together, by more than a share of the parameter, and by more than half of half the
+interval of that estimate: then the interval does not hold what other frequencies say.
 """
 
 from __future__ import annotations
@@ -29,10 +35,17 @@ import numpy as np
 import scipy
 
 from rigidimeter.analysis.estimation.closedloop.line_noise import Complex, Smoother, Solved
-from rigidimeter.analysis.estimation.closedloop.normal_equations import scaled_inverse
+from rigidimeter.analysis.estimation.closedloop.normal_equations import (
+    Problem,
+    scaled_inverse,
+    sums,
+)
 from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines
+from rigidimeter.analysis.estimation.found import found, half_widths
 from rigidimeter.analysis.estimation.signals import Array
-from rigidimeter.core.settings import FEWEST_LINES
+from rigidimeter.core.findings import Effect, Finding, Three
+from rigidimeter.core.records import PARAMETERS, BandEstimate, Fit
+from rigidimeter.core.settings import FEWEST_LINES, DiagnosticsSettings
 
 Part = Literal["all", "first half", "second half"]
 
@@ -46,26 +59,39 @@ each side."""
 LEAST_POWER = 1e-24
 """Of the largest line of the torque: a simulation without noise leaves nothing."""
 
+CHANCE = 0.01
+"""Probability of a change by chance, over all bands and parameters of a condition."""
+
+OF_HALF = 0.5
+"""A change of less than this share of half an interval is within it."""
+
 
 class Member(NamedTuple):
     """One epoch.
 
     Attributes
     ----------
-    lines : Lines
-        Of a band wider than that of the fit, where the rate allows it.
-    instruments : complex array, shape (m, 3)
-        The motion that the perturbation causes, at these lines.
-    fitted : slice
-        The lines of the fit.
+    problem : Problem
+        At the lines of a band wider than that of the fit, where the rate allows it. Its instruments
+        are the motion that the perturbation causes.
     values : array, shape (3,)
         J, B and K of this epoch, for the power of its noise.
     """
 
-    lines: Lines
-    instruments: Complex
-    fitted: slice
+    problem: Problem
     values: Array
+
+    @property
+    def lines(self) -> Lines:
+        """Those of the problem."""
+        return self.problem.observation.wider or self.problem.observation.lines
+
+    @property
+    def fitted(self) -> slice:
+        """Which of them are those of the fit."""
+        line = self.problem.observation.lines.grid.line
+        first = int(line[0] - self.lines.grid.line[0])
+        return slice(first, first + line.size)
 
 
 class BandChange(NamedTuple):
@@ -91,13 +117,18 @@ class BandChange(NamedTuple):
     p: Array
 
 
-class _Weighted(NamedTuple):
-    member: Member
+class _Epoch(NamedTuple):
+    """One epoch as it was fitted, and the effects of its lines on its own estimate there."""
+
+    fitted: Problem
     power: Array
-    instruments: Complex  # divided by the power
     smoother: Smoother
-    residual: Complex
-    density: Array  # the power of the noise, without the power that the fit has taken
+    spread: float
+    own: Complex
+
+    def solved(self, effect: Complex) -> Solved:
+        """Return estimates on which the lines have these effects."""
+        return Solved(np.eye(3), effect, self.fitted.regressors, self.power, self.spread)
 
 
 def band_changes(members: Sequence[Member]) -> tuple[Array, list[BandChange]]:
@@ -113,39 +144,46 @@ def band_changes(members: Sequence[Member]) -> tuple[Array, list[BandChange]]:
     ValueError
         If the epochs cannot distinguish J, B and K.
     """
-    weighted = [_weighted(member) for member in members]
-    gram, moment = np.zeros((3, 3)), np.zeros(3)
-    for one in weighted:
-        lines, fitted = one.member.lines, one.member.fitted
-        used = one.instruments[fitted].conj().T
-        gram += (used @ lines.motion[fitted]).real
-        moment += (used @ lines.torque_nm[fitted]).real
-    inverse = scaled_inverse(gram)
-    values = inverse @ moment
-    own = [_own(one) for one in weighted]
-    left = []
-    for one, effect in zip(weighted, own, strict=True):
-        residual = one.member.lines.torque_nm - one.member.lines.motion @ values
-        density = _solved(one, effect).density(residual, one.smoother)
-        left.append(one._replace(residual=residual, density=density))
-    first = left[0].member
+    epochs = [_as_fitted(member) for member in members]
+    gram, moment, _ = sums([one.fitted for one in epochs], [one.power for one in epochs])
+    values = scaled_inverse(gram) @ moment
+    residuals = [one.fitted.target - one.fitted.regressors @ values for one in epochs]
+    densities = [
+        one.solved(one.own).density(residual, one.smoother)
+        for one, residual in zip(epochs, residuals, strict=True)
+    ]
     changes = []
-    for low, high, part in _variants(first):
-        within = [_slice(one.member, low, high) for one in left]
-        found = _change(left, own, within, part)
-        grid = first.lines.grid
-        low_hz, high_hz = grid.omega_rad_s[[within[0].start, within[0].stop - 1]] / (2 * np.pi)
-        changes.append(BandChange(float(low_hz), float(high_hz), part, *found))
+    for low, high, part in _variants(members[0]):
+        within = [_slice(member, low, high) for member in members]
+        change, variance, squares = np.zeros(3), np.zeros(3), np.zeros(3)
+        of_band = [_of_band(*one, part) for one in zip(members, epochs, within, strict=True)]
+        inverse = scaled_inverse(np.sum([gram for gram, _ in of_band], axis=0))
+        for one, (gram, effect), residual, density in zip(
+            epochs, of_band, residuals, densities, strict=True
+        ):
+            difference = (effect - one.own @ gram.T) @ inverse.T
+            change += (difference.conj().T @ residual).real
+            covariance, degrees = one.solved(difference).covariance(density, one.smoother)
+            variance += np.diag(covariance)
+            squares += np.diag(covariance) ** 2 / degrees
+        se = np.sqrt(variance)
+        p = 2 * scipy.stats.t.sf(np.abs(change) / se, variance**2 / squares)
+        omega = members[0].lines.grid.omega_rad_s[within[0]]
+        edges_hz = float(omega[0] / (2 * np.pi)), float(omega[-1] / (2 * np.pi))
+        changes.append(BandChange(*edges_hz, part, change, se, np.asarray(p)))
     return values, changes
 
 
-def _weighted(member: Member) -> _Weighted:
-    lines = member.lines
-    residual = lines.torque_nm - lines.motion @ member.values
-    smoother = Smoother.over(lines.grid.line, SMOOTHED, NEIGHBOURS)
-    least = LEAST_POWER * float(np.max(np.abs(lines.torque_nm) ** 2))
+def _as_fitted(member: Member) -> _Epoch:
+    problem, grid = member.problem, member.lines.grid
+    smoother = Smoother.over(grid.line, SMOOTHED, NEIGHBOURS)
+    residual = problem.target - problem.regressors @ member.values
+    least = LEAST_POWER * float(np.max(np.abs(problem.target) ** 2))
     power = np.maximum(smoother(np.abs(residual) ** 2), least)
-    return _Weighted(member, power, member.instruments / power[:, None], smoother, residual, power)
+    fitted = problem._replace(instruments=_only(problem.instruments, member.fitted))
+    gram, _, (used,) = sums([fitted], [power])
+    own = np.asarray(used @ scaled_inverse(gram).T)
+    return _Epoch(fitted, power, smoother, grid.spread, own)
 
 
 def _variants(member: Member) -> list[tuple[float, float, Part]]:
@@ -170,46 +208,16 @@ def _slice(member: Member, low: float, high: float) -> slice:
     return slice(int(start), int(stop))
 
 
-def _change(
-    weighted: Sequence[_Weighted], own: Sequence[Complex], lines: Sequence[slice], part: Part
-) -> tuple[Array, Array, Array]:
-    """Return change, standard error and probability."""
+def _of_band(member: Member, epoch: _Epoch, within: slice, part: Part) -> tuple[Array, Complex]:
+    """Return the matrix of a band and part of an epoch, and the effects of the lines by it."""
     sign = {"all": 0, "first half": 1, "second half": -1}[part]
-    grams, effects = [], []
-    for one, within in zip(weighted, lines, strict=True):
-        if sign:
-            halved = _halved(one.member.instruments, sign) / one.power[:, None]
-            used = _only(halved, within)
-            grams.append((used.conj().T @ _halved(one.member.lines.motion, sign)).real)
-            effects.append(_halved_adjoint(used, sign))
-        else:
-            used = one.instruments[within]
-            grams.append((used.conj().T @ one.member.lines.motion[within]).real)
-            effects.append(_only(one.instruments, within))
-    inverse = scaled_inverse(np.sum(grams, axis=0))
-    change, variance, squares = np.zeros(3), np.zeros(3), np.zeros(3)
-    for one, effect, of_epoch, gram in zip(weighted, effects, own, grams, strict=True):
-        difference = (effect - of_epoch @ gram.T) @ inverse.T
-        change += (difference.conj().T @ one.residual).real
-        solved = _solved(one, difference)
-        covariance, degrees = solved.covariance(one.density, one.smoother)
-        variance += np.diag(covariance)
-        squares += np.diag(covariance) ** 2 / degrees
-    se = np.sqrt(variance)
-    p = 2 * scipy.stats.t.sf(np.abs(change) / se, variance**2 / squares)
-    return change, se, np.asarray(p, dtype=np.float64)
-
-
-def _solved(one: _Weighted, effect: Complex) -> Solved:
-    """Return estimates on which the lines have these effects."""
-    lines = one.member.lines
-    return Solved(np.eye(3), effect, lines.motion, one.power, lines.grid.spread)
-
-
-def _own(one: _Weighted) -> Complex:
-    """Return the effects of the lines on the epoch's own estimate in the band of the fit."""
-    used = _only(one.instruments, one.member.fitted)
-    return np.asarray(used @ scaled_inverse((used.conj().T @ one.member.lines.motion).real).T)
+    instruments, motion, *_ = member.problem
+    if sign:
+        instruments, motion = _halved(instruments, sign), _halved(motion, sign)
+    problem = epoch.fitted._replace(instruments=_only(instruments, within), regressors=motion)
+    gram, _, (used,) = sums([problem], [epoch.power])
+    # The half of a window is real: what weights the halved lines is halved in the same way.
+    return gram, _halved(used, sign) if sign else used
 
 
 def _only(values: Complex, within: slice) -> Complex:
@@ -226,9 +234,93 @@ def _halved(lines: Complex, sign: int) -> Complex:
     return np.asarray(0.5 * lines + sign * beside / 4j)
 
 
-def _halved_adjoint(weights: Complex, sign: int) -> Complex:
-    """Return weights of the lines that are equal to these weights of the halved lines."""
-    beside = np.zeros_like(weights)
-    beside[:-1] = weights[1:]
-    beside[1:] -= weights[:-1]
-    return np.asarray(0.5 * weights - sign * beside / 4j)
+def band_estimates(
+    condition: str, pooled: Fit | None, values: Array, changes: Sequence[BandChange]
+) -> list[BandEstimate]:
+    """Return what each band gives, the band of the fit first.
+
+    Parameters
+    ----------
+    condition : str
+    pooled : Fit or None
+        The fit to all epochs of the condition, where it was made by the perturbation.
+    values : array, shape (3,)
+        J, B and K in the band of the fit, in its place.
+    changes : sequence of BandChange
+    """
+    if not changes:
+        return []
+    at = values if pooled is None else pooled.value
+    # Halves of the epochs are of the band of the fit.
+    low_hz, high_hz = changes[-1].low_hz, changes[-1].high_hz
+    own = BandEstimate(
+        condition, low_hz, high_hz, "all", _three(at), (0.0,) * 3, (0.0,) * 3, (1.0,) * 3
+    )
+    others = [
+        BandEstimate(
+            condition,
+            band.low_hz,
+            band.high_hz,
+            band.part,
+            _three(at + band.change),
+            _three(band.change),
+            _three(band.change_se),
+            _three(band.p),
+        )
+        for band in changes
+    ]
+    return [own, *others]
+
+
+def band_finding(
+    fit: Fit, changes: Sequence[BandChange], settings: DiagnosticsSettings
+) -> list[Finding]:
+    """Return the finding of a fit that another band contradicts; nothing where none does.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of an epoch of the condition, or of all of them.
+    changes : sequence of BandChange
+    settings : DiagnosticsSettings
+    """
+    bands = [band for band in changes if band.part == "all"]
+    if not bands:
+        return []
+    change = np.array([band.change for band in bands])
+    p = np.minimum(change.size * np.array([band.p for band in bands]), 1.0)  # Bonferroni
+    percent = 100 * np.abs(change / fit.value)
+    half = half_widths(fit)
+    of_half = np.abs(change) / half
+    most = settings.max_band_sensitivity_percent
+    contradicting = (p < CHANCE) & (percent > most) & (of_half > OF_HALF)
+    if not np.any(contradicting):
+        return []
+    worst = np.argmax(np.where(contradicting, of_half, 0.0))
+    at, j = np.unravel_index(worst, change.shape)
+    band, own = bands[int(at)], changes[-1]
+    return [
+        found(
+            "band_sensitivity",
+            settings,
+            float(percent[at, j]),
+            most,
+            p=float(p[at, j]),
+            effect=Effect.of(-change[at], fit.value, half),
+            facts={
+                "symbol": PARAMETERS[int(j)].symbol,
+                "way": "more" if change[at, j] * fit.value[j] > 0 else "less",
+                "low_hz": band.low_hz,
+                "high_hz": band.high_hz,
+                "error": float(100 * band.change_se[j] / abs(fit.value[j])),
+                "own_low_hz": own.low_hz,
+                "own_high_hz": own.high_hz,
+                "of_half": float(of_half[at, j]),
+            },
+        )
+    ]
+
+
+def _three(values: Array) -> Three:
+    J, B, K = (float(value) for value in values)
+    return J, B, K

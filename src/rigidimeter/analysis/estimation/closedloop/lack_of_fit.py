@@ -36,6 +36,8 @@ from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation.closedloop.grid import Grid
 from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother
+from rigidimeter.analysis.estimation.closedloop.normal_equations import Problem, solution, sums
+from rigidimeter.analysis.estimation.closedloop.observation import Observation
 from rigidimeter.analysis.estimation.signals import Array
 
 Complex = NDArray[np.complex128]
@@ -75,14 +77,19 @@ class Answer(NamedTuple):
 
     Attributes
     ----------
-    grid : Grid
+    observation : Observation
     response_nm, residual_nm : complex array, shape (m,)
         The torque that the perturbation causes, simulated, and the torque that J, B and K leave.
     """
 
-    grid: Grid
+    observation: Observation
     response_nm: Complex
     residual_nm: Complex
+
+    @property
+    def grid(self) -> Grid:
+        """Of the lines."""
+        return self.observation.lines.grid
 
     @property
     def frequency_hz(self) -> Array:
@@ -150,7 +157,9 @@ def repeated(answers: Sequence[Answer]) -> list[Misfit]:
     """
     count = len(answers)
     answers = _without_drift(answers)
-    turned = np.stack([answer.residual_nm * _turn(answer.response_nm) for answer in answers])
+    turned = np.stack(
+        [answer.residual_nm * toward_zero_phase(answer.response_nm) for answer in answers]
+    )
     power = np.stack([_power(answer) for answer in answers])
     white = turned / np.sqrt(power)
     mean, frequency = white.mean(0), answers[0].frequency_hz
@@ -198,7 +207,7 @@ def _one_sequence(first: Answer, second: Answer) -> bool:
     return bool(shifted[at] > SAME_RESPONSE * size and part < LARGEST_SHIFT)
 
 
-def _turn(response: Complex) -> Complex:
+def toward_zero_phase(response: Complex) -> Complex:
     """Return what turns each line so that the response has phase zero in it."""
     size = np.abs(response)
     return np.asarray(np.where(size > 0, response.conj() / np.where(size > 0, size, 1.0), 1.0))
@@ -215,18 +224,13 @@ def _without_drift(answers: Sequence[Answer]) -> list[Answer]:
             drifts = [Legendre.basis(degree)(along) for degree in range(1, TREND + 1)]
             shapes[id(grid.line)] = grid.transform(np.stack(drifts)).T
         shape, steady = shapes[id(grid.line)], answer
+        drift = Problem(shape, shape, answer.residual_nm, answer.observation)
         for _ in range(2):  # the drift is in the first weights
-            weight = 1.0 / np.sqrt(_power(steady))
-            seen = _parts_of(weight[:, None] * shape), _parts_of(weight * answer.residual_nm)
-            drift_nm = shape @ np.linalg.lstsq(*seen)[0]
-            steady = answer._replace(residual_nm=answer.residual_nm - drift_nm)
+            gram, moment, _ = sums([drift], [_power(steady)])
+            left_nm = answer.residual_nm - shape @ solution(gram, moment)
+            steady = answer._replace(residual_nm=left_nm)
         found.append(steady)
     return found
-
-
-def _parts_of(lines: Complex) -> Array:
-    """Return real parts, then imaginary parts."""
-    return np.concatenate([lines.real, lines.imag])
 
 
 def _power(answer: Answer) -> Array:

@@ -19,7 +19,11 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimation.closedloop.lack_of_fit import Answer, proportional
+from rigidimeter.analysis.estimation.closedloop.lack_of_fit import (
+    Answer,
+    proportional,
+    toward_zero_phase,
+)
 from rigidimeter.analysis.estimation.closedloop.observation import Observation
 from rigidimeter.analysis.estimation.signals import Array
 
@@ -53,7 +57,7 @@ def impedance(observations: Sequence[Observation]) -> Impedance:
     noise = np.zeros(count)
     for observation in observations:
         lines, mask = observation.lines, observation.excited
-        turn = _toward_zero_phase(observation)[mask]
+        turn = toward_zero_phase(perturbation_lines(observation))[mask]
         torque += turn * lines.torque_nm[mask]
         angle += turn * lines.motion[mask, 2]
         between = np.where(mask, np.nan, np.abs(lines.torque_nm) ** 2)
@@ -82,13 +86,6 @@ def follows_perturbation(observation: Observation) -> bool:
     with stamps of another clock, or of another epoch, has no answer.
     """
     lines = observation.lines
-    answer = Answer(lines.grid, perturbation_lines(observation), lines.motion[:, 1])
+    answer = Answer(observation, perturbation_lines(observation), lines.motion[:, 1])
     parts = proportional([answer])
     return min(part.p for part in parts) * len(parts) < CHANCE
-
-
-def _toward_zero_phase(observation: Observation) -> Complex:
-    """Return what turns each line so that the perturbation has phase zero in it."""
-    there = perturbation_lines(observation)
-    size = np.abs(there)
-    return np.asarray(np.where(size > 0, there.conj() / np.where(size > 0, size, 1.0), 1.0))

@@ -18,6 +18,8 @@ from rigidimeter.analysis.estimation.closedloop.band_sensitivity import (
     BandChange,
     Member,
     band_changes,
+    band_estimates,
+    band_finding,
 )
 from rigidimeter.analysis.estimation.closedloop.grid import Complex
 from rigidimeter.analysis.estimation.closedloop.lack_of_fit import (
@@ -40,7 +42,6 @@ from rigidimeter.analysis.estimation.closedloop.observation import (
     observe_periods,
 )
 from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
-from rigidimeter.analysis.estimation.diagnostics.band_check import band_estimates, band_finding
 from rigidimeter.analysis.estimation.diagnostics.least_squares_checks import (
     loop_bias,
     unbiased,
@@ -64,30 +65,6 @@ class Together(NamedTuple):
     fits: list[Fit]
     pooled: list[Fit]
     sensitivity: list[BandEstimate]
-
-
-class Observed(NamedTuple):
-    """An epoch with the J, B and K that the perturbation gives, and what it causes at them.
-
-    `caused_wider` is at the lines of the wider band, `fitted` says which of them are the fit's.
-    """
-
-    observation: Observation
-    values: Array
-    caused_wider: Complex
-    fitted: slice
-
-    @property
-    def caused(self) -> Complex:
-        """The motion that the perturbation causes, at the lines of the fit."""
-        return self.caused_wider[self.fitted]
-
-    @property
-    def answer(self) -> Answer:
-        """What the lack of fit is tested with."""
-        lines = self.observation.lines
-        residual = lines.torque_nm - lines.motion @ self.values
-        return Answer(lines.grid, self.caused @ np.maximum(self.values, LEAST), residual)
 
 
 def checked_together(
@@ -137,28 +114,23 @@ def checked_together(
     )
 
 
-def in_bands(observed: Sequence[Observed]) -> tuple[Array, list[BandChange]]:
+def in_bands(observed: Sequence[Member]) -> tuple[Array, list[BandChange]]:
     """Return J, B and K of epochs together, and how they change in other bands.
 
     Parameters
     ----------
-    observed : sequence of Observed
+    observed : sequence of Member
         As `misfits` gives them.
     """
-    members = [
-        Member(one.observation.wider, one.caused_wider, one.fitted, one.values)
-        for one in observed
-        if one.observation.wider is not None
-    ]
     try:
-        return band_changes(members) if members else (np.full(3, np.nan), [])
+        return band_changes(observed) if observed else (np.full(3, np.nan), [])
     except ValueError:
         return np.full(3, np.nan), []  # the fits say why
 
 
 def misfits(
     members: Sequence[tuple[PreparedEpoch, Fit]], estimator: Method
-) -> tuple[list[Observed], list[Misfit]]:
+) -> tuple[list[Member], list[Misfit]]:
     """Return the epochs in which the lack of fit can be seen, and what each test says of them.
 
     Parameters
@@ -176,7 +148,7 @@ def misfits(
         return [], []
     values = np.array([fit.value for _, fit in known])
     common = np.maximum(np.median(values, axis=0), LEAST)
-    observed: list[Observed] = []
+    observed: list[Member] = []
     made: dict[int, Complex] = {}
     for (epoch, _), own in zip(known, values, strict=True):
         try:
@@ -185,23 +157,28 @@ def misfits(
             continue  # the fit of the epoch says why
     if not observed:
         return [], []
-    return observed, _tested([member.answer for member in observed], known[0], common)
+    return observed, _tested(list(map(_answer, observed)), known[0], common)
 
 
 def _member(
     observation: Observation, values: Array, common: Array, made: dict[int, Complex]
-) -> Observed:
+) -> Member:
     """Return an epoch as observed; `made` keeps what each perturbation causes, made once."""
-    excitation = observation.excitation
+    excitation, lines = observation.excitation, observation.wider or observation.lines
     assert excitation is not None  # `observe` gives it
     J, B, K = common.tolist()
-    grid = observation.lines.grid
-    wider = grid if observation.wider is None else observation.wider.grid
     if id(excitation) not in made:
-        made[id(excitation)] = replace(excitation, grid=wider).motion_lines((J, B, K))
-    first = int(grid.line[0] - wider.line[0])
-    fitted = slice(first, first + grid.line.size)
-    return Observed(observation, values, made[id(excitation)], fitted)
+        made[id(excitation)] = replace(excitation, grid=lines.grid).motion_lines((J, B, K))
+    problem = Problem(made[id(excitation)], lines.motion, lines.torque_nm, observation)
+    return Member(problem, values)
+
+
+def _answer(member: Member) -> Answer:
+    """Return what the lack of fit is tested with."""
+    lines = member.problem.observation.lines
+    caused = member.problem.instruments[member.fitted]
+    residual = lines.torque_nm - lines.motion @ member.values
+    return Answer(member.problem.observation, caused @ np.maximum(member.values, LEAST), residual)
 
 
 def _tested(
@@ -217,18 +194,18 @@ def _tested(
         periods = prepared.once(observe_periods)
     except ValueError:
         return tested  # there are not two periods
-    return tested + periodic(_member(periods, fit.value, common, {}).answer, periods.excited)
+    return tested + periodic(_answer(_member(periods, fit.value, common, {})), periods.excited)
 
 
 def lack_of_fit(
-    tested: Sequence[Misfit], observed: Sequence[Observed], settings: DiagnosticsSettings
+    tested: Sequence[Misfit], observed: Sequence[Member], settings: DiagnosticsSettings
 ) -> list[Finding]:
     """Return the finding for the part with the largest misfit that is not noise, if any.
 
     Parameters
     ----------
     tested : sequence of Misfit
-    observed : sequence of Observed
+    observed : sequence of Member
         As `misfits` gives them.
     settings : DiagnosticsSettings
     """
@@ -248,16 +225,16 @@ def lack_of_fit(
     return [found("lack_of_fit", settings, 100 * worst.share, most, p=worst.p, facts=facts)]
 
 
-def _in_half_the_band(observed: Sequence[Observed]) -> Array:
+def _in_half_the_band(observed: Sequence[Member]) -> Array:
     """Return by how many % J, B and K change if only the lower half of the band is fitted."""
     both = []
     for share in (1.0, 0.5):
         problems, powers = [], []
         for member in observed:
-            lines = member.observation.lines
-            part = slice(0, int(share * lines.torque_nm.size))
-            motion, torque = lines.motion[part], lines.torque_nm[part]
-            problems.append(Problem(member.caused[part], motion, torque, member.observation))
+            start, stop = member.fitted.start, member.fitted.stop
+            part = slice(start, start + int(share * (stop - start)))
+            instruments, motion, torque = (of_lines[part] for of_lines in member.problem[:3])
+            problems.append(Problem(instruments, motion, torque, member.problem.observation))
             power = np.mean(np.abs(torque - motion @ member.values) ** 2)
             powers.append(np.full(torque.size, power))
         gram, moment, _ = sums(problems, powers)

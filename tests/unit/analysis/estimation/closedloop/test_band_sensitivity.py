@@ -10,6 +10,8 @@ from scipy import stats
 
 from rigidimeter.analysis.estimation.closedloop.band_sensitivity import Member, band_changes
 from rigidimeter.analysis.estimation.closedloop.grid import epoch_grid
+from rigidimeter.analysis.estimation.closedloop.normal_equations import Problem
+from rigidimeter.analysis.estimation.closedloop.observation import Observation
 from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines
 from rigidimeter.core.records import Channel, Epoch
 
@@ -35,13 +37,18 @@ def member(rng, sd_nm=1.0, missing_nm_s=0.0, truth=TRUTH):
     motion = angle[:, None] * np.stack([-(omega**2), 1j * omega, np.ones(omega.size)], axis=1)
     missing = missing_nm_s * np.abs(omega) * angle
     torque = motion @ truth + missing + sd_nm * noise(rng, omega.size)
-    first = int(fit.line[0] - wide.line[0])
-    fitted = slice(first, first + fit.line.size)
-    return Member(Lines(wide, torque, motion), motion, fitted, truth)
+    return as_member(Lines(wide, torque, motion), fit, truth)
+
+
+def as_member(wider, fit, truth):
+    """Return an epoch whose motion is its own instrument."""
+    everywhere = np.ones(fit.line.size, dtype=bool)
+    observation = Observation(wider.on(fit), None, None, None, everywhere, wider=wider)
+    return Member(Problem(wider.motion, wider.motion, wider.torque_nm, observation), truth)
 
 
 def solved(member, power, part):
-    weighted = member.instruments[part] / power[part, None]
+    weighted = member.problem.instruments[part] / power[part, None]
     gram = (weighted.conj().T @ member.lines.motion[part]).real
     return np.linalg.solve(gram, (weighted.conj().T @ member.lines.torque_nm[part]).real)
 
@@ -127,13 +134,11 @@ def test_a_half_is_the_window_times_a_half_of_the_epoch():
     course = 1 + 0.1 * np.sin(2 * np.pi * (TIME_S[: wide.time_s.size]) / wide.time_s.size * 100.0)
     angle = rng.standard_normal(wide.time_s.size)
     lines = np.stack([wide.transform(angle * 0), wide.transform(angle * 0), wide.transform(angle)])
-    first = int(fit.line[0] - wide.line[0])
-    fitted = slice(first, first + fit.line.size)
     omega = wide.omega_rad_s
     motion = np.stack([-(omega**2) * lines[2], 1j * omega * lines[2], lines[2]], axis=1)
     torque = 1.751 * wide.transform(course * angle) + motion[:, :2] @ TRUTH[:2]
     torque = torque + 0.01 * noise(rng, omega.size)
-    made = Member(Lines(wide, torque, motion), motion, fitted, TRUTH)
+    made = as_member(Lines(wide, torque, motion), fit, TRUTH)
     values, changes = band_changes([made])
     halves = {c.part: c for c in changes if c.part != "all"}
     # The window ½ (1 + sin) has a mean of sin over it of one half.
@@ -145,7 +150,8 @@ def test_what_a_hole_in_the_window_repeats_widens_the_error():
     made = member(np.random.default_rng(6))
     grid = made.lines.grid
     spread = replace(made.lines, grid=replace(grid, spread=4 * grid.spread))
-    plain, wider = (band_changes([m])[1] for m in (made, made._replace(lines=spread)))
+    other = as_member(spread, made.problem.observation.lines.grid, TRUTH)
+    plain, wider = (band_changes([m])[1] for m in (made, other))
     assert wider[0].change_se == pytest.approx(2 * plain[0].change_se, rel=0.01)
     assert np.all(wider[0].p > plain[0].p)
 

@@ -16,6 +16,8 @@ from rigidimeter.analysis.estimation.closedloop.lack_of_fit import (
     repeated,
     same_sequence,
 )
+from rigidimeter.analysis.estimation.closedloop.observation import Observation
+from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines
 from rigidimeter.analysis.estimation.diagnostics.together import checked_together, misfits
 from rigidimeter.analysis.estimation.prepared import prepare
 from rigidimeter.core.records import Channel, Epoch
@@ -28,6 +30,11 @@ def grid():
     return epoch_grid(Epoch("made", "1", channels), (0.15, 20.0), 1.0)
 
 
+def observed(layout):
+    """Return an epoch of which nothing but its lines matters."""
+    return Observation(Lines(layout, None, None), None, None, None, None)
+
+
 def noise(rng, size, slope=0.0):
     lines = rng.standard_normal(size) + 1j * rng.standard_normal(size)
     return lines * np.arange(1, size + 1) ** slope
@@ -36,10 +43,11 @@ def noise(rng, size, slope=0.0):
 def answers(rng, count, factor=0.0, own=0.0, slope=0.0):
     """Return answers to one sequence with a share in proportion and one of the sequence's own."""
     layout = grid()
+    seen = observed(layout)
     m = layout.omega_rad_s.size
     response, again = 10.0 * noise(rng, m), own * noise(rng, m)
     return [
-        Answer(layout, response, factor * response + again + noise(rng, m, slope))
+        Answer(seen, response, factor * response + again + noise(rng, m, slope))
         for _ in range(count)
     ]
 
@@ -113,8 +121,8 @@ def test_a_sequence_that_begins_a_moment_later_is_the_same():
     rng = np.random.default_rng(2)
     first, other = answers(rng, 1, own=2.0)[0], answers(rng, 1)[0]
     late = np.exp(-1j * first.grid.omega_rad_s * 0.0123)
-    moved = Answer(first.grid, first.response_nm * late, first.residual_nm * late)
-    louder = Answer(first.grid, 1.001 * first.response_nm, first.residual_nm)
+    moved = Answer(first.observation, first.response_nm * late, first.residual_nm * late)
+    louder = Answer(first.observation, 1.001 * first.response_nm, first.residual_nm)
     groups = same_sequence([first, other, moved, louder])
     assert [len(group) for group in groups] == [3, 1]
     assert all(part.share > 0.15 for part in repeated(groups[0]))

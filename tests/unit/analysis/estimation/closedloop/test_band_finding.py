@@ -5,8 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimation.closedloop.band_sensitivity import BandChange
-from rigidimeter.analysis.estimation.diagnostics.band_check import band_estimates, band_finding
+from rigidimeter.analysis.estimation.closedloop.band_sensitivity import (
+    BandChange,
+    band_estimates,
+    band_finding,
+)
 from rigidimeter.core.records import Fit, Outcome
 from rigidimeter.core.settings import DiagnosticsSettings
 
