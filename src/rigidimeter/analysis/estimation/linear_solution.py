@@ -5,12 +5,16 @@ AᵀA is never formed, so the condition number is not squared.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+LARGEST_CONDITION_NUMBER = 1e6
+"""Beyond this named columns agree to six digits, more than any sensor knows."""
 
 
 class Solution(NamedTuple):
@@ -60,3 +64,29 @@ def solve(columns: Array, target: Array) -> Solution:
     with np.errstate(divide="ignore", invalid="ignore"):
         values = (right.T / singular) @ (left.T @ target) / lengths
     return Solution(values, lengths, singular, right, columns.shape[0])
+
+
+def solve_named(columns: Array, target: Array, names: Sequence[str]) -> Solution:
+    """Return `solve` for columns that have names.
+
+    Raises
+    ------
+    ValueError
+        If a column is zero, or the data cannot distinguish columns; the text names them.
+    """
+    solved = solve(columns, target)
+    for name, length in zip(names, solved.lengths, strict=True):
+        if not length > 0:
+            raise ValueError(f"{name} is zero throughout: this motion holds no information on it")
+    if solved.rows <= len(names):
+        raise ValueError(
+            f"{solved.rows} independent samples are too few for {len(names)} parameters"
+        )
+    if solved.singular[-1] * LARGEST_CONDITION_NUMBER < solved.singular[0]:
+        share = np.abs(solved.right[-1])
+        alike = [name for name, one in zip(names, share, strict=True) if one > 0.2 * share.max()]
+        raise ValueError(
+            f"the motion cannot distinguish {', '.join(alike[:-1])} and {alike[-1]}; leave one of "
+            "them out"
+        )
+    return solved

@@ -20,9 +20,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rigidimeter.analysis.estimation.linear_solution import Array, solve
 
 COSINES = 0.8
 """Cosines are this times (independent scores)^(2/3).
@@ -169,10 +168,7 @@ def cramer_rao_coloured(regressors: Array, density: Array, rate_hz: float) -> Ar
     lines = scipy.fft.rfft(np.ascontiguousarray(regressors.T)).T[known]
     matrix = np.sqrt(weight[known] / (n * rate_hz * density[known]))[:, None] * lines
     stacked = np.concatenate([matrix.real, matrix.imag])
-    scale = np.linalg.norm(stacked, axis=0)
-    _, singular, right = np.linalg.svd(stacked / scale, full_matrices=False)
-    root = (right.T / singular) / scale[:, None]
-    return np.asarray(root @ root.T)
+    return solve(stacked, np.zeros(len(stacked))).bread
 
 
 def _cosine_sum(scores: Array, count: int) -> Array:

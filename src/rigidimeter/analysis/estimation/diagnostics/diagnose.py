@@ -15,9 +15,7 @@ from rigidimeter.analysis.estimation.diagnostics.computed_torque_checks import (
     COMPUTED_TORQUE_CHECKS,
     STATIC_TORQUE_CHECKS,
 )
-from rigidimeter.analysis.estimation.diagnostics.controller_checks import (
-    CONTROLLER_CHECKS,
-)
+from rigidimeter.analysis.estimation.diagnostics.controller_checks import CONTROLLER_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.least_squares_checks import (
@@ -28,7 +26,7 @@ from rigidimeter.analysis.estimation.diagnostics.missing_term import MISSING_TER
 from rigidimeter.analysis.estimation.diagnostics.motion_checks import MOTION_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.movement_checks import MOVEMENT_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.tremor_check import TREMOR_CHECKS
-from rigidimeter.analysis.estimation.diagnostics.varying_checks import VARYING_CHECKS
+from rigidimeter.analysis.estimation.diagnostics.varying_selection import VARYING_CHECKS
 from rigidimeter.analysis.estimation.found import in_half_intervals
 from rigidimeter.analysis.estimation.methods import method_named
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch

@@ -16,14 +16,11 @@ import scipy
 from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation.closedloop.grid import Grid
-from rigidimeter.analysis.estimation.closedloop.line_noise import smoother_for
 from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST
-from rigidimeter.analysis.estimation.closedloop.observation import (
-    Observation,
-    observe,
-    observe_motion,
-)
+from rigidimeter.analysis.estimation.closedloop.normal_equations import Problem
+from rigidimeter.analysis.estimation.closedloop.observation import observe, observe_motion
 from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
+from rigidimeter.analysis.estimation.closedloop.refine import shared_powers
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.core.records import Epoch
@@ -120,8 +117,7 @@ def varying_lines(prepared: PreparedEpoch, parameters: Array) -> VaryingLines:
     ValueError
         If the epoch cannot be observed; the text says why.
     """
-    by_perturbation = not closed_loop_obstacle(prepared.epoch)
-    observation = prepared.once(observe if by_perturbation else observe_motion)
+    observation = prepared.once(observe_motion if closed_loop_obstacle(prepared.epoch) else observe)
     grid = observation.lines.grid
     n = scipy.fft.next_fast_len(int(POINTS_PER_CYCLE * (grid.line[-1] + 1)), real=True)
     time_s = grid.time_s[0] + np.arange(n) * (grid.time_s.size / grid.rate_hz / n)
@@ -129,19 +125,20 @@ def varying_lines(prepared: PreparedEpoch, parameters: Array) -> VaryingLines:
     wide = _from_first_line(grid)
     below = int(grid.line[0]) - 1
     torque, motion = observation.lines.torque_nm, observation.lines.motion
-    power = np.abs(torque - motion @ parameters) ** 2
-    noise = smoother_for(grid.line, 1)(power)
-    if not np.all(noise > 0):
-        raise ValueError("the fit leaves nothing at some frequencies: are the channels simulated?")
+    (noise,) = shared_powers([Problem(motion, motion, torque, observation)], parameters)
     motion = np.concatenate([_low_motion(grid, wide.omega_rad_s[:below], angle, velocity), motion])
+    instruments = motion
+    if observation.excitation is not None:
+        J, B, K = np.maximum(parameters, LEAST).tolist()
+        instruments = replace(observation.excitation, grid=wide).motion_lines((J, B, K))
     return VaryingLines(
         grid,
         torque,
         motion,
-        _instruments(observation, wide, parameters) if by_perturbation else motion,
+        instruments,
         1 / np.sqrt(noise),
         angle - float(np.mean(angle)),
-        by_perturbation,
+        observation.excitation is not None,
     )
 
 
@@ -154,12 +151,6 @@ def _from_first_line(grid: Grid) -> Grid:
         omega_rad_s=np.asarray(step_rad_s * line, dtype=np.float64),
         window_lines=np.asarray(scipy.fft.rfft(grid.window)[line]),
     )
-
-
-def _instruments(observation: Observation, grid: Grid, parameters: Array) -> Complex:
-    assert observation.excitation is not None  # an epoch with a perturbation has one
-    J, B, K = np.maximum(parameters, LEAST).tolist()
-    return replace(observation.excitation, grid=grid).motion_lines((J, B, K))
 
 
 def _coarse_motion(epoch: Epoch, time_s: Array) -> tuple[Array, Array]:

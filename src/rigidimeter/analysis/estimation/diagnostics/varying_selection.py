@@ -10,12 +10,16 @@ unevenly.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import scipy
 
-from rigidimeter.analysis.estimation.diagnostics.varying_lines import VaryingLines
+from rigidimeter.analysis.estimation.between_epochs import also
+from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look
+from rigidimeter.analysis.estimation.diagnostics.missing_term import terms_found
+from rigidimeter.analysis.estimation.diagnostics.varying_lines import VaryingLines, varying_lines
 from rigidimeter.analysis.estimation.diagnostics.varying_shapes import (
     Shapes,
     with_angle,
@@ -24,17 +28,19 @@ from rigidimeter.analysis.estimation.diagnostics.varying_shapes import (
 )
 from rigidimeter.analysis.estimation.diagnostics.varying_test import (
     Columns,
-    Effect,
     Score,
     effect,
     score_test,
 )
 from rigidimeter.analysis.estimation.signals import Array
+from rigidimeter.core.findings import Fact
+from rigidimeter.core.records import PARAMETERS
 
 SHORTEST_S = 5.0
 """Fewer than ten blocks say nothing of the level of a test."""
 
 STIFFNESS = 2
+WITH_ANGLE = "varying_with_angle"
 
 
 class Change(NamedTuple):
@@ -206,15 +212,8 @@ def _change(
     unique = {id(of): of for of, _ in rest}.values()
     kinds = [kind, *(of for of in unique if of is not kind)]
     torque, base, (tested, *others) = _model(lines, kinds, parts)
-    return _extremes(
-        kind.shapes,
-        effect(lines, torque, Columns.joined([base, *others]), tested, parameter),
-        parameter,
-        p,
-    )
-
-
-def _extremes(shapes: Shapes, found: Effect, parameter: int, p: float) -> Change:
+    shapes = kind.shapes
+    found = effect(lines, torque, Columns.joined([base, *others]), tested, parameter)
     functions = np.column_stack([np.ones(len(shapes.at)), shapes.at])
     values = functions @ np.concatenate([found.constant[[parameter]], found.coefficients])
     variance = np.einsum("gi,ij,gj->g", functions, found.covariance, functions)
@@ -232,3 +231,49 @@ def _extremes(shapes: Shapes, found: Effect, parameter: int, p: float) -> Change
         shapes.place(high),
         100 * float(values[high] - values[low]) / max(middle, 1e-300),
     )
+
+
+def _variation(case: Case) -> Variation | None:
+    """Return what varies within the epoch; None where that cannot be tested."""
+    if case.prepared is None:
+        return None
+    try:
+        lines = varying_lines(case.prepared, case.parameters)
+        return variation(lines, case.settings.varying_chance)
+    except ValueError:
+        return None
+
+
+def _look(case: Case, name: str) -> Look | None:
+    """Return how far the parameters go with one thing, in % of their means."""
+    found = case.once(_variation)
+    if found is None or name not in found.p:
+        return None
+    most = case.settings.max_varying_percent
+    changes = sorted(found.changes.get(name, []), key=lambda change: -change.percent)
+    if not changes or not changes[0].percent > most:
+        return Look(changes[0].percent if changes else 0.0, most, False, p=found.p[name])
+    first, *others = (change for change in changes if change.percent > most)
+    about = PARAMETERS[first.parameter]
+    facts: dict[str, Fact] = {
+        "symbol": about.symbol,
+        "size_unit": about.unit,
+        "low": first.low,
+        "low_half": first.low_half,
+        "low_at": first.low_at,
+        "high": first.high,
+        "high_half": first.high_half,
+        "high_at": first.high_at,
+        "others": also([PARAMETERS[change.parameter].symbol for change in others]),
+    }
+    variant = ""
+    if name == WITH_ANGLE and (terms := terms_found(case)):
+        facts["terms"], variant = terms, "with_term"
+    return Look(first.percent, most, True, facts, variant, p=found.p[name])
+
+
+VARYING_CHECKS = tuple(
+    Check(name, (), partial(_look, name=name))
+    for name in ("varying_with_time", WITH_ANGLE, "varying_with_phase")
+)
+"""The checks of a joint that varies within an epoch."""

@@ -19,13 +19,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rigidimeter.analysis.estimation.signals import Array, Signals
-from rigidimeter.analysis.estimation.terms.beyond_linear import beyond_linear
-from rigidimeter.analysis.estimation.terms.catalogue import GROUPS, REFLEXES, parse_terms
+from rigidimeter.analysis.estimation.terms.beyond_linear import BeyondLinear, beyond_linear
+from rigidimeter.analysis.estimation.terms.catalogue import (
+    GROUPS,
+    REFLEXES,
+    parse_terms,
+    term_named,
+)
 from rigidimeter.analysis.estimation.terms.held_out import Gain, block_errors, gain
-from rigidimeter.analysis.estimation.terms.reflex import REFLEX_KINDS
+from rigidimeter.analysis.estimation.terms.reflex import FIR_SPACING_S, REFLEX_KINDS, kernel
 from rigidimeter.analysis.estimation.terms.regressors import Design
 from rigidimeter.analysis.estimation.terms.term_fit import TermsFit, fit_terms
-from rigidimeter.analysis.estimation.terms.term_gains import TermGain, directed, pushes
 
 BASE = ("inertia", "damping", "stiffness")
 
@@ -34,6 +38,16 @@ LEAST_PERCENT = 5.0
 
 MARGIN_PERCENT = 1.0
 """Of the error of a smaller model, that a larger one must predict."""
+
+
+@dataclass(frozen=True)
+class TermGain:
+    """A term's coefficient from its part that no linear filter of the motion explains."""
+
+    term: str
+    value: float
+    standard_error: float
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -146,7 +160,7 @@ def fit_models(
         beyond = beyond_linear(motion, band_hz, trim_s)
     except ValueError:  # too few lines, or no noise: the coefficients of the fit have to do
         return Comparison(tuple(rows), None, "")
-    gains = [() if row.fit is None else directed(beyond, row.terms)[1] for row in rows]
+    gains = [() if row.fit is None else _directed(beyond, row.terms)[1] for row in rows]
     both = zip(rows, gains, strict=True)
     return Comparison(tuple(replace(row, beyond=found) for row, found in both), None, "")
 
@@ -176,7 +190,7 @@ class _Judge:
     def row(self, model: Sequence[str]) -> ModelRow:
         """Fit one model to all, let it predict each block, and look at its signs."""
         names = parse_terms(model)
-        decided, solved = directed(self._beyond, names)
+        decided, solved = _directed(self._beyond, names)
         row = fit_model(self._motion, decided, self._band_hz, self._trim_s)
         if row.fit is None:
             return replace(row, terms=names)
@@ -190,7 +204,7 @@ class _Judge:
             row,
             held_out=gain(block_errors(target, [], rate_hz, gap_s, mean=True), errors),
             beyond=solved,
-            problem="; ".join(filter(None, map(pushes, solved))),
+            problem="; ".join(filter(None, map(_pushes, solved))),
             errors=errors,
             beyond_errors=block_errors(self._target, grid, self._beyond.series_rate_hz, gap_s),
         )
@@ -206,7 +220,11 @@ class _Judge:
         held_out = chosen.held_out
         assert held_out is not None
         if not _beats(held_out, LEAST_PERCENT) or chosen.problem:
-            return None, _none_explains(chosen)
+            return None, "none of these models explains this torque: " + (
+                chosen.problem
+                or f"the best, {chosen.name}, predicts {held_out.text} of its variance in blocks "
+                f"that it has not seen; it must be {LEAST_PERCENT:g} % and its interval above 0"
+            )
         reason = (
             f"{chosen.name}: predicts {held_out.text} of the torque's variance in blocks that it "
             "has not seen"
@@ -243,6 +261,64 @@ class _Judge:
             chosen, gained = min(alike, key=lambda pair: (_size(pair[0]), -pair[1].percent))
 
 
+def _directed(
+    beyond: BeyondLinear, names: tuple[str, ...]
+) -> tuple[tuple[str, ...], tuple[TermGain, ...]]:
+    """Decide the direction of a reflex, and return the terms that are not linear with their gains.
+
+    Of max(v, 0) = (v + |v|)/2 and min(v, 0) = (v − |v|)/2 the even part has opposite signs: a
+    reflex that resists has a positive gain in one direction only.
+    """
+    undecided = [name for name in names if name in REFLEXES and name[-1] not in "+-"]
+    found = [
+        _gains(beyond, tuple(name + side if name in undecided else name for name in names))
+        for side in ("+-" if undecided else "+")
+    ]
+    if not undecided:
+        return names, found[0]
+    kind = undecided[0]
+    plus = next(one.value for one in found[0] if one.term == f"{kind}+")
+    side, solved = ("+", found[0]) if plus > 0 else ("-", found[1])
+    return tuple(name + side if name in undecided else name for name in names), solved
+
+
+def _gains(beyond: BeyondLinear, names: tuple[str, ...]) -> tuple[TermGain, ...]:
+    """Return the coefficients of the terms that are not linear in the motion."""
+    bent = beyond.not_linear(names)
+    if not bent:
+        return ()
+    tried = [beyond.solve(beyond.columns(bent, q)) for q in beyond.grid(bent)]
+    best = min(tried, key=lambda one: float(np.sum(np.abs(one.residual) ** 2)))
+    found, column = [], 0
+    for name in bent:
+        term = term_named(name)
+        count = 1 if term is not None else len(kernel(name).columns)
+        part = slice(column, column + count)
+        column += count
+        width = FIR_SPACING_S if count > 1 else 1.0
+        found.append(
+            TermGain(
+                name,
+                width * float(np.sum(best.values[part])),
+                width * math.sqrt(float(np.sum(best.covariance[part, part]))),
+                "N·m·s/rad" if term is None else term.unit,
+            )
+        )
+    return tuple(found)
+
+
+def _pushes(one: TermGain) -> str:
+    """Return that a reflex or a friction pushes, by more than chance; empty where it does not."""
+    term = term_named(one.term)
+    if one.value >= -2 * one.standard_error or (term is not None and not term.resists):
+        return ""
+    kind = "reflex" if term is None else "friction"
+    return (
+        f"the gain of {one.term} is {one.value:.3g} ± {one.standard_error:.2g} {one.unit}: it "
+        f"pushes, and a {kind} resists, so it stands for something else"
+    )
+
+
 def _more(smaller: ModelRow, larger: ModelRow, comparisons: int) -> Gain:
     if _same_bent(smaller, larger):
         return gain(smaller.errors, larger.errors, comparisons)
@@ -250,24 +326,11 @@ def _more(smaller: ModelRow, larger: ModelRow, comparisons: int) -> Gain:
 
 
 def _same_bent(one: ModelRow, other: ModelRow) -> bool:
-    return _beyond_terms(one) == _beyond_terms(other)
+    return {gain.term for gain in one.beyond} == {gain.term for gain in other.beyond}
 
 
 def _beats(more: Gain, least_percent: float) -> bool:
     return more.low_percent > 0 and more.percent > least_percent
-
-
-def _beyond_terms(row: ModelRow) -> frozenset[str]:
-    return frozenset(one.term for one in row.beyond)
-
-
-def _none_explains(best: ModelRow) -> str:
-    assert best.held_out is not None
-    return "none of these models explains this torque: " + (
-        best.problem
-        or f"the best, {best.name}, predicts {best.held_out.text} of its variance in blocks that "
-        f"it has not seen; it must be {LEAST_PERCENT:g} % and its interval above 0"
-    )
 
 
 def _size(row: ModelRow) -> int:

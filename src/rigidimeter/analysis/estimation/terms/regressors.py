@@ -1,7 +1,11 @@
 """The regressors of a sum of terms: everything linear is done once.
 
 The band F and the dynamics H of a reflex are both linear, so F comes first, on the wide-band rate,
-and H, which the search changes, on the few samples that are kept.
+and H, which the search changes, on the few samples that are kept. What is linear in the
+coefficients c is solved, what is not, q, is searched (variable projection: Golub and Pereyra 1973;
+2003 for a review):
+
+    min over q, c of |y − A(q) c|²  =  min over q of |y − A(q) c(q)|²
 """
 
 from __future__ import annotations
@@ -10,6 +14,7 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
+import scipy
 
 from rigidimeter.analysis.estimation.signals import Array, Signals
 from rigidimeter.analysis.estimation.terms.catalogue import REFLEXES, term_named
@@ -19,11 +24,13 @@ from rigidimeter.analysis.estimation.terms.reflex import (
     pass_through,
     stretch_velocity,
 )
-from rigidimeter.analysis.estimation.terms.separable import search
 from rigidimeter.analysis.estimation.terms.wideband import banded
 
 SAMPLES_PER_CYCLE = 2.5
 """Of the highest frequency of the band, kept for the fit."""
+
+REFINED_STARTS = 3
+"""How many of the best points of the grid are refined; the rest have lost by then."""
 
 
 class Design:
@@ -80,10 +87,40 @@ class Design:
             columns += [column[self.keep] for column in passed]
         return np.column_stack(columns)
 
-    def search(self) -> Array:
-        """Return the q of least residual."""
-        kernels = list(self.kernels.values())
-        starts = [sum(parts, ()) for parts in product(*(one.starts for one in kernels))]
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """The least and the largest q, shape (k,) each."""
+        kernels = self.kernels.values()
         low = [bound for one in kernels for bound in one.low]
-        high = [bound for one in kernels for bound in one.high]
-        return search(self.columns, self.torque_nm[self.keep], starts, low, high)
+        return np.array(low), np.array([bound for one in kernels for bound in one.high])
+
+    def search(self) -> Array:
+        """Return the q of least residual: best of a grid, then refined; shape (k,)."""
+        low, high = self.bounds
+        if not low.size:
+            return low
+        target = self.torque_nm[self.keep]
+
+        def residual(parameters: Array) -> Array:
+            columns = self.columns(parameters)
+            lengths = np.linalg.norm(columns, axis=0)
+            scaled = columns / np.where(lengths > 0, lengths, 1.0)
+            # On the way q may make columns alike; what counts is the distance to their span.
+            values, *_ = np.linalg.lstsq(scaled, target, rcond=1e-10)
+            return np.asarray(target - scaled @ values, dtype=np.float64)
+
+        grid = product(*(one.starts for one in self.kernels.values()))
+        starts = [np.clip(sum(parts, ()), low, high) for parts in grid]
+        best = sorted(starts, key=lambda start: float(np.linalg.norm(residual(start))))
+        refined = [
+            scipy.optimize.least_squares(
+                residual,
+                start,
+                bounds=(low, high),
+                x_scale=high - low,
+                diff_step=np.full(low.size, 1e-5),
+                max_nfev=60,
+            )
+            for start in best[:REFINED_STARTS]
+        ]
+        return np.asarray(min(refined, key=lambda found: float(found.cost)).x, dtype=np.float64)

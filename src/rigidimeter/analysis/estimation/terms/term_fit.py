@@ -15,12 +15,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rigidimeter.analysis.estimation.linear_solution import solve_named
 from rigidimeter.analysis.estimation.signals import Array, Signals
 from rigidimeter.analysis.estimation.terms.catalogue import REFLEXES, parse_terms, term_named
 from rigidimeter.analysis.estimation.terms.reflex import FIR_SPACING_S
 from rigidimeter.analysis.estimation.terms.regressors import Design
 from rigidimeter.analysis.estimation.terms.residual_tests import ResidualTest, residual_test
-from rigidimeter.analysis.estimation.terms.separable import bread, solve
 from rigidimeter.analysis.estimation.uncertainty import hac_covariance
 
 NEAR_BOUND = 1e-3
@@ -159,9 +159,9 @@ def _fit(design: Design, band_hz: tuple[float, float], trim_s: float) -> TermsFi
     if not float(np.ptp(target)) > 0:
         raise ValueError("the torque is constant in the band")
     nonlinear = design.search()
-    columns, names = design.columns(nonlinear), design.names
-    solution = solve(columns, target, names)
-    residual = solution.residual
+    columns = design.columns(nonlinear)
+    solution = solve_named(columns, target, design.names)
+    residual = target - columns @ solution.values
     n, p = target.size, columns.shape[1] + nonlinear.size
     independent = min(float(n), 2.0 * (band_hz[1] - band_hz[0]) * n / design.rate_hz)
     parameters, remarks = _parameters(design, solution.values, nonlinear, residual)
@@ -188,19 +188,16 @@ def _parameters(
     design: Design, linear: Array, nonlinear: Array, residual: Array
 ) -> tuple[tuple[TermParameter, ...], list[str]]:
     """Return the parameters with HAC errors, linear and nonlinear ones from one Jacobian."""
-    low = [bound for one in design.kernels.values() for bound in one.low]
-    high = [bound for one in design.kernels.values() for bound in one.high]
+    low, high = design.bounds
     slopes, remarks = [], []
-    for k, value in enumerate(nonlinear):
-        width = 1e-4 * (high[k] - low[k])
-        up, down = nonlinear.copy(), nonlinear.copy()
-        up[k], down[k] = value + width, value - width
-        slopes.append((design.columns(up) - design.columns(down)) @ linear / (2.0 * width))
+    for step in np.diag(1e-4 * (high - low)):
+        rise = design.columns(nonlinear + step) - design.columns(nonlinear - step)
+        slopes.append(rise @ linear / (2.0 * step.sum()))
     jacobian = np.column_stack((design.columns(nonlinear), *slopes))
     inner = [f"q{k}" for k in range(nonlinear.size)]
     covariance = np.full((jacobian.shape[1],) * 2, math.nan)
     try:
-        inverse = bread(jacobian, [*design.names, *inner])
+        inverse = solve_named(jacobian, residual, [*design.names, *inner]).bread
         covariance = hac_covariance(inverse, jacobian * residual[:, None]).covariance
     except ValueError as obstacle:
         remarks.append(f"no standard errors: {obstacle}")
