@@ -16,7 +16,7 @@ in its linear part. A term that is linear comes with the J, B and K beside it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -117,8 +117,8 @@ def missing_term(case: Case) -> Look | None:
     # The whole damping and its two halves are one too many.
     asked = asked.replace("damping,", "", 1) if "directional-damping" in asked else asked
     facts: dict[str, Fact] = {
-        "terms": _and(WORDS[term.name][0] for term in found.terms),
-        "sizes": _and(map(_size, found.terms)),
+        "terms": " and ".join(WORDS[term.name][0] for term in found.terms),
+        "sizes": " and ".join(map(_size, found.terms)),
         "asked": asked,
     }
     variants = ""
@@ -165,16 +165,12 @@ def _linear(case: Case, beyond: BeyondLinear, term: LinearTerm) -> Look:
 
 def _look(case: Case, added: Array, p: float, facts: Mapping[str, Fact], variant: str) -> Look:
     """Return a look for what terms add to J, B and K while left out, shape (1 or 2, 3)."""
-    value = _share_percent(case, added)
+    largest = np.max(np.abs(added), axis=0) / np.maximum(case.half_widths, 1e-300)
+    value = 100.0 * float(np.max(largest))
     by_fit, *beside = (Effect.of(row, case.parameters, case.half_widths) for row in added)
     # In a loop the fit with the terms may be biased: it is not enough to call them harmless.
     effect = beside[0] if by_fit.negligible and beside else by_fit
     return Look(value, MOST_PERCENT, True, facts, variant, effect, p)
-
-
-def _share_percent(case: Case, added: Array) -> float:
-    largest = np.max(np.abs(added), axis=0) / np.maximum(case.half_widths, 1e-300)
-    return 100.0 * float(np.max(largest))
 
 
 def _moved(
@@ -195,11 +191,28 @@ def _moved(
     low, high = case.signals.band_hz
     first, last = np.searchsorted(beyond.frequency_hz, (low, np.nextafter(high, np.inf))).tolist()
     inside = slice(first, last)
-    motion = beyond.linear[inside]
+    plain = [term for term in terms if term.name not in REFLEXES]
+    with_motion = [beyond.linear, *(beyond.term_lines(term.name) for term in plain)]
+    columns, torque = np.concatenate(with_motion, axis=1)[inside], beyond.torque_lines[inside]
+    upper = triangle(columns, torque)
+
+    def joint(group: Sequence[OmittedTerm]) -> Array:
+        """Return J, B and K by least squares beside these terms, shape (3,)."""
+        used = [0, 1, 2, *(3 + i for i, term in enumerate(plain) if term in group)]
+        reflexes = [term.name for term in group if term.name in REFLEXES]
+        if not reflexes:
+            return explained(upper[:, used], upper[:, -1]).values[:3]
+        # One reflex at most is looked for: its direction is decided by what is not linear.
+        (name,) = reflexes
+        signal, gains = beyond.reflexes(name)
+        late = Filtered(signal[inside], gains.part(inside, slice(None)))
+        best = late.column(strongest(columns[:, used], late, torque))
+        return _fitted(np.column_stack([columns[:, used], best]), torque)[:3]
+
+    motion = columns[:, :3]
     alone = {term: _fitted(motion, term.lines(beyond)[inside]) for term in terms}
-    refit = _Refit(beyond, [term.name for term in terms], inside)
     return [
-        np.stack([case.parameters - refit.joint(group), np.sum([alone[t] for t in group], axis=0)])
+        np.stack([case.parameters - joint(group), np.sum([alone[t] for t in group], axis=0)])
         for group in groups
     ]
 
@@ -226,41 +239,6 @@ def _fitted(columns: Complex, torque: Complex) -> Array:
     """Return the columns' parts in a torque by least squares."""
     upper = triangle(columns, torque)
     return explained(upper[:, :-1], upper[:, -1]).values
-
-
-class _Refit:
-    """J, B and K by least squares with some of the terms, at lines of the band."""
-
-    def __init__(self, beyond: BeyondLinear, names: Sequence[str], inside: slice) -> None:
-        self._beyond, self._inside = beyond, inside
-        self._plain = [name for name in names if name not in REFLEXES]
-        lines = [beyond.linear, *(beyond.term_lines(name) for name in self._plain)]
-        self._columns = np.concatenate(lines, axis=1)[inside]
-        self._torque = beyond.torque_lines[inside]
-        self._upper = triangle(self._columns, self._torque)
-
-    def joint(self, terms: Sequence[OmittedTerm]) -> Array:
-        """Return J, B and K beside these terms, shape (3,)."""
-        reflexes = [term.name for term in terms if term.name in REFLEXES]
-        used = [
-            0,
-            1,
-            2,
-            *(3 + i for i, n in enumerate(self._plain) if n in {t.name for t in terms}),
-        ]
-        if not reflexes:
-            return explained(self._upper[:, used], self._upper[:, -1]).values[:3]
-        # One reflex at most is looked for: its direction is decided by what is not linear.
-        (name,) = reflexes
-        columns = self._columns[:, used]
-        signal, gains = self._beyond.reflexes(name)
-        late = Filtered(signal[self._inside], gains.part(self._inside, slice(None)))
-        best = late.column(strongest(columns, late, self._torque))
-        return _fitted(np.column_stack([columns, best]), self._torque)[:3]
-
-
-def _and(words: Iterable[str]) -> str:
-    return " and ".join(words)
 
 
 def _size(term: OmittedTerm) -> str:
