@@ -14,11 +14,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimation.stretches import bridged, sound, too_little, used_s
+from rigidimeter.analysis.estimation.stretches import (
+    bridged,
+    fitted_channels,
+    sound,
+    too_little,
+    used_s,
+)
 from rigidimeter.core.records import Channel, Epoch, LeftOut
 from rigidimeter.core.settings import DiagnosticsSettings, Settings
 
-FITTED = ("torque_nm", "angle_rad", "velocity_rad_s")
 CAUSES = ("velocity_command_rad_s", "perturbation_nm")
 FEWEST_AT_EXTREME = 3
 """An extreme reached by chance is not repeated three times in a row."""
@@ -41,7 +46,7 @@ def without_bad_stretches(epoch: Epoch, settings: Settings) -> Epoch:
     """
     epoch = bridged(epoch)
     diagnostics, levels = settings.diagnostics, settings.diagnostics.levels
-    if not any(len(channel) for channel in _fitted(epoch)):
+    if not fitted_channels(epoch):
         return epoch
     frozen, saturated = levels.frozen == "exclude", levels.saturation == "exclude"
     found = bad_stretches(epoch, diagnostics, frozen=frozen, saturated=saturated)
@@ -71,7 +76,7 @@ def bad_stretches(
         Return where a channel that was at the end of its range too often was there.
     """
     found = []
-    for channel in _fitted(epoch):
+    for channel in fitted_channels(epoch):
         runs = _runs(channel.values)
         starts_s, stops_s = _repetitions(epoch, channel, runs, settings)
         long = stops_s - starts_s > (settings.max_frozen_s if frozen else np.inf)
@@ -200,11 +205,3 @@ def _keeps(
         return False
     other = np.abs(cause.values[inside] - level) > ZERO * float(np.max(np.abs(cause.values)))
     return float(np.count_nonzero(other)) / cause.mean_rate_hz <= other_most_s
-
-
-def _fitted(epoch: Epoch) -> list[Channel]:
-    return [
-        epoch.channels[name]
-        for name in FITTED
-        if name in epoch.channels and len(epoch.channels[name])
-    ]

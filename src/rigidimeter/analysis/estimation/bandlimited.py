@@ -85,14 +85,10 @@ def zero_phase_band(values: Array, rate_hz: float, band: tuple[float, float]) ->
     if n <= SHORT_MEMORY:
         raise ValueError(f"{n} samples are too few for a filter; it needs {SHORT_MEMORY + 1}")
     low, high = band
-    lowpass, highpass = _filters(low, high, _to_stamps(rate_hz))
+    # To the digits that stamps are good for, so that epochs share their filters.
+    lowpass, highpass = _filters(low, high, float(f"{rate_hz:.9g}"))
     smooth = _both_ways(lowpass, values - np.mean(values, axis=-1, keepdims=True), SHORT_MEMORY)
     return _both_ways(highpass, smooth, round(rate_hz / low))
-
-
-def _to_stamps(rate_hz: float) -> float:
-    """Return a rate to the digits that stamps are good for, so that epochs share their filters."""
-    return float(f"{rate_hz:.9g}")
 
 
 _Filter = tuple[Array, Array]

@@ -123,7 +123,8 @@ def between_epochs(
     if not np.all(np.isfinite(values)) or not np.all(errors > 0):
         return None
     half = np.array([fit.high - fit.low for fit in fits]) / 2
-    degrees = _degrees(half / errors)
+    known, quantile = _quantiles()
+    degrees = np.interp(-half / errors, -quantile, known)
     scatters = [scatter(j, values[:, j], errors[:, j], degrees[:, j]) for j in range(3)]
     most = settings.max_varying_percent
     if by_perturbation:
@@ -143,6 +144,8 @@ def between_epochs(
     labels, about = [fit.epoch for fit in fits], PARAMETERS[first.parameter]
     low, high = int(np.argmin(first.drawn)), int(np.argmax(first.drawn))
     trend_percent, trend_p = first.trend()
+    way = "rising" if trend_percent > 0 else "falling"
+    trend = f", {way} by {abs(trend_percent):.0f} % over the epochs" if trend_p < TREND_P else ""
     facts: dict[str, Fact] = {
         "symbol": about.symbol,
         "size_unit": about.unit,
@@ -153,7 +156,7 @@ def between_epochs(
         "sd": first.sd,
         "trend_percent": trend_percent,
         "trend_p": trend_p,
-        "trend": "" if trend_p >= TREND_P else _trend(trend_percent),
+        "trend": trend,
         "others": also([PARAMETERS[one.parameter].symbol for one in others]),
     }
     return found(
@@ -171,16 +174,6 @@ def between_epochs(
 def also(symbols: Sequence[str]) -> str:
     """Return which of J, B and K change too, to end a sentence."""
     return f"; {' and '.join(symbols)} too" if symbols else ""
-
-
-def _trend(percent: float) -> str:
-    return f", {'rising' if percent > 0 else 'falling'} by {abs(percent):.0f} % over the epochs"
-
-
-def _degrees(ratio: Array) -> Array:
-    """Return the degrees of freedom of t intervals, half their width over the standard error."""
-    known, quantile = _quantiles()
-    return np.asarray(np.interp(-ratio, -quantile, known))
 
 
 @lru_cache

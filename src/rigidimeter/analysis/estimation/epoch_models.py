@@ -66,7 +66,10 @@ def model_epoch(
     """
     band = _band_hz(prepared, high_hz)
     epoch, estimation = prepared.epoch, prepared.settings.estimation
-    fit = _estimate(prepared)
+    # By `iv` they would not be biased by torque of the subject's own, and checks would say so of
+    # models that are.
+    (fit,), _ = method_named("bandlimited").fit([prepared], None, lambda _: None, False)
+    fit = checked(prepared, fit, by_noise=False)
     motion = wideband_signals(longest_part(epoch), band[1])
     if not compare:
         fitted = fit_models(motion, models, band, estimation.trim_s)
@@ -131,16 +134,6 @@ def _band_hz(prepared: PreparedEpoch, high_hz: float | None) -> tuple[float, flo
     used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
     slowest_hz = min(channel.rate_hz for channel in used)
     return (0.0, min(high_hz, USABLE_FRACTION_OF_RATE * slowest_hz))
-
-
-def _estimate(prepared: PreparedEpoch) -> Fit:
-    """Return J, B and K by least squares, as the models are fitted, with what the checks found.
-
-    By `iv` they would not be biased by torque of the subject's own, and checks would say so of
-    models that are.
-    """
-    (fit,), _ = method_named("bandlimited").fit([prepared], None, lambda _: None, False)
-    return checked(prepared, fit, by_noise=False)
 
 
 def _refused(fit: Fit) -> str:

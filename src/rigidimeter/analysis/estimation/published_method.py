@@ -24,10 +24,7 @@ import numpy as np
 import scipy
 
 from rigidimeter.analysis.estimation.amplitude import amplitude_of_signals, amplitude_together
-from rigidimeter.analysis.estimation.closedloop.between_samples import (
-    acceleration_seen,
-    phases_s,
-)
+from rigidimeter.analysis.estimation.closedloop.between_samples import acceleration_seen, phases_s
 from rigidimeter.analysis.estimation.closedloop.between_uncertainty import NAME
 from rigidimeter.analysis.estimation.found import found
 from rigidimeter.analysis.estimation.least_squares import fit_inertia_damping_stiffness

@@ -105,13 +105,13 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
     grid = uniform_grid(used, rate_hz)
     both = np.stack([values_at(used[0], grid), angle_at(epoch, grid)])
     bandpass = _bandpass(settings.band_low_hz, settings.band_high_hz, rate_hz)
-    gain = _gain(bandpass, motion.frequency_hz, rate_hz)
+    _, response = scipy.signal.sosfreqz(bandpass, [motion.frequency_hz], fs=rate_hz)
+    gain = float(np.abs(response[0]) ** 2)  # once forwards and once backwards
     if gain < LEAST_GAIN:
         raise ValueError(
             f"the {motion.frequency_hz:.3g} Hz motion lies outside the band of the scores, "
             f"{settings.band_low_hz:g} to {settings.band_high_hz:g} Hz ([scores] sets it)"
         )
-    moving = _moving_at_ends(both[1], round(rate_hz / motion.frequency_hz))
     padding_s = 3 / settings.band_low_hz  # the slowest part of the filter settles in that time
     start = max(motion.start_s + settings.discard_s, float(grid[0]))
     stop = min(motion.start_s + motion.duration_s - settings.discard_s, float(grid[-1]))
@@ -124,7 +124,7 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
     points = n_cycles * POINTS_PER_CYCLE
     fine = start + np.arange(points + 1) / (POINTS_PER_CYCLE * motion.frequency_hz)
     centred = both - np.mean(both, axis=1, keepdims=True)
-    padded, before = _continued(grid, centred, motion.frequency_hz, moving, padding_s)
+    padded, before = _continued(grid, centred, motion.frequency_hz, padding_s)
     filtered = scipy.signal.sosfiltfilt(bandpass, padded)[:, before : before + grid.size]
     torque, angle = scipy.interpolate.CubicSpline(grid, filtered / gain, axis=1)(fine)
     return Cycles(fine, torque, angle, motion.frequency_hz, n_cycles)
@@ -137,23 +137,12 @@ def _bandpass(low_hz: float, high_hz: float, rate_hz: float) -> Array:
     return np.asarray(sections)
 
 
-def _gain(sections: Array, frequency_hz: float, rate_hz: float) -> float:
-    """Return the gain of the filter at a frequency, once forwards and once backwards."""
-    _, response = scipy.signal.sosfreqz(sections, [frequency_hz], fs=rate_hz)
-    return float(np.abs(response[0]) ** 2)
-
-
-def _moving_at_ends(angle: Array, points_per_cycle: int) -> tuple[bool, bool]:
-    """Return whether the first and the last cycle of a recording have the full amplitude."""
-    full = SAME_AMPLITUDE * float(np.ptp(angle))
-    n = points_per_cycle
-    return float(np.ptp(angle[:n])) > full, float(np.ptp(angle[-n:])) > full
-
-
 def _continued(
-    grid: Array, values: Array, frequency_hz: float, moving: tuple[bool, bool], padding_s: float
+    grid: Array, values: Array, frequency_hz: float, padding_s: float
 ) -> tuple[Array, int]:
     """Return signals, shape (k, n), continued at both ends, and how many values were put before.
+
+    The last of the signals is the angle, which shows whether it moves at an end.
 
     A recording that begins in the middle of the motion is continued with the cycles next to its
     end, one at rest with its last value; a filter that started from a mirror image instead would
@@ -165,6 +154,8 @@ def _continued(
     cycle_s = 1.0 / frequency_hz
     back = (-steps) % cycle_s  # how far into the first cycle, for each time before it
     early, late = np.repeat(values[:, :1], n, axis=1), np.repeat(values[:, -1:], n, axis=1)
+    cycle, full = round(cycle_s / interval_s), SAME_AMPLITUDE * float(np.ptp(values[-1]))
+    moving = [float(np.ptp(end)) > full for end in (values[-1, :cycle], values[-1, -cycle:])]
     if any(moving):
         motion = scipy.interpolate.CubicSpline(grid, values, axis=1)
         early = motion(grid[0] + back) if moving[0] else early

@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimation.signals import Array, motion_channels
+from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.core.records import Channel, Epoch, LeftOut
 from rigidimeter.core.settings import EstimationSettings
 
@@ -30,6 +30,12 @@ LEAST_USED_S = 1.0
 
 GAP = 1.5
 """In mean intervals: where two samples are further apart, some between them are missing."""
+
+
+def fitted_channels(epoch: Epoch) -> list[Channel]:
+    """Return the measured channels that J, B and K are made of, those with samples."""
+    wanted = (epoch.channels.get(name) for name in ("torque_nm", "angle_rad", "velocity_rad_s"))
+    return [channel for channel in wanted if channel is not None and len(channel)]
 
 
 def sound(epoch: Epoch, time_s: Array, margin_s: float = 0.0) -> NDArray[np.bool_]:
@@ -56,7 +62,7 @@ def bridged(epoch: Epoch) -> Epoch:
     if not epoch.left_out and all(channels[name] is one for name, one in epoch.channels.items()):
         return epoch
     epoch = replace(epoch, channels=channels)
-    for channel in _fitted(epoch):
+    for channel in fitted_channels(epoch):
         kept = sound(epoch, channel.time_s)
         if not np.any(kept):
             continue  # nothing to hang a line on; the epoch is refused for what is left of it
@@ -111,7 +117,7 @@ def longest_part(epoch: Epoch) -> Epoch:
     # The first of those that are equally long.
     low_s, high_s = max(parts, key=lambda part: min(part[1], stop_s) - max(part[0], start_s))
     channels = dict(epoch.channels)
-    for channel in _fitted(epoch):
+    for channel in fitted_channels(epoch):
         # The ends of a stretch are left out with it.
         rows = (channel.time_s >= low_s) & (channel.time_s <= high_s)
         rows &= sound(epoch, channel.time_s)
@@ -151,12 +157,7 @@ def too_little(epoch: Epoch, settings: EstimationSettings) -> str:
     )
 
 
-def _fitted(epoch: Epoch) -> list[Channel]:
-    torque = epoch.channels.get("torque_nm")
-    return ([] if torque is None else [torque]) + motion_channels(epoch)
-
-
 def _span(epoch: Epoch) -> tuple[float, float]:
-    used = [channel for channel in _fitted(epoch) if len(channel)]
+    used = fitted_channels(epoch)
     start_s = max(float(channel.time_s[0]) for channel in used)
     return start_s, min(float(channel.time_s[-1]) for channel in used)

@@ -182,12 +182,11 @@ def same_sequence(answers: Sequence[Answer]) -> list[list[Answer]]:
     """Return the answers by sequence: those whose responses differ by a short delay alone."""
     groups: list[list[Answer]] = []
     for answer in answers:
-        for group in groups:
-            if _one_sequence(group[0], answer):
-                group.append(answer)
-                break
-        else:
+        same = next((group for group in groups if _one_sequence(group[0], answer)), None)
+        if same is None:
             groups.append([answer])
+        else:
+            same.append(answer)
     return groups
 
 

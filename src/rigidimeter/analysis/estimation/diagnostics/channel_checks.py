@@ -11,11 +11,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.bad_stretches import (
-    FITTED,
-    longest_repetition,
-    share_at_extremes,
-)
+from rigidimeter.analysis.estimation.bad_stretches import longest_repetition, share_at_extremes
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
     HARMFUL,
     Case,
@@ -24,7 +20,7 @@ from rigidimeter.analysis.estimation.diagnostics.check_record import (
     Look,
     at_most,
 )
-from rigidimeter.analysis.estimation.stretches import left_out_s
+from rigidimeter.analysis.estimation.stretches import fitted_channels, left_out_s
 from rigidimeter.core.findings import Fact
 from rigidimeter.core.records import LOST_SAMPLES, Channel, Epoch, LeftOut, Ticks
 from rigidimeter.core.settings import DiagnosticsSettings
@@ -39,7 +35,7 @@ def saturation(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     if found:
         value = 100.0 * _seconds(found) / _length_s(epoch)
         return Look(value, most, True, {"channel": _channels(found), **_rest(epoch, found)})
-    shares = {c.name: 100.0 * share_at_extremes(epoch, c, settings) for c in _fitted(epoch)}
+    shares = {c.name: 100.0 * share_at_extremes(epoch, c, settings) for c in fitted_channels(epoch)}
     worst = max(shares, key=lambda name: shares[name])
     return at_most(shares[worst], most, channel=worst)
 
@@ -50,7 +46,7 @@ def frozen(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     if found:
         value = max(stretch.stop_s - stretch.start_s for stretch in found)
         return Look(value, most, True, {"channel": _channels(found), **_rest(epoch, found)})
-    longest = {c.name: longest_repetition(epoch, c, settings) for c in _fitted(epoch)}
+    longest = {c.name: longest_repetition(epoch, c, settings) for c in fitted_channels(epoch)}
     worst = max(longest, key=lambda name: longest[name][0])
     value, start_s = longest[worst]
     return at_most(value, most, channel=worst, start_s=start_s)
@@ -151,10 +147,6 @@ def position_limit(angle: Channel, limit_rad: float, settings: DiagnosticsSettin
     """Return how near the joint came to the position limit, in % of it."""
     value = 100.0 * float(np.max(np.abs(angle.values))) / limit_rad
     return at_most(value, settings.max_position_percent, limit_deg=deg_from_rad(limit_rad))
-
-
-def _fitted(epoch: Epoch) -> list[Channel]:
-    return [epoch.channels[name] for name in FITTED if name in epoch.channels]
 
 
 def _position_limit(case: Case) -> Look | None:

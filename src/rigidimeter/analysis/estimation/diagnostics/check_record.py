@@ -56,7 +56,9 @@ def push_harmless(case: Case, look: Look) -> Harmless:
         # Torque that shows no joint is not the joint's.
         shown = bool(np.all(np.abs(case.parameters) > case.half_widths))
         return ("in_interval", {}) if shown else HARMFUL
-    return "small_bias", {"share": case.loop_bias_percent or 0.0}
+    assert case.loop_bias is not None  # one that is small is known
+    percent = 100.0 * np.abs(case.loop_bias) / case.half_widths
+    return "small_bias", {"share": float(np.max(percent))}
 
 
 def push_effect(case: Case) -> Effect:
@@ -65,18 +67,6 @@ def push_effect(case: Case) -> Effect:
         return Effect((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     bias = case.loop_bias
     return UNKNOWN_EFFECT if bias is None else Effect.of(bias, case.parameters, case.half_widths)
-
-
-def never(case: Case, look: Look) -> Harmless:
-    """Return that a failed check is not harmless."""
-    del case, look
-    return HARMFUL
-
-
-def unknown(case: Case) -> Effect:
-    """Return that nothing is known of what a failure does to J, B and K."""
-    del case
-    return UNKNOWN_EFFECT
 
 
 @dataclass(frozen=True)
@@ -142,12 +132,6 @@ class Case:
         if self.fit is None:
             return np.abs(self.parameters) * UNKNOWN_WIDTH
         return half_widths(self.fit)
-
-    @property
-    def loop_bias_percent(self) -> float | None:
-        """`loop_bias` in % of `half_widths`, the largest of the three."""
-        bias = self.loop_bias
-        return None if bias is None else 100.0 * float(np.max(np.abs(bias) / self.half_widths))
 
     @property
     def loop_bias_is_small(self) -> bool:
@@ -226,8 +210,8 @@ class Check:
     needs: tuple[str, ...]
     function: Callable[[Case], Look | None]
     of_fit: bool = True
-    harmless: Callable[[Case, Look], Harmless] = never
-    effect: Callable[[Case], Effect] = unknown
+    harmless: Callable[[Case, Look], Harmless] = lambda case, look: HARMFUL
+    effect: Callable[[Case], Effect] = lambda case: UNKNOWN_EFFECT
 
     def looks(self, case: Case) -> Look | None:
         """Return what the check sees, or None where it lacks what it needs."""

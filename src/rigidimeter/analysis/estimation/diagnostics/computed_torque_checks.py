@@ -23,7 +23,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
-from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look, at_least
+from rigidimeter.analysis.estimation.diagnostics.check_record import Check, Look, at_least
 from rigidimeter.analysis.estimation.diagnostics.excitation_checks import perturbation_nm
 from rigidimeter.analysis.estimation.signals import (
     Array,
@@ -115,13 +115,16 @@ def _not_a_sum(epoch: Epoch, channels: Sequence[Channel]) -> float:
     return float(np.sqrt(np.mean(left**2))) / sd if sd > 0 else math.inf
 
 
-def _static_torque(case: Case) -> Look:
-    return static_torque(case.epoch, case.signals, case.settings)
-
-
 COMPUTED_TORQUE_CHECKS = (
     Check("computed_torque", (), lambda c: computed_torque(c.epoch, c.settings), of_fit=False),
 )
 """Before those of the channels: a binary torque that was computed repeats its extremes too."""
 
-STATIC_TORQUE_CHECKS = (Check("static_torque", ("angle_rad",), _static_torque, of_fit=False),)
+STATIC_TORQUE_CHECKS = (
+    Check(
+        "static_torque",
+        ("angle_rad",),
+        lambda c: static_torque(c.epoch, c.signals, c.settings),
+        of_fit=False,
+    ),
+)

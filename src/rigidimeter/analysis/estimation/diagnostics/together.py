@@ -31,21 +31,14 @@ from rigidimeter.analysis.estimation.closedloop.lack_of_fit import (
     same_sequence,
 )
 from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST
-from rigidimeter.analysis.estimation.closedloop.normal_equations import (
-    Problem,
-    solution,
-    sums,
-)
+from rigidimeter.analysis.estimation.closedloop.normal_equations import Problem, solution, sums
 from rigidimeter.analysis.estimation.closedloop.observation import (
     Observation,
     observe,
     observe_periods,
 )
 from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
-from rigidimeter.analysis.estimation.diagnostics.least_squares_checks import (
-    loop_bias,
-    unbiased,
-)
+from rigidimeter.analysis.estimation.diagnostics.least_squares_checks import loop_bias, unbiased
 from rigidimeter.analysis.estimation.found import found, in_half_intervals
 from rigidimeter.analysis.estimation.method_record import Method
 from rigidimeter.analysis.estimation.methods import method_named

@@ -215,7 +215,7 @@ def _change(
     shapes = kind.shapes
     found = effect(lines, torque, Columns.joined([base, *others]), tested, parameter)
     functions = np.column_stack([np.ones(len(shapes.at)), shapes.at])
-    values = functions @ np.concatenate([found.constant[[parameter]], found.coefficients])
+    values = functions @ found.values
     variance = np.einsum("gi,ij,gj->g", functions, found.covariance, functions)
     half = float(scipy.stats.t.ppf(0.975, found.degrees)) * np.sqrt(variance)
     low, high = int(np.argmin(values)), int(np.argmax(values))

@@ -76,17 +76,14 @@ class Effect(NamedTuple):
 
     Attributes
     ----------
-    constant : array, shape (3,)
-        J, B and K where all functions are zero.
-    coefficients : array, shape (q,)
+    values : array, shape (q + 1,)
+        The parameter where all functions are zero, and its coefficients.
     covariance : array, shape (q + 1, q + 1)
-        Of the parameter's constant and its coefficients.
     degrees : float
         Of freedom, for Student's t.
     """
 
-    constant: Array
-    coefficients: Array
+    values: Array
     covariance: Array
     degrees: float
 
@@ -167,9 +164,7 @@ def effect(
     covariance = inverse @ (blocks.T @ blocks * scale**2 * count / max(count - p, 1)) @ inverse.T
     first = base.instruments.shape[1]
     place = np.array([parameter, *range(first, p)])
-    return Effect(
-        values[:3], values[first:], covariance[np.ix_(place, place)], float(max(count - p, 1))
-    )
+    return Effect(values[place], covariance[np.ix_(place, place)], float(max(count - p, 1)))
 
 
 def _block_scores(lines: VaryingLines, instruments: Array, residual: Array) -> Array:
