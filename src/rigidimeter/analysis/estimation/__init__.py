@@ -29,7 +29,6 @@ if TYPE_CHECKING:
         find_motion,
         score_epoch,
         scoring_cycles,
-        single_frequency_share,
     )
     from rigidimeter.analysis.estimation.signals import Signals
 
@@ -53,7 +52,6 @@ __all__ = [
     "no_such_method",
     "score_epoch",
     "scoring_cycles",
-    "single_frequency_share",
 ]
 
 __getattr__ = lazy_names(
@@ -79,7 +77,6 @@ __getattr__ = lazy_names(
             "find_motion",
             "score_epoch",
             "scoring_cycles",
-            "single_frequency_share",
         ),
         "signals": ("Signals",),
     },

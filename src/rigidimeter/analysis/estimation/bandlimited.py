@@ -21,9 +21,8 @@ import scipy
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
     driven_behind,
     torque_filter_of,
-    without_driven,
 )
-from rigidimeter.analysis.estimation.closedloop.drive_motion import DrivenAt
+from rigidimeter.analysis.estimation.closedloop.epoch_motion import EpochMotion
 from rigidimeter.analysis.estimation.signals import (
     Array,
     Signals,
@@ -32,11 +31,12 @@ from rigidimeter.analysis.estimation.signals import (
     kinematics,
     motion_channels,
     uniform_grid,
+    usable_hz,
     values_at,
 )
 from rigidimeter.analysis.estimation.stretches import sound
 from rigidimeter.core.records import Epoch
-from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE, EstimationSettings
+from rigidimeter.core.settings import EstimationSettings
 from rigidimeter.model import DriveModel
 
 EDGE_SAMPLES = 10
@@ -60,9 +60,7 @@ def band_hz(epoch: Epoch, settings: EstimationSettings) -> tuple[float, float]:
     """
     known = epoch.excitation_hz is not None or "perturbation_nm" in epoch.channels
     wanted = settings.band_high_hz if known else settings.band_high_unknown_hz
-    used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
-    slowest = min(channel.rate_hz for channel in used)
-    return settings.band_low_hz, min(wanted, USABLE_FRACTION_OF_RATE * slowest)
+    return settings.band_low_hz, min(wanted, usable_hz(epoch))
 
 
 def zero_phase_band(values: Array, rate_hz: float, band: tuple[float, float]) -> Array:
@@ -146,39 +144,18 @@ def bandlimited_signals(
     used = [torque, *motion_channels(epoch)]
     rate_hz = grid_rate_hz(used, band[1])
     full = uniform_grid(used, rate_hz)
-    angle, velocity, acceleration = _motion(epoch, settings, drive, full)
+    moving = EpochMotion(epoch, drive)
+    motion = np.stack(kinematics(moving.beyond, full))
+    if moving.driven_at is not None:
+        # One spline of the three, at the stamps that they share.
+        caused = driven_behind(moving.driven_at, torque_filter_of(settings), torque)
+        motion += columns_at(torque, caused[::-1], full)
     edge = math.ceil(EDGE_SAMPLES * rate_hz / min(channel.rate_hz for channel in used))
     inner = slice(edge, full.size - edge)
     time_s = full[inner]
     trim = max(round(settings.trim_s * rate_hz) - edge, 0)
     keep = sound(epoch, time_s, settings.trim_s)
     keep[:trim] = keep[time_s.size - trim :] = False
-    everything = np.stack(
-        [values_at(torque, time_s), acceleration[inner], velocity[inner], angle[inner]]
-    )
-    torque_nm, acceleration, velocity, angle = zero_phase_band(everything, rate_hz, band)[:, keep]
-    return Signals(
-        time_s=time_s[keep],
-        torque_nm=torque_nm,
-        acceleration_rad_s2=acceleration,
-        velocity_rad_s=velocity,
-        angle_rad=angle,
-        rate_hz=rate_hz,
-        band_hz=band,
-    )
-
-
-def _motion(
-    epoch: Epoch, settings: EstimationSettings, drive: DriveModel | None, time_s: Array
-) -> tuple[Array, Array, Array]:
-    """Return angle, velocity and acceleration as the torque saw them."""
-    command = epoch.channels.get("velocity_command_rad_s")
-    if drive is None or command is None:
-        return kinematics(epoch, time_s)
-    driven_at = DrivenAt(drive, command)
-    rest = kinematics(without_driven(epoch, driven_at), time_s)
-    torque = epoch.channels["torque_nm"]
-    caused = driven_behind(driven_at, torque_filter_of(settings), torque)
-    # One spline of the three, at the stamps that they share.
-    angle, velocity, acceleration = np.stack(rest) + columns_at(torque, caused[::-1], time_s)
-    return angle, velocity, acceleration
+    everything = np.stack([values_at(torque, time_s), *motion[:, inner]])
+    torque_nm, angle, velocity, acceleration = zero_phase_band(everything, rate_hz, band)[:, keep]
+    return Signals(time_s[keep], torque_nm, acceleration, velocity, angle, rate_hz, band)

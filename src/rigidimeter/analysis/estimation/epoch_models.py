@@ -10,7 +10,7 @@ from rigidimeter.analysis.estimation.bandlimited import band_hz
 from rigidimeter.analysis.estimation.diagnostics import checked
 from rigidimeter.analysis.estimation.methods import method_named
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
-from rigidimeter.analysis.estimation.signals import motion_channels
+from rigidimeter.analysis.estimation.signals import usable_hz
 from rigidimeter.analysis.estimation.stretches import longest_part
 from rigidimeter.analysis.estimation.terms import (
     Comparison,
@@ -21,7 +21,6 @@ from rigidimeter.analysis.estimation.terms import (
 )
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Fit
-from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE
 
 REFUSING = ("conditioning",)
 """Checks that forbid a choice of terms though an estimate only needs caution: where J, B
@@ -128,12 +127,9 @@ def clock_of_models(
 def _band_hz(prepared: PreparedEpoch, high_hz: float | None) -> tuple[float, float]:
     if prepared.obstacle:
         raise ValueError(prepared.obstacle)
-    epoch = prepared.epoch
     if high_hz is None:
-        return band_hz(epoch, prepared.settings.estimation)
-    used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
-    slowest_hz = min(channel.rate_hz for channel in used)
-    return (0.0, min(high_hz, USABLE_FRACTION_OF_RATE * slowest_hz))
+        return band_hz(prepared.epoch, prepared.settings.estimation)
+    return (0.0, min(high_hz, usable_hz(prepared.epoch)))
 
 
 def _refused(fit: Fit) -> str:

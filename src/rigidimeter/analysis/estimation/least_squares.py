@@ -14,6 +14,7 @@ import scipy
 
 from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother
 from rigidimeter.analysis.estimation.linear_solution import solve
+from rigidimeter.analysis.estimation.power_lines import lines_inside
 from rigidimeter.analysis.estimation.signals import Array, Signals
 from rigidimeter.analysis.estimation.uncertainty import cramer_rao_coloured, of_fit
 from rigidimeter.core.records import Fit, Outcome
@@ -81,8 +82,7 @@ def _bound(signals: Signals, regressors: Array, residual: Array) -> Array:
     power = 2.0 / (n * rate_hz) * np.abs(scipy.fft.rfft(residual)) ** 2
     if n % 2 == 0:
         power[-1] /= 2.0  # half the rate has no other side
-    low, high = signals.band_hz
-    inside = np.flatnonzero((frequency >= low) & (frequency <= high) & (frequency > 0))
+    inside = lines_inside(frequency, signals.band_hz)
     density = np.full(power.size, np.inf)
     density[inside] = Smoother.over(inside, 4, 0.1)(power[inside])
     if not np.all(density > 0):

@@ -82,15 +82,9 @@ def published_signals(
     angle = scipy.signal.sosfilt(highpass, angle)
     n = acceleration.size  # the last sample has no forward difference
     keep = sound(epoch, time_s[:n], settings.trim_s)
-    return Signals(
-        time_s=time_s[:n][keep],
-        torque_nm=np.interp(time_s[:n][keep], torque.time_s, torque.values),
-        acceleration_rad_s2=acceleration[keep],
-        velocity_rad_s=velocity[:n][keep],
-        angle_rad=angle[:n][keep],
-        rate_hz=rate_hz,
-        band_hz=(0.0, rate_hz / 2),
-    )
+    motion = acceleration[keep], velocity[:n][keep], angle[:n][keep]
+    torque_nm = np.interp(time_s[:n][keep], torque.time_s, torque.values)
+    return Signals(time_s[:n][keep], torque_nm, *motion, rate_hz, (0.0, rate_hz / 2))
 
 
 def _held(command: Channel, time_s: Array) -> Array:

@@ -258,16 +258,12 @@ class LineShares(NamedTuple):
         return self.angle > most and self.velocity > LEAST_VELOCITY_SHARE
 
 
-def single_frequency_share(epoch: Epoch) -> float:
-    """Return the share of the angle's variance within a quarter octave of its strongest line.
-
-    Close to 1 for an imposed sinusoid, well below for a perturbation with many frequencies.
-    """
-    return line_shares(epoch).angle
-
-
 def line_shares(epoch: Epoch) -> LineShares:
-    """Return the shares within a quarter octave of the angle's strongest line."""
+    """Return the shares within a quarter octave of the angle's strongest line.
+
+    That of the angle is close to 1 for an imposed sinusoid, well below for a perturbation with many
+    frequencies.
+    """
     motion = {c.name: thinned(c, HIGHEST_HZ) for c in motion_channels(epoch)}
     time_s, angle = _angle(replace(epoch, channels=motion))
     if time_s.size < 16 or not np.any(angle):

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation.linear_solution import Solution, solve
 from rigidimeter.core.records import Channel, Epoch
+from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE
 
 Array = NDArray[np.float64]
 
@@ -232,3 +233,9 @@ def motion_channels(epoch: Epoch) -> list[Channel]:
     """Return the measured motion channels of an epoch."""
     names = ("velocity_rad_s", "angle_rad")
     return [epoch.channels[name] for name in names if name in epoch.channels]
+
+
+def usable_hz(epoch: Epoch) -> float:
+    """Return up to which frequency torque and motion were sampled densely enough to be fitted."""
+    used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
+    return USABLE_FRACTION_OF_RATE * min(channel.rate_hz for channel in used)

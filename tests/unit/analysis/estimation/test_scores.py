@@ -10,7 +10,6 @@ from rigidimeter.analysis.estimation import (
     find_motion,
     score_epoch,
     scoring_cycles,
-    single_frequency_share,
 )
 from rigidimeter.analysis.estimation.scores import line_shares
 from rigidimeter.analysis.estimation.stretches import longest_part
@@ -82,7 +81,7 @@ def test_the_motion_is_found_where_it_is_not_said():
     assert found.frequency_hz == pytest.approx(1.1, abs=0.005)
     assert found.start_s == pytest.approx(3.0, abs=0.3)
     assert found.start_s + found.duration_s == pytest.approx(13.0, abs=0.3)
-    assert single_frequency_share(epoch) > 0.9
+    assert line_shares(epoch).angle > 0.9
 
 
 @pytest.mark.parametrize("ramp", [0.05, 0.08, 0.12])
@@ -110,7 +109,7 @@ def test_a_drifting_angle_is_no_sinusoid(seed):
     t = np.arange(2000) / 100.0
     angle = np.cumsum(np.random.default_rng(seed).standard_normal(2000)) * 0.001
     epoch = Epoch("file", "1", {"angle_rad": Channel("angle_rad", t, angle)})
-    assert single_frequency_share(epoch) < 0.7
+    assert line_shares(epoch).angle < 0.7
 
 
 def test_a_short_motion_gives_the_cycles_it_has_or_says_that_it_has_none():

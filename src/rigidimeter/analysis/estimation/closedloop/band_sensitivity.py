@@ -251,12 +251,10 @@ def band_estimates(
     if not changes:
         return []
     at = values if pooled is None else pooled.value
+    nothing = np.zeros(3)
     # Halves of the epochs are of the band of the fit.
-    low_hz, high_hz = changes[-1].low_hz, changes[-1].high_hz
-    own = BandEstimate(
-        condition, low_hz, high_hz, "all", _three(at), (0.0,) * 3, (0.0,) * 3, (1.0,) * 3
-    )
-    others = [
+    own = changes[-1]._replace(part="all", change=nothing, change_se=nothing, p=np.ones(3))
+    return [
         BandEstimate(
             condition,
             band.low_hz,
@@ -267,9 +265,8 @@ def band_estimates(
             _three(band.change_se),
             _three(band.p),
         )
-        for band in changes
+        for band in (own, *changes)
     ]
-    return [own, *others]
 
 
 def band_finding(

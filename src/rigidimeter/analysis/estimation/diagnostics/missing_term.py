@@ -34,7 +34,7 @@ from rigidimeter.analysis.estimation.diagnostics.check_record import (
     Look,
 )
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
-from rigidimeter.analysis.estimation.signals import Array, motion_channels
+from rigidimeter.analysis.estimation.signals import Array, usable_hz
 from rigidimeter.analysis.estimation.stretches import longest_part
 from rigidimeter.analysis.estimation.terms.beyond_linear import BeyondLinear, beyond_linear
 from rigidimeter.analysis.estimation.terms.catalogue import REFLEXES, term_named
@@ -49,7 +49,6 @@ from rigidimeter.analysis.estimation.terms.linear_misfit import LinearTerm, line
 from rigidimeter.analysis.estimation.terms.omitted_terms import OmittedTerm, omitted_terms
 from rigidimeter.analysis.estimation.terms.wideband import wideband_signals
 from rigidimeter.core.findings import Effect, Fact
-from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE
 
 WORDS = {
     "coulomb": ("friction", "coulomb"),
@@ -77,9 +76,7 @@ class _Found:
 
     def __init__(self, prepared: PreparedEpoch) -> None:
         epoch, estimation = longest_part(prepared.epoch), prepared.settings.estimation
-        used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
-        usable_hz = USABLE_FRACTION_OF_RATE * min(channel.rate_hz for channel in used)
-        high_hz = min(estimation.band_high_unknown_hz, usable_hz)
+        high_hz = min(estimation.band_high_unknown_hz, usable_hz(epoch))
         motion = wideband_signals(epoch, high_hz)
         # Stiffness is that at the mean posture, and what is not linear is so about it.
         motion = replace(motion, angle_rad=motion.angle_rad - np.mean(motion.angle_rad))

@@ -27,10 +27,10 @@ from rigidimeter.analysis.estimation.signals import (
     kinematics,
     motion_channels,
     uniform_grid,
+    usable_hz,
     values_at,
 )
 from rigidimeter.core.records import Epoch
-from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE
 
 WIDE_OVER_BAND = 3.0
 """How far above the band the noise is cut before a term bends the signal."""
@@ -52,15 +52,8 @@ def wideband_from_angle(
     """
     torque, rest = _Sines(torque_nm, rate_hz, wide_hz).value(), _Sines(angle_rad, rate_hz, wide_hz)
     angle, velocity, acceleration = rest.value(), rest.slope(), rest.curvature()
-    return Signals(
-        time_s=np.arange(angle_rad.size) / rate_hz,
-        torque_nm=torque,
-        acceleration_rad_s2=acceleration,
-        velocity_rad_s=velocity,
-        angle_rad=angle,
-        rate_hz=rate_hz,
-        band_hz=(0.0, min(wide_hz, rate_hz / 2)),
-    )
+    time_s, band_hz = np.arange(angle_rad.size) / rate_hz, (0.0, min(wide_hz, rate_hz / 2))
+    return Signals(time_s, torque, acceleration, velocity, angle, rate_hz, band_hz)
 
 
 def wideband_signals(epoch: Epoch, high_hz: float) -> Signals:
@@ -70,8 +63,7 @@ def wideband_signals(epoch: Epoch, high_hz: float) -> Signals:
     """
     used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
     rate_hz = grid_rate_hz(used, high_hz)
-    slowest = min(channel.rate_hz for channel in used)
-    wide_hz = max(high_hz, min(WIDE_OVER_BAND * high_hz, USABLE_FRACTION_OF_RATE * slowest))
+    wide_hz = max(high_hz, min(WIDE_OVER_BAND * high_hz, usable_hz(epoch)))
     time_s = uniform_grid(used, rate_hz)
     if time_s.size > 2:
         time_s = time_s[: scipy.fft.prev_fast_len(time_s.size - 1) + 1]  # of the period below
@@ -81,15 +73,8 @@ def wideband_signals(epoch: Epoch, high_hz: float) -> Signals:
         return wideband_from_angle(torque, angle, rate_hz, wide_hz)
     everything = np.stack([torque, *kinematics(epoch, time_s)])
     torque, angle, velocity, acceleration = _Sines(everything, rate_hz, wide_hz).value()
-    return Signals(
-        time_s=time_s,
-        torque_nm=torque,
-        acceleration_rad_s2=acceleration,
-        velocity_rad_s=velocity,
-        angle_rad=angle,
-        rate_hz=rate_hz,
-        band_hz=(0.0, min(wide_hz, rate_hz / 2)),
-    )
+    band_hz = 0.0, min(wide_hz, rate_hz / 2)
+    return Signals(time_s, torque, acceleration, velocity, angle, rate_hz, band_hz)
 
 
 def banded(values: Array, rate_hz: float, band_hz: tuple[float, float]) -> Array:
