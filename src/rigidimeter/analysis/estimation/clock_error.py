@@ -53,7 +53,6 @@ def with_clock_error(
         Where one was corrected, its standard error counts: of two clocks, in place of the offset's.
     """
     corrected = {delay.source: delay.delay_s_se for delay in delays if delay.corrected}
-    moved = [one.epoch.source in corrected for one in epochs]
     sources = [one.epoch.source for one in epochs]
     errors_s = [corrected.get(one.epoch.source, one.epoch.clock_error_s) for one in epochs]
     if not any(errors_s):
@@ -73,8 +72,8 @@ def with_clock_error(
     alone, pooled = found
     by_error = [(one.value - other.value) / 2 for one, other in zip(early, late, strict=True)]
     by_drive = [
-        _of_drive(one, own) if there else np.zeros(3)
-        for one, own, there in zip(epochs, alone, moved, strict=True)
+        _of_drive(one, own) if one.epoch.source in corrected else np.zeros(3)
+        for one, own in zip(epochs, alone, strict=True)
     ]
     return (
         [_widened(own, both) for own, *both in zip(alone, by_error, by_drive, strict=True)],

@@ -247,11 +247,4 @@ def at_least(value: float, least: float, **facts: Fact) -> Look:
 
 def reconstructed_torque_nm(signals: Signals, parameters: Array) -> Array:
     """Return the subject's own torque, M_sub of Eq. 5, in N·m, shape (n,), in the signals' band."""
-    J, B, K = parameters
-    return np.asarray(
-        J * signals.acceleration_rad_s2
-        + B * signals.velocity_rad_s
-        + K * signals.angle_rad
-        - signals.torque_nm,
-        dtype=np.float64,
-    )
+    return np.asarray(signals.motion @ parameters - signals.torque_nm, dtype=np.float64)

@@ -112,16 +112,9 @@ def _case(prepared: PreparedEpoch, parameters: Array) -> Case:
     epoch, settings = prepared.epoch, prepared.settings
     from_session = epoch.excitation_hz is not None
     limit_rad = rad_from_deg(settings.guard.position_limit_deg) if from_session else None
-    signals = prepared.signals(bandlimited_signals)
-    return Case(
-        epoch,
-        signals,
-        parameters,
-        settings.diagnostics,
-        position_limit_rad=limit_rad,
-        loop=loop_shown(prepared),
-        prepared=prepared,
-    )
+    signals, loop = prepared.signals(bandlimited_signals), loop_shown(prepared)
+    looked_at = epoch, signals, parameters, settings.diagnostics, limit_rad
+    return Case(*looked_at, loop=loop, prepared=prepared)
 
 
 def _seen_without_fit(prepared: PreparedEpoch) -> dict[str, Look | None]:

@@ -207,14 +207,8 @@ def lack_of_fit(
     if not sure:
         return []
     worst = max(sure, key=lambda part: part.share)
-    J, B, K = _in_half_the_band(observed).tolist()
-    facts = {
-        "low_hz": worst.low_hz,
-        "high_hz": worst.high_hz,
-        "half_J": J,
-        "half_B": B,
-        "half_K": K,
-    }
+    half = zip(("half_J", "half_B", "half_K"), _in_half_the_band(observed).tolist(), strict=True)
+    facts = {"low_hz": worst.low_hz, "high_hz": worst.high_hz, **dict(half)}
     return [found("lack_of_fit", settings, 100 * worst.share, most, p=worst.p, facts=facts)]
 
 

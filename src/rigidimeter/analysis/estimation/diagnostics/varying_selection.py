@@ -50,27 +50,15 @@ class Change(NamedTuple):
     ----------
     parameter : int
         Which of J, B and K.
-    p : float
-        Probability of as much by chance.
-    low, high : float
-        From where to where it goes.
-    low_half, high_half : float
-        Half the 95 % interval of each.
-    low_at, high_at : str
-        Where.
     percent : float
-        high − low, in % of the mean between them.
+        From where to where it goes, in % of the mean between them.
+    facts : dict
+        What the words of the finding show: the ends, half the 95 % interval of each, and where.
     """
 
     parameter: int
-    p: float
-    low: float
-    high: float
-    low_half: float
-    high_half: float
-    low_at: str
-    high_at: str
     percent: float
+    facts: dict[str, Fact]
 
 
 class Variation(NamedTuple):
@@ -110,7 +98,7 @@ def variation(lines: VaryingLines, chance: float) -> Variation:
     terms = [_terms(lines, shapes) for shapes in kinds if shapes is not None]
     parameters = range(3) if lines.by_perturbation else (STIFFNESS,)
     left = [(kind, parameter) for kind in terms for parameter in parameters]
-    accepted: list[tuple[_Terms, int, float]] = []
+    accepted: list[tuple[_Terms, int]] = []
     smallest: dict[str, float] = {}
     try:
         while left:
@@ -123,10 +111,10 @@ def variation(lines: VaryingLines, chance: float) -> Variation:
             if not sure:
                 break
             best = min(sure, key=lambda i: found[i].left)
-            accepted.append((*left.pop(best), found[best].p))
+            accepted.append(left.pop(best))
         changes: dict[str, list[Change]] = {}
-        for kind, parameter, p in accepted:
-            change = _change(lines, kind, parameter, p, accepted)
+        for kind, parameter in accepted:
+            change = _change(lines, kind, parameter, accepted)
             changes.setdefault(kind.shapes.name, []).append(change)
     except np.linalg.LinAlgError as error:
         raise ValueError(f"the motion cannot tell the terms apart ({error})") from None
@@ -180,10 +168,10 @@ def _scores(
     lines: VaryingLines,
     kind: _Terms,
     left: list[tuple[_Terms, int]],
-    accepted: list[tuple[_Terms, int, float]],
+    accepted: list[tuple[_Terms, int]],
 ) -> list[Score]:
     """Test what is left of one kind: each parameter beside the other two and what was accepted."""
-    known = [(of, j) for of, j, _ in accepted if of is not kind]
+    known = [(of, j) for of, j in accepted if of is not kind]
     kinds = [kind, *{id(of): of for of, _ in known}.values()]
     parts = [*kind.of, *(of.finer(j) for of, j in known)]
     torque, base, parts = _model(lines, kinds, parts)
@@ -200,14 +188,10 @@ def _scores(
 
 
 def _change(
-    lines: VaryingLines,
-    kind: _Terms,
-    parameter: int,
-    p: float,
-    accepted: list[tuple[_Terms, int, float]],
+    lines: VaryingLines, kind: _Terms, parameter: int, accepted: list[tuple[_Terms, int]]
 ) -> Change:
     """Return how far a parameter goes, by the model with all that was accepted."""
-    rest = [(of, j) for of, j, _ in accepted if not (of is kind and j == parameter)]
+    rest = [(of, j) for of, j in accepted if not (of is kind and j == parameter)]
     parts = [kind.of[parameter], *(of.of[j] for of, j in rest)]
     unique = {id(of): of for of, _ in rest}.values()
     kinds = [kind, *(of for of in unique if of is not kind)]
@@ -220,17 +204,17 @@ def _change(
     half = float(scipy.stats.t.ppf(0.975, found.degrees)) * np.sqrt(variance)
     low, high = int(np.argmin(values)), int(np.argmax(values))
     middle = abs(float(values[low] + values[high])) / 2
-    return Change(
-        parameter,
-        p,
-        float(values[low]),
-        float(values[high]),
-        float(half[low]),
-        float(half[high]),
-        shapes.place(low),
-        shapes.place(high),
-        100 * float(values[high] - values[low]) / max(middle, 1e-300),
-    )
+    facts: dict[str, Fact] = {
+        "symbol": PARAMETERS[parameter].symbol,
+        "size_unit": PARAMETERS[parameter].unit,
+        "low": float(values[low]),
+        "low_half": float(half[low]),
+        "low_at": shapes.place(low),
+        "high": float(values[high]),
+        "high_half": float(half[high]),
+        "high_at": shapes.place(high),
+    }
+    return Change(parameter, 100 * float(np.ptp(values)) / max(middle, 1e-300), facts)
 
 
 def _variation(case: Case) -> Variation | None:
@@ -253,19 +237,9 @@ def _look(case: Case, name: str) -> Look | None:
     changes = sorted(found.changes.get(name, []), key=lambda change: -change.percent)
     if not changes or not changes[0].percent > most:
         return Look(changes[0].percent if changes else 0.0, most, False, p=found.p[name])
-    first, *others = (change for change in changes if change.percent > most)
-    about = PARAMETERS[first.parameter]
-    facts: dict[str, Fact] = {
-        "symbol": about.symbol,
-        "size_unit": about.unit,
-        "low": first.low,
-        "low_half": first.low_half,
-        "low_at": first.low_at,
-        "high": first.high,
-        "high_half": first.high_half,
-        "high_at": first.high_at,
-        "others": also([PARAMETERS[change.parameter].symbol for change in others]),
-    }
+    first, *more = (change for change in changes if change.percent > most)
+    others = [PARAMETERS[change.parameter].symbol for change in more]
+    facts = {**first.facts, "others": also(others)}
     variant = ""
     if name == WITH_ANGLE and (terms := terms_found(case)):
         facts["terms"], variant = terms, "with_term"

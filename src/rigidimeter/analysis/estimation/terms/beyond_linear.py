@@ -52,12 +52,11 @@ NOTHING = 1e-3
 
 @dataclass(frozen=True)
 class Solution:
-    """Coefficients of a fit to the lines, shape (p,), their covariance, what is left and its ν."""
+    """Coefficients of a fit to the lines, shape (p,), their covariance, and what is left."""
 
     values: Array
     covariance: Array
     residual: Complex
-    degrees: float
 
     @property
     def standard_errors(self) -> Array:
@@ -206,7 +205,7 @@ class BeyondLinear:
         free = self.free_values - values.size
         variance = float(np.sum(np.abs(residual) ** 2)) / free * self.taper_loss
         root = inverse / lengths[:, None]
-        return Solution(values, variance * (root @ root.T), residual, free)
+        return Solution(values, variance * (root @ root.T), residual)
 
     def _share(self, name: str) -> float:
         whole = float(np.linalg.norm(self.term_lines(name)[:, 0] / self.line_size_nm))

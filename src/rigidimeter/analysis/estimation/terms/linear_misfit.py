@@ -70,7 +70,8 @@ class LinearTerm(NamedTuple):
         if self.name == "reflex":
             delayed = np.exp(-1j * omega_rad_s * self.delay_s) * motion[:, 1]
             return np.asarray(self.value * delayed)
-        path = _impedance(self.joint, omega_rad_s)
+        J, B, K = self.joint
+        path = K - J * omega_rad_s**2 + 1j * omega_rad_s * B
         return np.asarray((path / (1 + path / self.value) - path) * motion[:, 2])
 
 
@@ -89,10 +90,7 @@ def linear_term(beyond: BeyondLinear) -> LinearTerm | None:
     p = float(scipy.special.fdtrc(taken, left, ratio))
     if not p < CHANCE:
         return None
-    found = [
-        _coupling(joint, omega, motion[:, 2], target),
-        _both_directions(motion, omega, lines),
-    ]
+    found = [_coupling(joint, omega, motion[:, 2], target), _both_directions(motion, omega, lines)]
     (name, value, delay_s, values), remains = min(found, key=lambda one: one[1])
     share = (rest - remains) / (rest - free)
     if share < NEARLY_ALL or not value > 0:
@@ -151,8 +149,3 @@ def _both_directions(motion: Complex, omega: Array, target: Complex) -> Found:
     columns = np.column_stack([motion, late.column(best)])
     rest, values = explained(stacked(columns), stacked(target))
     return ("reflex", float(values[3]), float(DELAYS_S[best]), values[:3]), rest
-
-
-def _impedance(joint: Array, omega_rad_s: Array) -> Complex:
-    J, B, K = joint
-    return np.asarray(K - J * omega_rad_s**2 + 1j * omega_rad_s * B)

@@ -53,7 +53,10 @@ def residual_test(
     band_hz : (float, float)
     """
     count = max(int(residual.size * min(1.0, 2 * FLAT_PART * band_hz[1] / rate_hz)), 8)
-    error, motion = (_resampled(values, count) for values in (residual, velocity))
+    error, motion = (
+        np.asarray(scipy.signal.resample(values - np.mean(values), count), dtype=np.float64)
+        for values in (residual, velocity)
+    )
     lags = min(LAGS, count // 4)
     own = _correlation(error, error, lags)[lags:]
     k = np.arange(1, lags + 1)
@@ -71,11 +74,6 @@ def residual_test(
         input_correlation=largest,
         input_p=min(1.0, single * cross.size),
     )
-
-
-def _resampled(values: Array, count: int) -> Array:
-    centred = values - np.mean(values)
-    return np.asarray(scipy.signal.resample(centred, count), dtype=np.float64)
 
 
 def _correlation(one: Array, other: Array, lags: int) -> Array:
