@@ -48,8 +48,7 @@ def without_bad_stretches(epoch: Epoch, settings: Settings) -> Epoch:
     diagnostics, levels = settings.diagnostics, settings.diagnostics.levels
     if not fitted_channels(epoch):
         return epoch
-    frozen, saturated = levels.frozen == "exclude", levels.saturation == "exclude"
-    found = bad_stretches(epoch, diagnostics, frozen=frozen, saturated=saturated)
+    found = [one for one in bad_stretches(epoch, diagnostics) if levels.of(one.check) == "exclude"]
     if not found:
         return epoch
     without = replace(epoch, left_out=(*epoch.left_out, *sorted(found)))
@@ -61,30 +60,22 @@ def without_bad_stretches(epoch: Epoch, settings: Settings) -> Epoch:
     return bridged(without)
 
 
-def bad_stretches(
-    epoch: Epoch, settings: DiagnosticsSettings, *, frozen: bool = True, saturated: bool = True
-) -> list[LeftOut]:
+def bad_stretches(epoch: Epoch, settings: DiagnosticsSettings) -> list[LeftOut]:
     """Return where a channel repeats one value for too long, or was at the end of its range.
 
-    Parameters
-    ----------
-    epoch : Epoch
-    settings : DiagnosticsSettings
-    frozen : bool
-        Return where one value is repeated for longer than `max_frozen_s`.
-    saturated : bool
-        Return where a channel that was at the end of its range too often was there.
+    That is longer than `max_frozen_s`, and where a channel that was at the end of its range too
+    often was there.
     """
     found = []
     for channel in fitted_channels(epoch):
         runs = _runs(channel.values)
         starts_s, stops_s = _repetitions(epoch, channel, runs, settings)
-        long = stops_s - starts_s > (settings.max_frozen_s if frozen else np.inf)
+        long = stops_s - starts_s > settings.max_frozen_s
         text = f"{channel.name} repeats one value"
         spans = zip(starts_s[long], stops_s[long], strict=True)
         found += [LeftOut(float(one), float(two), text, "frozen") for one, two in spans]
         rows, starts, stops = _at_extremes(epoch, channel, runs, settings)
-        if saturated and 100.0 * rows / len(channel) > settings.max_saturated_percent:
+        if 100.0 * rows / len(channel) > settings.max_saturated_percent:
             text = f"{channel.name} repeats an extreme value"
             spans = zip(channel.time_s[starts], channel.time_s[stops], strict=True)
             found += [LeftOut(float(one), float(two), text, "saturation") for one, two in spans]

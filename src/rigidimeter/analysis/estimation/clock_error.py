@@ -80,11 +80,8 @@ def with_clock_error(
         [
             _widened(
                 one,
-                [
-                    change
-                    for changes in (by_error, by_drive)
-                    for change in _changes_of_sources(one, alone, changes, sources)
-                ],
+                _changes_of_sources(one, alone, by_error, sources)
+                + _changes_of_sources(one, alone, by_drive, sources),
             )
             for one in pooled
         ],

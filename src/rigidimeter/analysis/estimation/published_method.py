@@ -153,13 +153,7 @@ def as_they_are(prepared: PreparedEpoch) -> tuple[Finding, ...]:
         return ()
     facts = {"seen": 100.0 * seen, "side": "small" if seen < 1 else "large"}
     finding = found(
-        NAME,
-        settings,
-        percent,
-        most,
-        condition=epoch.condition,
-        facts=facts,
-        variant="as_sampled",
+        NAME, settings, percent, most, condition=epoch.condition, facts=facts, variant="as_sampled"
     )
     return (finding,)
 

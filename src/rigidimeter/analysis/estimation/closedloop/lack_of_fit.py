@@ -118,14 +118,12 @@ class Misfit(NamedTuple):
 
 def proportional(answers: Sequence[Answer]) -> list[Misfit]:
     """Return what answers the perturbation in proportion, in each part of the band."""
-    frequency = np.concatenate([answer.frequency_hz for answer in answers])
     answers = _without_drift(answers)
-    power = np.concatenate([_power(answer) for answer in answers])
-    response = np.concatenate([answer.response_nm for answer in answers])
-    residual = np.concatenate([answer.residual_nm for answer in answers])
+    frequency = np.concatenate([answer.frequency_hz for answer in answers])
     order = np.argsort(frequency, kind="stable")
-    frequency, power = frequency[order], power[order]
-    response, residual = response[order], residual[order]
+    frequency, power = frequency[order], np.concatenate(list(map(_power, answers)))[order]
+    response = np.concatenate([answer.response_nm for answer in answers])[order]
+    residual = np.concatenate([answer.residual_nm for answer in answers])[order]
     edges = np.searchsorted(frequency, _group_edges(answers[0].frequency_hz))
     starts, sizes = edges[:-1], np.diff(edges)
     of_each = np.abs(response) ** 2 / power

@@ -180,20 +180,17 @@ class _Search:
             name: Explained(max(before.left - gain, 0.0), value)
             for name, gain, value in zip(alone, gained, values[:, None], strict=True)
         }
-        return [self._test(found, before, name, fits.get(name)) for name in names]
-
-    def _test(
-        self, found: Sequence[_Found], before: Explained, name: str, fit: Explained | None
-    ) -> _Test:
-        beyond, tested = self._beyond, _tested(name)
-        more = len(tested)
-        if fit is None:
-            fit = self.fit([*found, *tested])
-        degrees = beyond.free_values - len(found) - more
-        gained = max(before.left - fit.left, 0.0) / more / beyond.taper_loss
-        ratio = gained / (fit.left / degrees) if fit.left > 0 else np.inf
-        # The tail of Fisher's distribution.
-        return _Test(name, float(scipy.special.fdtrc(more, degrees, ratio)), fit)
+        tests = []
+        for name in names:
+            tested = _tested(name)
+            fit = fits[name] if name in fits else self.fit([*found, *tested])
+            degrees = self._beyond.free_values - len(found) - len(tested)
+            more = max(before.left - fit.left, 0.0) / len(tested) / self._beyond.taper_loss
+            ratio = more / (fit.left / degrees) if fit.left > 0 else np.inf
+            # The tail of Fisher's distribution.
+            p = float(scipy.special.fdtrc(len(tested), degrees, ratio))
+            tests.append(_Test(name, p, fit))
+        return tests
 
     def best(self, found: Sequence[_Found], test: _Test) -> tuple[_Found, Explained]:
         """Return the term and its fit, a reflex with its delay of least residual."""

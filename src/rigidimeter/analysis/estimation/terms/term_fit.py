@@ -206,16 +206,16 @@ def _parameters(
     column, q = 0, 0
     for term in design.terms:
         plain = term_named(term)
+        names = ("",) if plain is not None else design.kernels[term].columns
+        unit = "N·m/rad" if term.startswith("reflex-fir") else "N·m·s/rad"
+        unit = unit if plain is None else plain.unit
+        part = slice(column, column + len(names))
+        column += len(names)
+        for name, value, error in zip(names, linear[part], errors[part], strict=True):
+            found.append(TermParameter(term, name, float(value), float(error), unit))
         if plain is not None:
-            value, error = float(linear[column]), float(errors[column])
-            found.append(TermParameter(term, "", value, error, plain.unit))
-            column += 1
             continue
         one = design.kernels[term]
-        part = slice(column, column + len(one.columns))
-        unit = "N·m/rad" if one.kind == "reflex-fir" else "N·m·s/rad"
-        for name, value, error in zip(one.columns, linear[part], errors[part], strict=True):
-            found.append(TermParameter(term, name, float(value), float(error), unit))
         if one.kind == "reflex-fir":
             spread = FIR_SPACING_S * math.sqrt(float(np.sum(covariance[part, part])))
             area = FIR_SPACING_S * float(np.sum(linear[part]))
@@ -226,7 +226,6 @@ def _parameters(
                 f"{term}: the gain is negative, {gain.value:.3g} N·m·s/rad; a reflex resists "
                 "stretch, so this term explains something else"
             )
-        column += len(one.columns)
         for name, unit, bottom, top in zip(
             one.nonlinear, one.units, one.low, one.high, strict=True
         ):
