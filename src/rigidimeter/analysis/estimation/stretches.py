@@ -80,12 +80,10 @@ def _evenly(channel: Channel, lost: list[LeftOut]) -> Channel:
     wide = steps_s >= GAP / channel.mean_rate_hz
     if not np.any(wide):
         return channel
-    missing = np.where(wide, np.maximum(np.rint(steps_s * channel.rate_hz) - 1, 0), 0)
-    missing = missing.astype(np.intp)
     middle_s = channel.time_s[:-1] + 0.5 * steps_s
-    missing[
-        ~np.any([(one.start_s < middle_s) & (middle_s < one.stop_s) for one in lost], axis=0)
-    ] = 0
+    wide &= np.any([(one.start_s < middle_s) & (middle_s < one.stop_s) for one in lost], axis=0)
+    more = np.maximum(np.rint(steps_s * channel.rate_hz) - 1, 0)
+    missing = np.where(wide, more, 0).astype(np.intp)
     if not np.any(missing):
         return channel
     before = np.repeat(np.arange(len(channel)), np.append(missing, 0) + 1)

@@ -136,7 +136,9 @@ def hac_covariance(bread: Array, scores: Array) -> Scatter:
         raise ValueError(f"{n} samples are too few for the scatter of {p} parameters")
     independent = max(n / float(np.max(correlation_samples(scores))), p + 1.0)
     count = min(max(round(COSINES * independent ** (2.0 / 3.0)), FEWEST_COSINES), n - 1)
-    middle = _cosine_sum(scores, count) * independent / (independent - p)
+    # The transform gives 2 Σ cos(π j (t + ½)/n) g_t; a sum of unit mean square has √2 before it.
+    sums = scipy.fft.dct(scores, type=2, axis=0)[1 : count + 1] / np.sqrt(2.0)
+    middle = sums.T @ sums / count * independent / (independent - p)
     return Scatter(bread @ middle @ bread.T, float(count))
 
 
@@ -169,10 +171,3 @@ def cramer_rao_coloured(regressors: Array, density: Array, rate_hz: float) -> Ar
     matrix = np.sqrt(weight[known] / (n * rate_hz * density[known]))[:, None] * lines
     stacked = np.concatenate([matrix.real, matrix.imag])
     return solve(stacked, np.zeros(len(stacked))).bread
-
-
-def _cosine_sum(scores: Array, count: int) -> Array:
-    """Return n times the density at zero: the mean outer product of `count` cosine sums."""
-    # The transform gives 2 Σ cos(π j (t + ½)/n) g_t; a sum of unit mean square has √2 before it.
-    sums = scipy.fft.dct(scores, type=2, axis=0)[1 : count + 1] / np.sqrt(2.0)
-    return np.asarray(sums.T @ sums / count)

@@ -245,8 +245,7 @@ def _group_edges(frequency_hz: Array) -> Array:
     while edges[-1] < frequency_hz[-1]:
         edges.append(edges[-1] + max(GROUP_LINES * spacing, GROUP_SHARE * edges[-1]))
     # The last group takes what is left over.
-    inner = edges[1:-2] if len(edges) > 3 else []
-    return np.array([-np.inf, *(edge - spacing / 2 for edge in inner), np.inf])
+    return np.array([-np.inf, *(edge - spacing / 2 for edge in edges[1:-2]), np.inf])
 
 
 def _parts(frequency_hz: Array, highest_hz: float) -> Iterator[NDArray[np.intp]]:

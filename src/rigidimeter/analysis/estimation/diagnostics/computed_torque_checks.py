@@ -74,12 +74,9 @@ def computed_torque(epoch: Epoch, settings: DiagnosticsSettings) -> Look | None:
     """
     if epoch.virtual:
         return None
-    shares = {
-        "the motion": _not_a_sum(epoch, motion_channels(epoch)),
-        "the perturbation": _not_a_sum(
-            epoch, [c for name, c in epoch.channels.items() if name == "perturbation_nm"]
-        ),
-    }
+    perturbation = [epoch.channels[name] for name in ("perturbation_nm",) if name in epoch.channels]
+    causes = {"the motion": motion_channels(epoch), "the perturbation": perturbation}
+    shares = {name: _not_a_sum(epoch, channels) for name, channels in causes.items()}
     origin = min(shares, key=lambda name: shares[name])
     value, least = 100.0 * shares[origin], settings.min_computed_torque_percent
     if not math.isfinite(value):

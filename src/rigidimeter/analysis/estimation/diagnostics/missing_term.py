@@ -30,7 +30,6 @@ from rigidimeter.analysis.estimation.diagnostics.check_record import (
     HARMFUL,
     Case,
     Check,
-    Harmless,
     Look,
 )
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
@@ -156,8 +155,7 @@ def _linear(case: Case, beyond: BeyondLinear, term: LinearTerm) -> Look:
     if term.name != "coupling":
         facts |= {"terms": "a reflex", "late_ms": 1e3 * term.delay_s}
         facts["asked"] = "inertia,damping,stiffness,reflex+,reflex-"
-    variant = "coupling" if term.name == "coupling" else "reflex"
-    return _look(case, _moved_by_linear(case, beyond, term), term.p, facts, variant)
+    return _look(case, _moved_by_linear(case, beyond, term), term.p, facts, term.name)
 
 
 def _look(case: Case, added: Array, p: float, facts: Mapping[str, Fact], variant: str) -> Look:
@@ -246,12 +244,12 @@ def _size(term: OmittedTerm) -> str:
     return f"{WORDS[term.name][0]} {term.value:.3g} ± {term.standard_error:.2g} {unit}{late}"
 
 
-def _within(case: Case, look: Look) -> Harmless:
-    del case
-    return HARMFUL if look.value > look.limit else ("within", {})
-
-
 MISSING_TERM_CHECKS = (
-    Check("missing_term", (), lambda c: c.once(missing_term), harmless=_within),
+    Check(
+        "missing_term",
+        (),
+        lambda c: c.once(missing_term),
+        harmless=lambda _, look: HARMFUL if look.value > look.limit else ("within", {}),
+    ),
     Check("between_samples", (), friction_of_drive),
 )

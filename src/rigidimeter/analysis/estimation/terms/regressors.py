@@ -45,7 +45,7 @@ class Design:
             return banded(values, motion.rate_hz, band_hz)[::step]
 
         self.rate_hz = motion.rate_hz / step
-        self.terms = tuple(terms)
+        self.terms, self.band_hz, self.trim_s = tuple(terms), band_hz, trim_s
         self.torque_nm = thin(motion.torque_nm)
         self.velocity_rad_s = thin(motion.velocity_rad_s)
         trim = round(trim_s * self.rate_hz)

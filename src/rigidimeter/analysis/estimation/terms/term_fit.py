@@ -125,7 +125,7 @@ def fit_terms(
     undecided = [name for name in terms if name in REFLEXES and name[-1] not in "+-"]
     if undecided:
         return _both_directions(motion, terms, undecided[0], band_hz, trim_s)
-    return _fit(Design(motion, terms, band_hz, trim_s), band_hz, trim_s)
+    return _fit(Design(motion, terms, band_hz, trim_s))
 
 
 def _both_directions(
@@ -138,7 +138,7 @@ def _both_directions(
     fits = []
     for sign in "+-":
         decided = [undecided + sign if name == undecided else name for name in terms]
-        fits.append(_fit(Design(motion, decided, band_hz, trim_s), band_hz, trim_s))
+        fits.append(_fit(Design(motion, decided, band_hz, trim_s)))
     # A reflex resists stretch; a direction that needs a negative gain is not one.
     worse, better = sorted(fits, key=lambda fit: (_gain(fit, undecided) > 0, fit.vaf_percent))
     side = "positive" if f"{undecided}+" in better.terms else "negative"
@@ -154,8 +154,8 @@ def _gain(fit: TermsFit, kind: str) -> float:
     return fit[f"{term} gain"].value
 
 
-def _fit(design: Design, band_hz: tuple[float, float], trim_s: float) -> TermsFit:
-    target = design.torque_nm[design.keep]
+def _fit(design: Design) -> TermsFit:
+    target, band_hz = design.torque_nm[design.keep], design.band_hz
     if not float(np.ptp(target)) > 0:
         raise ValueError("the torque is constant in the band")
     nonlinear = design.search()
@@ -173,7 +173,7 @@ def _fit(design: Design, band_hz: tuple[float, float], trim_s: float) -> TermsFi
         nonlinear=nonlinear,
         band_hz=band_hz,
         rate_hz=design.rate_hz,
-        trim_s=trim_s,
+        trim_s=design.trim_s,
         vaf_percent=100.0 * (1.0 - float(np.var(residual)) / float(np.var(target))),
         aic=misfit + 2.0 * p,
         bic=misfit + p * math.log(independent),
