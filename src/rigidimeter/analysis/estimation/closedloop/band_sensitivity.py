@@ -118,9 +118,9 @@ class BandChange(NamedTuple):
 
 
 class _Epoch(NamedTuple):
-    """One epoch as it was fitted, and the effects of its lines on its own estimate there."""
+    """One epoch, its instruments divided by S, and its lines' effects on its own estimate."""
 
-    fitted: Problem
+    problem: Problem
     power: Array
     smoother: Smoother
     spread: float
@@ -128,7 +128,7 @@ class _Epoch(NamedTuple):
 
     def solved(self, effect: Complex) -> Solved:
         """Return estimates on which the lines have these effects."""
-        return Solved(np.eye(3), effect, self.fitted.regressors, self.power, self.spread)
+        return Solved(np.eye(3), effect, self.problem.regressors, self.power, self.spread)
 
 
 def band_changes(members: Sequence[Member]) -> tuple[Array, list[BandChange]]:
@@ -144,10 +144,13 @@ def band_changes(members: Sequence[Member]) -> tuple[Array, list[BandChange]]:
     ValueError
         If the epochs cannot distinguish J, B and K.
     """
-    epochs = [_as_fitted(member) for member in members]
-    gram, moment, _ = sums([one.fitted for one in epochs], [one.power for one in epochs])
+    epochs = [_weighted(member) for member in members]
+    fitted = [
+        _only(one.problem, member.fitted) for one, member in zip(epochs, members, strict=True)
+    ]
+    gram, moment, _ = sums(fitted)
     values = scaled_inverse(gram) @ moment
-    residuals = [one.fitted.target - one.fitted.regressors @ values for one in epochs]
+    residuals = [one.problem.target - one.problem.regressors @ values for one in epochs]
     densities = [
         one.solved(one.own).density(residual, one.smoother)
         for one, residual in zip(epochs, residuals, strict=True)
@@ -174,16 +177,16 @@ def band_changes(members: Sequence[Member]) -> tuple[Array, list[BandChange]]:
     return values, changes
 
 
-def _as_fitted(member: Member) -> _Epoch:
+def _weighted(member: Member) -> _Epoch:
     problem, grid = member.problem, member.lines.grid
     smoother = Smoother.over(grid.line, SMOOTHED, NEIGHBOURS)
     residual = problem.target - problem.regressors @ member.values
     least = LEAST_POWER * float(np.max(np.abs(problem.target) ** 2))
     power = np.maximum(smoother(np.abs(residual) ** 2), least)
-    fitted = problem._replace(instruments=_only(problem.instruments, member.fitted))
-    gram, _, (used,) = sums([fitted], [power])
+    weighted = problem._replace(instruments=problem.instruments / power[:, None])
+    gram, _, (used,) = sums([_only(weighted, member.fitted)])
     own = np.asarray(used @ scaled_inverse(gram).T)
-    return _Epoch(fitted, power, smoother, grid.spread, own)
+    return _Epoch(weighted, power, smoother, grid.spread, own)
 
 
 def _variants(member: Member) -> list[tuple[float, float, Part]]:
@@ -211,19 +214,21 @@ def _slice(member: Member, low: float, high: float) -> slice:
 def _of_band(member: Member, epoch: _Epoch, within: slice, part: Part) -> tuple[Array, Complex]:
     """Return the matrix of a band and part of an epoch, and the effects of the lines by it."""
     sign = {"all": 0, "first half": 1, "second half": -1}[part]
-    instruments, motion, *_ = member.problem
+    problem = epoch.problem
     if sign:
-        instruments, motion = _halved(instruments, sign), _halved(motion, sign)
-    problem = epoch.fitted._replace(instruments=_only(instruments, within), regressors=motion)
-    gram, _, (used,) = sums([problem], [epoch.power])
+        weighted = _halved(member.problem.instruments, sign) / epoch.power[:, None]
+        motion = _halved(problem.regressors, sign)
+        problem = problem._replace(instruments=weighted, regressors=motion)
+    gram, _, (used,) = sums([_only(problem, within)])
     # The half of a window is real: what weights the halved lines is halved in the same way.
     return gram, _halved(used, sign) if sign else used
 
 
-def _only(values: Complex, within: slice) -> Complex:
-    kept = np.zeros_like(values)
-    kept[within] = values[within]
-    return kept
+def _only(problem: Problem, within: slice) -> Problem:
+    """Return the problem of some of the lines: at the others the instruments are zero."""
+    kept = np.zeros_like(problem.instruments)
+    kept[within] = problem.instruments[within]
+    return problem._replace(instruments=kept)
 
 
 def _halved(lines: Complex, sign: int) -> Complex:
