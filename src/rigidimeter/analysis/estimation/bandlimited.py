@@ -98,10 +98,8 @@ def _filters(low_hz: float, high_hz: float, rate_hz: float) -> tuple[_Filter, _F
     """Return low-pass and high-pass; to design them takes longer than to filter an epoch."""
     lowpass = scipy.signal.butter(4, high_hz, "lowpass", fs=rate_hz, output="sos")
     highpass = scipy.signal.butter(2, low_hz, "highpass", fs=rate_hz, output="sos")
-    return (lowpass, scipy.signal.sosfilt_zi(lowpass)), (
-        highpass,
-        scipy.signal.sosfilt_zi(highpass),
-    )
+    low, high = ((sos, scipy.signal.sosfilt_zi(sos)) for sos in (lowpass, highpass))
+    return low, high
 
 
 def _both_ways(through: _Filter, values: Array, memory: int) -> Array:

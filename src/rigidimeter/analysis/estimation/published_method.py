@@ -116,7 +116,6 @@ def fit_published(
             fits.append(Fit(epoch.source, epoch.label, epoch.condition, "published", outcome))
         else:
             outcome = after_fit(epoch, fitted.r_squared, fitted.condition_number)
-            seen = as_they_are(prepared) if inertia_kg_m2 is None else ()
             fit = replace(
                 fitted,
                 source=epoch.source,
@@ -124,7 +123,7 @@ def fit_published(
                 condition=epoch.condition,
                 method="published",
                 outcome=outcome,
-                findings=seen,
+                findings=as_they_are(prepared) if inertia_kg_m2 is None else (),
                 **amplitude_of_signals(epoch, signals)._asdict(),
             )
             fits.append(fit)

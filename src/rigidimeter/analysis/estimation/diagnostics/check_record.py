@@ -17,7 +17,6 @@ from rigidimeter.analysis.estimation.signals import Array, Signals
 from rigidimeter.core.findings import UNKNOWN_EFFECT, Effect, Fact, Finding
 from rigidimeter.core.records import Epoch, Fit
 from rigidimeter.core.settings import DiagnosticsSettings
-from rigidimeter.model import Loop
 
 T = TypeVar("T")
 
@@ -88,8 +87,6 @@ class Case:
         The estimate with its intervals.
     method : Method, optional
         That made it.
-    loop : Loop, optional
-        In which the joint was moved, as the settings and the recording say.
     unbiased : array, shape (3,), optional
         For least squares: J, B and K without the bias that torque of the subject causes by the
         loop, NaN where it is too much to be told.
@@ -107,7 +104,6 @@ class Case:
     position_limit_rad: float | None = None
     fit: Fit | None = None
     method: Method | None = None
-    loop: Loop | None = None
     unbiased: Array | None = None
     bias_in_interval: bool = False
     prepared: PreparedEpoch | None = None

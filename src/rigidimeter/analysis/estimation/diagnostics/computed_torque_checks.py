@@ -55,8 +55,7 @@ def static_torque(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings)
     steps = np.diff(torque[np.argsort(angle, kind="stable")])
     variance = float(np.var(torque))
     value = 100.0 * float(np.mean(steps**2)) / (2.0 * variance) if variance > 0 else math.nan
-    least = settings.min_static_torque_percent
-    return at_least(value, least)
+    return at_least(value, settings.min_static_torque_percent)
 
 
 def _at(channel: Channel, time_s: Array) -> Array:

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from rigidimeter.analysis.estimation.bandlimited import bandlimited_signals
-from rigidimeter.analysis.estimation.closedloop.controller_used import loop_shown
 from rigidimeter.analysis.estimation.diagnostics.channel_checks import CHANNEL_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look
 from rigidimeter.analysis.estimation.diagnostics.computed_torque_checks import (
@@ -112,9 +111,8 @@ def _case(prepared: PreparedEpoch, parameters: Array) -> Case:
     epoch, settings = prepared.epoch, prepared.settings
     from_session = epoch.excitation_hz is not None
     limit_rad = rad_from_deg(settings.guard.position_limit_deg) if from_session else None
-    signals, loop = prepared.signals(bandlimited_signals), loop_shown(prepared)
-    looked_at = epoch, signals, parameters, settings.diagnostics, limit_rad
-    return Case(*looked_at, loop=loop, prepared=prepared)
+    signals = prepared.signals(bandlimited_signals)
+    return Case(epoch, signals, parameters, settings.diagnostics, limit_rad, prepared=prepared)
 
 
 def _seen_without_fit(prepared: PreparedEpoch) -> dict[str, Look | None]:

@@ -22,7 +22,6 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from itertools import product
 
 import numpy as np
 import scipy
@@ -37,7 +36,7 @@ from rigidimeter.analysis.estimation.terms.explained import (
     stacked,
 )
 from rigidimeter.analysis.estimation.terms.reflex import kernel
-from rigidimeter.analysis.estimation.window import tapered_ends
+from rigidimeter.analysis.estimation.window import repetition, tapered_ends
 
 STRETCH_HZ = 1.0
 FEWEST_LINES = 9
@@ -57,11 +56,6 @@ class Solution:
     values: Array
     covariance: Array
     residual: Complex
-
-    @property
-    def standard_errors(self) -> Array:
-        """Square roots of the diagonal of the covariance."""
-        return np.sqrt(np.diag(self.covariance))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +103,7 @@ class BeyondLinear:
     @cached_property
     def taper_loss(self) -> float:
         """By how much the taper enlarges a variance."""
-        squares = self._window**2
-        return float(squares.size * np.sum(squares**2) / np.sum(squares) ** 2)
+        return repetition(self._window)
 
     def columns(self, names: Sequence[str], nonlinear: Sequence[float] = ()) -> Complex:
         """Return what is left of each term, shape (m, p); a column for each linear parameter.
@@ -164,11 +157,6 @@ class BeyondLinear:
     def _stretch(self, name: str) -> Complex:
         """Return the lines of the velocity that stretches, that of the damping of one direction."""
         return self.term_lines(f"damping{name[-1]}")
-
-    def grid(self, names: Sequence[str]) -> list[tuple[float, ...]]:
-        """Return the points at which the parameters inside the reflexes are tried."""
-        starts = [kernel(name).starts for name in names if name in REFLEXES]
-        return [sum(parts, ()) for parts in product(*starts)]
 
     def not_linear(self, names: Sequence[str]) -> tuple[str, ...]:
         """Return the terms that are more than a linear filter of the motion."""

@@ -27,7 +27,12 @@ from rigidimeter.analysis.estimation.terms.catalogue import (
     term_named,
 )
 from rigidimeter.analysis.estimation.terms.held_out import Gain, block_errors, gain
-from rigidimeter.analysis.estimation.terms.reflex import FIR_SPACING_S, REFLEX_KINDS, kernel
+from rigidimeter.analysis.estimation.terms.reflex import (
+    FIR_SPACING_S,
+    REFLEX_KINDS,
+    kernel,
+    points_tried,
+)
 from rigidimeter.analysis.estimation.terms.regressors import Design
 from rigidimeter.analysis.estimation.terms.term_fit import TermsFit, fit_terms
 
@@ -195,7 +200,8 @@ class _Judge:
         if row.fit is None:
             return replace(row, terms=names)
         bent = self._beyond.not_linear(decided)
-        grid = [self._beyond.series(self._beyond.columns(bent, q)) for q in self._beyond.grid(bent)]
+        beyond = self._beyond
+        tried = [beyond.series(beyond.columns(bent, inner)) for inner in points_tried(bent)]
         design = Design(self._motion, decided, self._band_hz, self._trim_s)
         target, columns = design.torque_nm[design.keep], design.columns(row.fit.nonlinear)
         rate_hz, gap_s = design.rate_hz, self._trim_s
@@ -206,7 +212,7 @@ class _Judge:
             beyond=solved,
             problem="; ".join(filter(None, map(_pushes, solved))),
             errors=errors,
-            beyond_errors=block_errors(self._target, grid, self._beyond.series_rate_hz, gap_s),
+            beyond_errors=block_errors(self._target, tried, beyond.series_rate_hz, gap_s),
         )
 
     def recommend(self, rows: Sequence[ModelRow]) -> tuple[ModelRow | None, str]:
@@ -287,7 +293,7 @@ def _gains(beyond: BeyondLinear, names: tuple[str, ...]) -> tuple[TermGain, ...]
     bent = beyond.not_linear(names)
     if not bent:
         return ()
-    tried = [beyond.solve(beyond.columns(bent, q)) for q in beyond.grid(bent)]
+    tried = [beyond.solve(beyond.columns(bent, inner)) for inner in points_tried(bent)]
     best = min(tried, key=lambda one: float(np.sum(np.abs(one.residual) ** 2)))
     found, column = [], 0
     for name in bent:

@@ -33,7 +33,12 @@ from rigidimeter.analysis.estimation.terms.explained import (
     strongest,
     triangle,
 )
-from rigidimeter.analysis.estimation.terms.reflex import kernel, pass_through, stretch_velocity
+from rigidimeter.analysis.estimation.terms.reflex import (
+    kernel,
+    pass_through,
+    points_tried,
+    stretch_velocity,
+)
 from rigidimeter.analysis.statistics import holm
 
 TESTED = ("coulomb", "damping+", "cubic", "quadratic", "reflex+")
@@ -132,11 +137,10 @@ def omitted_terms(beyond: BeyondLinear) -> tuple[OmittedTerm, ...]:
     if not found:
         return ()
     whole = beyond.solve(_columns(beyond, found))
+    errors = np.sqrt(np.diag(whole.covariance))
     return tuple(
         _named(term, float(value), float(error), p)
-        for term, value, error, p in zip(
-            found, whole.values, whole.standard_errors, chances, strict=True
-        )
+        for term, value, error, p in zip(found, whole.values, errors, chances, strict=True)
     )
 
 
@@ -211,7 +215,7 @@ class _Search:
         What is linear in the lines is at right angles to whatever is white.
         """
         if kind not in self._tried:
-            inners = self._beyond.grid([kind])
+            inners = points_tried([kind])
             # The delay comes first and rises.
             late = slice(sum(inner[0] < EARLIEST_S for inner in inners), None)
             signal, gains = self._beyond.reflexes(kind)

@@ -21,8 +21,10 @@ G is in N·m·s/rad: a steady stretch of
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
 import scipy
@@ -100,6 +102,12 @@ def _kernel(kind: str) -> Kernel:
         (0.2, 20.0, 4.0),
         tuple((d, f, z) for d in delays for f in (1.0, 2.0, 4.0, 8.0) for z in (0.5, 1.0)),
     )
+
+
+def points_tried(names: Iterable[str]) -> list[tuple[float, ...]]:
+    """Return the points at which the parameters inside the reflexes among terms are tried."""
+    starts = (kernel(name).starts for name in names if name.startswith(REFLEX_KINDS))
+    return [sum(parts, ()) for parts in product(*starts)]
 
 
 def stretch_velocity(motion: Signals, name: str) -> Array:

@@ -11,7 +11,6 @@ coefficients c is solved, what is not, q, is searched (variable projection: Golu
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
 
 import numpy as np
 import scipy
@@ -22,6 +21,7 @@ from rigidimeter.analysis.estimation.terms.reflex import (
     Kernel,
     kernel,
     pass_through,
+    points_tried,
     stretch_velocity,
 )
 from rigidimeter.analysis.estimation.terms.wideband import banded
@@ -66,11 +66,9 @@ class Design:
     @property
     def names(self) -> list[str]:
         """The linear parameters, one for each column."""
-        names: list[str] = []
-        for term in self.terms:
-            columns = self.kernels[term].columns if term in self.kernels else ("",)
-            names += [f"{term} {column}".strip() for column in columns]
-        return names
+        columns = {term: one.columns for term, one in self.kernels.items()}
+        each = ((term, columns.get(term, ("",))) for term in self.terms)
+        return [f"{term} {column}".strip() for term, of_term in each for column in of_term]
 
     def columns(self, nonlinear: Array) -> Array:
         """Return A(q), shape (n, p)."""
@@ -109,8 +107,7 @@ class Design:
             values, *_ = np.linalg.lstsq(scaled, target, rcond=1e-10)
             return np.asarray(target - scaled @ values, dtype=np.float64)
 
-        grid = product(*(one.starts for one in self.kernels.values()))
-        starts = [np.clip(sum(parts, ()), low, high) for parts in grid]
+        starts = [np.clip(start, low, high) for start in points_tried(self.kernels)]
         best = sorted(starts, key=lambda start: float(np.linalg.norm(residual(start))))
         refined = [
             scipy.optimize.least_squares(
