@@ -49,6 +49,25 @@ class Term:
     resists: bool = False
 
 
+def _toward_each_side(
+    name: str,
+    unit: str,
+    torque: str,
+    regressor: Callable[[Signals, float], Array | float],
+    *,
+    resists: bool = False,
+) -> list[Term]:
+    """Return a term for motion toward positive angle, and one for the other."""
+
+    def toward(sign: float) -> Callable[[Signals], Array]:
+        return lambda m: np.where(sign * m.velocity_rad_s > 0, regressor(m, sign), 0.0)
+
+    return [
+        Term(name + mark, unit, f"{torque} while it moves toward {side} angle.", made, resists)
+        for mark, side, made in (("+", "positive", toward(1.0)), ("-", "negative", toward(-1.0)))
+    ]
+
+
 TERMS: list[Term] = [
     Term(
         "inertia", "kg·m²", "Torque for each angular acceleration.", lambda m: m.acceleration_rad_s2
@@ -77,44 +96,9 @@ TERMS: list[Term] = [
         "Stiffness that grows with the square of the angle.",
         lambda m: m.angle_rad * m.angle_rad**2,
     ),
-    Term(
-        "damping+",
-        "N·m·s/rad",
-        "Viscous torque while it moves toward positive angle.",
-        lambda m: np.maximum(m.velocity_rad_s, 0.0),
-    ),
-    Term(
-        "damping-",
-        "N·m·s/rad",
-        "Viscous torque while it moves toward negative angle.",
-        lambda m: np.minimum(m.velocity_rad_s, 0.0),
-    ),
-    Term(
-        "stiffness+",
-        "N·m/rad",
-        "Elastic torque while it moves toward positive angle.",
-        lambda m: np.where(m.velocity_rad_s > 0, m.angle_rad, 0.0),
-    ),
-    Term(
-        "stiffness-",
-        "N·m/rad",
-        "Elastic torque while it moves toward negative angle.",
-        lambda m: np.where(m.velocity_rad_s < 0, m.angle_rad, 0.0),
-    ),
-    Term(
-        "coulomb+",
-        "N·m",
-        "Dry friction while it moves toward positive angle.",
-        lambda m: np.where(m.velocity_rad_s > 0, 1.0, 0.0),
-        resists=True,
-    ),
-    Term(
-        "coulomb-",
-        "N·m",
-        "Dry friction while it moves toward negative angle.",
-        lambda m: np.where(m.velocity_rad_s < 0, -1.0, 0.0),
-        resists=True,
-    ),
+    *_toward_each_side("damping", "N·m·s/rad", "Viscous torque", lambda m, sign: m.velocity_rad_s),
+    *_toward_each_side("stiffness", "N·m/rad", "Elastic torque", lambda m, sign: m.angle_rad),
+    *_toward_each_side("coulomb", "N·m", "Dry friction", lambda m, sign: sign, resists=True),
 ]
 """Terms that are linear in their coefficient. Code from outside the package may append its own."""
 
