@@ -132,10 +132,9 @@ def fit_published(
         progress(1.0)
     if not pooled:
         return fits, []
-    everything = dict(groups)
     if len(groups) > 1:
-        everything[""] = [member for members in groups.values() for member in members]
-    return fits, [_pooled(name, own, inertia_kg_m2) for name, own in everything.items()]
+        groups[""] = [member for members in groups.values() for member in members]
+    return fits, [_pooled(name, own, inertia_kg_m2) for name, own in groups.items()]
 
 
 def as_they_are(prepared: PreparedEpoch) -> tuple[Finding, ...]:

@@ -155,9 +155,7 @@ def repeated(answers: Sequence[Answer]) -> list[Misfit]:
     """
     count = len(answers)
     answers = _without_drift(answers)
-    turned = np.stack(
-        [answer.residual_nm * toward_zero_phase(answer.response_nm) for answer in answers]
-    )
+    turned = np.stack([one.residual_nm * toward_zero_phase(one.response_nm) for one in answers])
     power = np.stack([_power(answer) for answer in answers])
     white = turned / np.sqrt(power)
     mean, frequency = white.mean(0), answers[0].frequency_hz
