@@ -71,13 +71,13 @@ FIT_KINDS = (
     ),
     Kind(
         "band_share",
-        "share of the power of torque and velocity about their means, as recorded, that lies in "
-        "the band of the fit or less than 0.75 spectral lines from it; the smaller. Epochs below "
-        "14 s cannot tell drift from the slowest part of a band that begins at 0.15 Hz",
+        "share of the power of torque and velocity about their means, white noise left out, that "
+        "lies in the band of the fit or less than 0.75 spectral lines from it; the smaller. Epochs "
+        "below 14 s cannot tell drift from the slowest part of a band that begins at 0.15 Hz",
         headline="Only {value:.0f} % of the {signal}'s power lies in the band",
         measured="Only {value:.0f} % of the {signal}'s power lies in the band, {low_hz:g} to "
         "{high_hz:.3g} Hz (at least {limit:g} %).",
-        meaning="Most of what was measured is drift below or noise above the band, so J, B and K "
+        meaning="Most of what was measured is drift below or motion above the band, so J, B and K "
         "are from a small part of it.",
         remedy="Look for drift and slow pushes, check rate and unit of the time, and set the band "
         "to what was perturbed (--band-hz).",

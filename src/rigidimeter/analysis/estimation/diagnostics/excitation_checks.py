@@ -26,7 +26,7 @@ from rigidimeter.analysis.estimation.diagnostics.check_record import (
 )
 from rigidimeter.analysis.estimation.power_lines import lines_inside, power_lines
 from rigidimeter.analysis.estimation.scores import line_shares
-from rigidimeter.analysis.estimation.signals import Array, Signals, values_at, velocity_at
+from rigidimeter.analysis.estimation.signals import Array, Signals, values_at
 from rigidimeter.core.records import PARAMETERS, Channel, Epoch
 from rigidimeter.core.settings import DiagnosticsSettings
 
@@ -66,9 +66,8 @@ def coherence(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> 
     """
     cause = perturbation_nm(epoch.channels["perturbation_nm"], signals.time_s)
     shared = _coherence(cause, np.stack([signals.torque_nm, signals.velocity_rad_s]), signals)
-    values = dict(zip(("torque", "velocity"), np.median(shared, axis=1).tolist(), strict=True))
-    weaker = min(values, key=lambda name: values[name])
-    value = values[weaker]
+    medians = np.median(shared, axis=1).tolist()
+    value, weaker = min(zip(medians, ("torque", "velocity"), strict=True))
     return at_least(value, settings.min_coherence, signal=weaker, percent=100.0 * value)
 
 
@@ -92,11 +91,12 @@ def _coherence(cause: Array, effects: Array, signals: Signals) -> Array:
 def band_share(epoch: Epoch, signals: Signals, settings: DiagnosticsSettings) -> Look:
     """Return how much of the recorded torque and velocity lies in the band of the fit."""
     torque = values_at(epoch.channels["torque_nm"], signals.time_s)
-    velocity = velocity_at(epoch, signals.time_s)
-    shares = {
-        "torque": _share(torque, signals.rate_hz, signals.band_hz),
-        "velocity": _share(velocity, signals.rate_hz, signals.band_hz),
-    }
+    if "velocity_rad_s" in epoch.channels:
+        velocity = values_at(epoch.channels["velocity_rad_s"], signals.time_s)
+    else:
+        velocity = np.gradient(values_at(epoch.channels["angle_rad"], signals.time_s))
+    both = {"torque": torque, "velocity": velocity}
+    shares = {name: _share(both[name], signals.rate_hz, signals.band_hz) for name in both}
     weaker = min(shares, key=lambda name: shares[name])
     low, high = signals.band_hz
     value, least = 100.0 * shares[weaker], settings.min_band_share_percent
@@ -120,15 +120,18 @@ def perturbation_nm(channel: Channel, time_s: Array) -> Array:
 def _share(values: Array, rate_hz: float, band_hz: tuple[float, float]) -> float:
     """Return the share of the power of a signal about its mean that lies in a band.
 
+    Of the power P(f) neighbouring samples, T apart, share P cos 2πfT, which is counted: white noise
+    sums to nothing over all lines, as it is or in differences to both sides, P sin² 2πfT cos 2πfT.
+
     The first line of a perturbation may lie less than a line above the lower edge: what the taper
     does not tell from the band is not outside it.
     """
     frequency, power = power_lines(values, rate_hz, tapered=True)
+    power = power * np.cos(2 * np.pi * frequency / rate_hz)
     reach_hz = TAPERED_LINES / 2 * float(frequency[1])
+    inside = lines_inside(frequency, (band_hz[0] - reach_hz, band_hz[1] + reach_hz))
     total = float(np.sum(power[1:]))
-    low_hz, high_hz = band_hz
-    inside = lines_inside(frequency, (low_hz - reach_hz, high_hz + reach_hz))
-    return float(np.sum(power[inside])) / total if total > 0 else 0.0
+    return min(float(np.sum(power[inside])) / total, 1.0) if total > 0 else 0.0
 
 
 def _middle_hz(signals: Signals) -> tuple[float, float]:

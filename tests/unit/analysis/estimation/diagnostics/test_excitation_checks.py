@@ -82,6 +82,22 @@ def test_drift_below_the_band_is_told(sound):
     assert passed(band_share(epoch, signals, SETTINGS))
 
 
+@pytest.mark.parametrize(("high_hz", "told"), [(10.0, False), (0.5, True)])
+def test_motion_above_the_band_is_told_and_noise_of_the_encoder_is_none(sound, high_hz, told):
+    epoch, signals, _ = sound
+    signals = replace(signals, band_hz=(0.15, high_hz))
+    angle = epoch.channels["angle_rad"].values
+    smooth = {name: epoch.channels[name] for name in ("torque_nm", "angle_rad")}
+    alone = replace(epoch, channels=smooth)
+    speed = np.std(np.gradient(angle))
+    noise = 2 * speed * np.random.default_rng(4).standard_normal(N)
+    assert np.std(np.gradient(noise)) > speed
+    noisy = with_channel(alone, "angle_rad", angle + noise)
+    without, found = (band_share(one, signals, SETTINGS) for one in (alone, noisy))
+    assert found.value == pytest.approx(without.value, rel=0.1)
+    assert (without.failed, found.failed) == (told, told)
+
+
 @pytest.mark.parametrize("duration_s", [8.0, 10.0, 12.0, 15.0, 20.0])
 @pytest.mark.parametrize("phase", [0.0, 1.0, 2.0])
 def test_the_slowest_line_of_a_perturbation_is_no_drift(sound, duration_s, phase):
