@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 from rigidimeter.analysis.estimation.alignment import aligned_prepared, estimate_delays
 from rigidimeter.analysis.estimation.clock_error import with_clock_error
 from rigidimeter.analysis.estimation.diagnostics import checked, checked_together
-from rigidimeter.analysis.estimation.diagnostics.delay_check import with_torque_delay
 from rigidimeter.analysis.estimation.methods import choose_method, method_named
 from rigidimeter.analysis.estimation.prepared import prepare
 from rigidimeter.analysis.estimation.signals import Array
@@ -117,7 +116,7 @@ def identify(
     (fit,), _ = with_clock_error(chosen.fit, [prepared], None, made, delays)
     if fit.outcome.kind == "failed":
         raise ValueError(f"method {chosen.name}: {fit.outcome.reason}")
-    fit = with_torque_delay(prepared, checked(prepared, fit), delays)
+    fit = checked(prepared, fit, delays)
     together = checked_together([prepared], [fit], [], chosen)
     return together.fits[0]
 

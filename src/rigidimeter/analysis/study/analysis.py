@@ -20,7 +20,6 @@ from rigidimeter.analysis.estimation.alignment import MOST_EPOCHS, aligned_prepa
 from rigidimeter.analysis.estimation.between_epochs import between_epochs
 from rigidimeter.analysis.estimation.clock_error import with_clock_error
 from rigidimeter.analysis.estimation.diagnostics import checked, checked_together
-from rigidimeter.analysis.estimation.diagnostics.delay_check import with_torque_delay
 from rigidimeter.analysis.estimation.method_record import Progress
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch, prepare
 from rigidimeter.analysis.estimation.scores import line_shares, score_prepared
@@ -199,8 +198,7 @@ def analyse_prepared(
     found, pooled = fitted_by(fitted, None, not fits_alone)
     fits = []
     for prepared, fit in zip(fitted, found, strict=True):
-        found_fit = checked(prepared, fit, exclusions_alone=fits_alone)
-        fits.append(found_fit if fits_alone else with_torque_delay(prepared, found_fit, delays))
+        fits.append(checked(prepared, fit, delays, exclusions_alone=fits_alone))
         progress(0.0 if fits_alone else costs.check)
     counted = [
         prepared.closed_as(fit.outcome)

@@ -15,7 +15,7 @@ from rigidimeter.analysis.estimation.method_record import Method
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array, Signals
 from rigidimeter.core.findings import UNKNOWN_EFFECT, Effect, Fact, Finding
-from rigidimeter.core.records import Epoch, Fit
+from rigidimeter.core.records import Delay, Epoch, Fit
 from rigidimeter.core.settings import DiagnosticsSettings
 
 T = TypeVar("T")
@@ -95,6 +95,8 @@ class Case:
     prepared : PreparedEpoch, optional
         The epoch with what was made of it; without it nothing is said of a joint that varies,
         of terms that are missing, nor of the controller.
+    delay : Delay, optional
+        Of the torque of its source.
     """
 
     epoch: Epoch
@@ -107,6 +109,7 @@ class Case:
     unbiased: Array | None = None
     bias_in_interval: bool = False
     prepared: PreparedEpoch | None = None
+    delay: Delay | None = None
     _made: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
 
     @property

@@ -12,17 +12,13 @@ which is in the interval of J.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-
 import numpy as np
 
 from rigidimeter.analysis.estimation.closedloop.between_samples import acceleration_late_s
 from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
-from rigidimeter.analysis.estimation.found import found, half_widths
+from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch, drive_followed
-from rigidimeter.core.findings import Effect, Finding
-from rigidimeter.core.records import Delay, Fit
+from rigidimeter.core.findings import Effect
 from rigidimeter.model import DriveModel
 
 SIGNIFICANT = 3.0
@@ -42,46 +38,25 @@ def delay_of_drive_s(prepared: PreparedEpoch) -> float:
     return abs(acceleration_late_s(drive, 1.0 / rig.tick_rate_hz))
 
 
-def with_torque_delay(prepared: PreparedEpoch, fit: Fit, delays: Sequence[Delay]) -> Fit:
-    """Return the fit with the finding, if a delay moves J or B by more than half their intervals.
+def torque_delay(case: Case) -> Look | None:
+    """Return how late the torque is, in ms, where that moves J or B by more than half an interval.
 
-    Parameters
-    ----------
-    prepared : PreparedEpoch
-    fit : Fit
-        Of the epoch. Where the perturbation is known, nothing is added.
-    delays : sequence of Delay
-        Of all sources.
+    None where nothing is known of it, where it was taken out, and where the perturbation is known.
     """
-    found = _torque_delay(prepared, fit, delays) if closed_loop_obstacle(prepared.epoch) else ()
-    return replace(fit, findings=(*fit.findings, *found)) if found else fit
-
-
-def _torque_delay(
-    prepared: PreparedEpoch, fit: Fit, delays: Sequence[Delay]
-) -> tuple[Finding, ...]:
-    delay = next((delay for delay in delays if delay.source == fit.source), None)
-    if delay is None or delay.corrected or not fit.n_samples:
-        return ()
+    delay, prepared = case.delay, case.prepared
+    if delay is None or delay.corrected or prepared is None:
+        return None
     late_s = abs(delay.delay_s)
-    if not late_s > delay_of_drive_s(prepared) + SIGNIFICANT * delay.delay_s_se:
-        return ()
-    _, B, K = fit.value
+    known = not closed_loop_obstacle(case.epoch)
+    if known or not late_s > delay_of_drive_s(prepared) + SIGNIFICANT * delay.delay_s_se:
+        return None
+    _, B, K = case.parameters
     # Of a late torque J is B τ too low and B is K τ.
     bias = np.array([-abs(B), -abs(K), 0.0]) * delay.delay_s
-    half = half_widths(fit)
-    share = float(np.max(np.abs(bias) / half))
-    if share <= 1.0:
-        return ()
-    late_ms, most_ms = 1e3 * delay.delay_s, 1e3 * late_s / share
-    return (
-        found(
-            "torque_delay",
-            prepared.settings.diagnostics,
-            abs(late_ms),
-            most_ms,
-            condition=fit.condition,
-            effect=Effect.of(bias, fit.value, half),
-            facts={"late_ms": late_ms},
-        ),
-    )
+    effect = Effect.of(bias, case.parameters, case.half_widths)
+    share = float(np.max(np.abs(bias) / case.half_widths))
+    most_ms, facts = 1e3 * late_s / share, {"late_ms": 1e3 * delay.delay_s}
+    return Look(1e3 * late_s, most_ms, share > 1.0, facts, effect=effect)
+
+
+DELAY_CHECKS = (Check("torque_delay", (), torque_delay),)

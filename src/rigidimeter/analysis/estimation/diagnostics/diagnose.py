@@ -14,7 +14,10 @@ from rigidimeter.analysis.estimation.diagnostics.computed_torque_checks import (
     COMPUTED_TORQUE_CHECKS,
     STATIC_TORQUE_CHECKS,
 )
-from rigidimeter.analysis.estimation.diagnostics.controller_checks import CONTROLLER_CHECKS
+from rigidimeter.analysis.estimation.diagnostics.controller_checks import (
+    CONTROLLER_CHECKS,
+)
+from rigidimeter.analysis.estimation.diagnostics.delay_check import DELAY_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.least_squares_checks import (
@@ -31,7 +34,7 @@ from rigidimeter.analysis.estimation.methods import method_named
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.core.findings import Finding
-from rigidimeter.core.records import Fit, Outcome
+from rigidimeter.core.records import Delay, Fit, Outcome
 from rigidimeter.core.units import rad_from_deg
 
 CHECKS: list[Check] = [
@@ -48,6 +51,7 @@ CHECKS: list[Check] = [
     *VARYING_CHECKS,
     *PARAMETER_CHECKS,
     *CONTROLLER_CHECKS,
+    *DELAY_CHECKS,
 ]
 """Every check of an epoch. Code from outside the package may append its own."""
 
@@ -73,7 +77,12 @@ def diagnose(
 
 
 def checked(
-    prepared: PreparedEpoch, fit: Fit, *, exclusions_alone: bool = False, by_noise: bool = True
+    prepared: PreparedEpoch,
+    fit: Fit,
+    delays: Sequence[Delay] = (),
+    *,
+    exclusions_alone: bool = False,
+    by_noise: bool = True,
 ) -> Fit:
     """Return the fit with what the checks found, excluded if one of them says so.
 
@@ -81,6 +90,8 @@ def checked(
     ----------
     prepared : PreparedEpoch
     fit : Fit
+    delays : sequence of Delay
+        Of the torque of all sources.
     exclusions_alone : bool
         Run those checks alone that may exclude the epoch.
     by_noise : bool
@@ -96,6 +107,7 @@ def checked(
         method=method,
         unbiased=None if method.uses_perturbation else unbiased(prepared, fit, by_noise),
         bias_in_interval=by_noise,
+        delay=next((delay for delay in delays if delay.source == fit.source), None),
     )
     levels = case.settings.levels
     checks = [c for c in CHECKS if not exclusions_alone or levels.of(c.name) == "exclude"]
