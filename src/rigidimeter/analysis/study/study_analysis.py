@@ -299,11 +299,12 @@ def _analysed(
     across = [
         replace(finding, condition=where, facts={**finding.facts, "subject": subject})
         for subject, part in parts.items()
+        for carried in [{(one.name, one.level) for fit in part.fits for one in fit.findings}]
         for where, finding in (
             *((fit.condition, one) for fit in part.pooled for one in fit.findings),
             *((one.condition, one) for one in part.across),
         )
-        if finding.level != "note"
+        if finding.level != "note" and (finding.name, finding.level) not in carried
     ]
     reasons = dict.fromkeys([reason, *(part.method_reason for part in parts.values())])
     fits = [fit for part in parts.values() for fit in part.fits]

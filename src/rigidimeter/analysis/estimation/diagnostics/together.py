@@ -44,7 +44,7 @@ from rigidimeter.analysis.estimation.method_record import Method
 from rigidimeter.analysis.estimation.methods import method_named
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array
-from rigidimeter.core.findings import Finding
+from rigidimeter.core.findings import Effect, Finding
 from rigidimeter.core.records import BandEstimate, Fit
 from rigidimeter.core.settings import DiagnosticsSettings
 
@@ -100,11 +100,9 @@ def checked_together(
             for one in (*of_condition[fit.condition], *bands)
         ]
 
-    return Together(
-        [_with(fit, shared(fit)) if fit.outcome.included else fit for fit in fits],
-        [_with(fit, [*shared(fit), *_pooled_bias(fit, counting, estimator)]) for fit in pooled],
-        sensitivity,
-    )
+    alone = [_with(fit, shared(fit)) if fit.outcome.included else fit for fit in fits]
+    own = [_with(fit, [*shared(fit), *_pooled_bias(fit, counting, estimator)]) for fit in pooled]
+    return Together(alone, [_with(fit, _of_every(fit, alone)) for fit in own], sensitivity)
 
 
 def in_bands(observed: Sequence[Member]) -> tuple[Array, list[BandChange]]:
@@ -248,6 +246,25 @@ def _pooled_bias(
             "loop_bias", settings, look.value, look.limit, effect=look.effect, variant=look.variant
         )
     ]
+
+
+def _of_every(pool: Fit, fits: Sequence[Fit]) -> list[Finding]:
+    """Return what casts doubt on every epoch of a pool, and is not said of the pool yet.
+
+    What all epochs share does not average out: the effect on the pool is the mean of theirs.
+    """
+    own = [fit for fit in fits if fit.outcome.included and pool.condition in ("", fit.condition)]
+    doubts = [{one.name: one for one in fit.findings if one.level != "note"} for fit in own]
+    said = {one.name for one in pool.findings}
+    common = []
+    for name in doubts[0] if doubts else ():
+        shown = [one[name] for one in doubts if name in one]
+        if len(shown) == len(own) and name not in said:
+            J, B, K = np.mean([one.effect.percent for one in shown], axis=0).tolist()
+            most = max(shown, key=lambda one: abs(one.value - one.limit))
+            labels, effect = tuple(fit.epoch for fit in own), Effect((J, B, K))
+            common.append(replace(most, epochs=labels, condition=pool.condition, effect=effect))
+    return common
 
 
 def _with(fit: Fit, findings: Sequence[Finding]) -> Fit:

@@ -38,6 +38,7 @@ def test_a_delay_that_is_not_corrected_is_said_where_it_matters(name, late_ms, r
         assert found == []
         return
     (finding,) = found
+    assert "torque_delay" in {one.name for one in analysis.pooled[0].findings}
     assert finding.level == "caution"
     assert finding.value == pytest.approx(late_ms, rel=0.1)
     # B τ off J is less than half its interval below that delay.

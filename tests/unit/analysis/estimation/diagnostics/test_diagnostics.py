@@ -11,7 +11,9 @@ from tests.unit.analysis.estimation.diagnostics.sound_epoch import (
     T,
     assert_failed,
     passed,
+    perturbed,
     sound,
+    with_channel,
 )
 
 from rigidimeter.analysis.estimation.diagnostics import (
@@ -29,6 +31,7 @@ from rigidimeter.analysis.estimation.diagnostics.fit_checks import (
 )
 from rigidimeter.analysis.estimation.diagnostics.movement_checks import active_movement
 from rigidimeter.analysis.estimation.found import found
+from rigidimeter.analysis.study import estimate
 from rigidimeter.core.findings import KINDS, Kind, explained
 from rigidimeter.core.records import Channel
 
@@ -105,6 +108,29 @@ def test_a_check_from_outside_brings_its_kind(sound, monkeypatch):
     assert (seen["loud"].level, seen["loud"].unit) == ("exclude", "N·m")
     assert seen["loud"].remedy == "Push less."
     assert "never" not in seen
+
+
+@pytest.mark.parametrize("late", [(2,), (2, 2), (0, 2)])
+def test_what_all_epochs_share_is_said_of_their_pool_too(late):
+    """A velocity 10 ms late takes K τ off B of each epoch, which does not average out."""
+    epochs = []
+    for seed, samples in enumerate(late):
+        epoch = replace(perturbed(seed), label=str(seed))
+        velocity = np.roll(epoch.channels["velocity_rad_s"].values, samples)
+        epochs.append(with_channel(epoch, "velocity_rad_s", velocity))
+    analysis = estimate(epochs, "iv")
+    own, (pool,) = analysis.fits, analysis.pooled
+    found = [one for one in pool.findings if one.name == "velocity_delay"]
+    if not all(late):
+        assert found == []
+        return
+    (finding,) = found
+    of_each = [one for fit in own for one in fit.findings if one.name == "velocity_delay"]
+    assert finding.value == max(one.value for one in of_each)
+    assert finding.epochs == tuple(fit.epoch for fit in own)
+    assert finding.effect.percent == pytest.approx(np.mean([o.effect.percent for o in of_each], 0))
+    percent, half = np.array(finding.effect)
+    np.testing.assert_allclose(half, percent / 50 * pool.value / (pool.high - pool.low), rtol=1e-9)
 
 
 def test_sentences_of_findings_hold_for_an_axis_on_a_bench_too():
