@@ -116,7 +116,7 @@ def _estimate(source: str, epochs: Sequence[PreparedEpoch]) -> Delay:
                 "(estimation.max_delay_s)",
             )
         found = Delay(source, total_s, error_s)
-        if not _matters(total_s, error_s):
+        if not matters(total_s, error_s):
             return replace(found, remark="not corrected: not significantly different from zero")
     except ValueError as error:
         return Delay(source, remark=f"the delay of the torque was not estimated: {error}")
@@ -180,7 +180,7 @@ def _settled(
     for _ in range(ROUNDS):
         fit = left_after(total_s, begin)
         left_s, error_s = float(fit.values[-1]), float(fit.standard_errors[-1])
-        if near is None and not (perturbed or tried or _matters(left_s, error_s)):
+        if near is None and not (perturbed or tried or matters(left_s, error_s)):
             return left_s, error_s, fit.values[:-1]  # least squares shows it without a move
         begin = fit.values if abs(left_s) < IN_VALLEY_S else None
         stretch = 1.0
@@ -210,7 +210,8 @@ def _settled(
     return total_s, error_s, fit.values[:-1]
 
 
-def _matters(delay_s: float, error_s: float) -> bool:
+def matters(delay_s: float, error_s: float) -> bool:
+    """Return whether a delay is significant, and long enough to be worth a shift."""
     return abs(delay_s) >= max(SIGNIFICANT * error_s, LEAST_S)
 
 

@@ -13,7 +13,8 @@ them, but by pooling sources.
 At the ticks the acceleration alone is late: hardly with a drive of velocity, by half a tick T/2
 with a motor that holds its torque between them. Where the drive is not known, that much of a delay
 that was taken out may have been the acceleration's. Then velocity and angle are δ too early, and
-J is B δ too high and B is K δ. Every δ from 0 to T/2 is as likely.
+J is B δ too high and B is K δ. Every δ from 0 to T/2 is as likely. A delay within T/2 that was not
+taken out may be all the acceleration's, or the torque's, and then J is B δ too low and B is K δ.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
+from rigidimeter.analysis.estimation.alignment import SIGNIFICANT, matters
 from rigidimeter.analysis.estimation.method_record import FitEpochs
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch, drive_followed
 from rigidimeter.analysis.estimation.signals import Array
@@ -52,10 +54,12 @@ def with_clock_error(
     delays : sequence of Delay
         Where one was corrected, its standard error counts: of two clocks, in place of the offset's.
     """
-    corrected = {delay.source: delay.delay_s_se for delay in delays if delay.corrected}
+    alone, pooled = found
     sources = [one.epoch.source for one in epochs]
+    corrected = {delay.source: delay.delay_s_se for delay in delays if delay.corrected}
     errors_s = [corrected.get(one.epoch.source, one.epoch.clock_error_s) for one in epochs]
-    if not any(errors_s):
+    by_drive = [_of_drive(one, own, delays) for one, own in zip(epochs, alone, strict=True)]
+    if not (any(errors_s) or np.any(by_drive)):
         return found
     early, late = (
         fit(
@@ -67,14 +71,11 @@ def with_clock_error(
             lambda _: None,
             False,
         )[0]
+        if any(errors_s)
+        else alone
         for sign in (1.0, -1.0)
     )
-    alone, pooled = found
     by_error = [(one.value - other.value) / 2 for one, other in zip(early, late, strict=True)]
-    by_drive = [
-        _of_drive(one, own) if one.epoch.source in corrected else np.zeros(3)
-        for one, own in zip(epochs, alone, strict=True)
-    ]
     return (
         [_widened(own, both) for own, *both in zip(alone, by_error, by_drive, strict=True)],
         [
@@ -88,13 +89,17 @@ def with_clock_error(
     )
 
 
-def _of_drive(prepared: PreparedEpoch, fit: Fit) -> Array:
+def _of_drive(prepared: PreparedEpoch, fit: Fit, delays: Sequence[Delay]) -> Array:
     """Return what the standard error of δ changes; nothing where the drive is known."""
-    if drive_followed(prepared):
-        return np.zeros(3)
-    delay_s = 0.5 / prepared.settings.rig.tick_rate_hz / math.sqrt(3.0)
+    half_tick_s, most_s = 0.5 / prepared.settings.rig.tick_rate_hz, 0.0
+    for delay in () if drive_followed(prepared) else delays:
+        if delay.source == fit.source and delay.corrected:
+            most_s = half_tick_s
+        elif delay.source == fit.source and matters(delay.delay_s, delay.delay_s_se):
+            within = 0.0 < delay.delay_s < half_tick_s + SIGNIFICANT * delay.delay_s_se
+            most_s = delay.delay_s if within else 0.0
     _, B, K = fit.value
-    return np.where(fit.se > 0, np.array([B, K, 0.0]) * delay_s, 0.0)
+    return np.where(fit.se > 0, np.array([B, K, 0.0]) * most_s / math.sqrt(3.0), 0.0)
 
 
 def _changes_of_sources(

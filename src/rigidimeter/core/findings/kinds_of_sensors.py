@@ -173,9 +173,8 @@ SENSOR_KINDS = (
         "torque_delay",
         "delay of the torque against the motion that was found and not corrected, in ms, where the "
         "perturbation was not recorded and the delay would move J (by B τ) or B (by K τ) by more "
-        "than half their intervals. Where no drive was identified either, not up to three standard "
-        "errors beyond the delay of the acceleration at the ticks with the drive of the settings, "
-        "ζ ω₀ T²/6",
+        "than half their intervals, which hold a delay up to half a tick where no drive was "
+        "identified either",
         headline="Torque is {late_ms:.3g} ms late: {changes}",
         measured="The torque is {late_ms:.3g} ms late against the motion (at most {limit:.2g} ms "
         "either way), which was not corrected.",

@@ -108,6 +108,16 @@ def test_of_a_corrected_delay_its_own_error_counts(clock_error_s):
     assert added == pytest.approx(late_s * DAMPING_NM_S_RAD, rel=0.05)
 
 
+@pytest.mark.parametrize(("delay_s", "its"), [(0.0004, True), (0.0008, False), (-0.0004, False)])
+def test_a_delay_within_half_a_tick_that_was_not_corrected_may_be_the_drives(delay_s, its):
+    """Or the torque's: B τ off J, and K τ off B. A longer one is neither, and has its finding."""
+    delay = Delay("r", delay_s, 1e-5)
+    ((plain,), _), ((wide,), _) = fits([epoch()], delays=[delay])
+    added = np.sqrt(np.diag(wide.covariance - plain.covariance))
+    bias = delay_s / np.sqrt(3) * np.array([plain.value[1], plain.value[2], 0.0]) * its
+    np.testing.assert_allclose(added, bias, rtol=1e-6)
+
+
 def test_estimate_contains_it_in_both_stages():
     plain, wide = (estimate([epoch(error_s)], "bandlimited") for error_s in (0.0, ERROR_S))
     for stage in ("fits", "fixed_inertia"):

@@ -55,19 +55,24 @@ def test_of_arrays_it_is_said_as_of_a_file():
     assert "torque_delay" in {finding.name for finding in fit.findings}
 
 
-@pytest.mark.parametrize("method", ["iv", "bandlimited"])
-def test_a_motor_that_holds_its_torque_is_within_the_intervals_of_a_late_torque(method):
-    """There the acceleration alone is late, by half a tick: J is 1.5 % high and B 0.6 %."""
-    scenario = SCENARIOS["torque motor, torque 2 ms late"]
+@pytest.mark.parametrize(
+    ("method", "late_ms", "corrected"),
+    [("iv", 2.0, True), ("bandlimited", 2.0, True), ("bandlimited", 0.0, False)],
+)
+def test_a_motor_that_holds_its_torque_is_within_the_intervals(method, late_ms, corrected):
+    """There the acceleration alone is late, by half a tick: corrected, J is 1.5 % high, B 0.6 %."""
+    late = f", torque {late_ms:.0f} ms late" if late_ms else ""
+    scenario = SCENARIOS[f"torque motor{late}"]
     epochs, truth = scenario.simulated(0, 2)
     if method == "bandlimited":
         epochs = [measured_alone(epoch) for epoch in epochs]
     analysis = estimate(epochs, method, settings=scenario.analysed_with())
-    assert analysis.delays[0].corrected
-    assert analysis.delays[0].delay_s == pytest.approx(0.0025, abs=1e-4)
+    assert analysis.delays[0].corrected == corrected
+    assert analysis.delays[0].delay_s == pytest.approx(1e-3 * late_ms + 0.0005, abs=1e-4)
     for fit in (*analysis.fits, analysis.pooled[-1]):
         assert np.all((fit.low <= truth[0]) & (truth[0] <= fit.high))
         np.testing.assert_allclose(fit.value, truth[0], rtol=0.02)
+        assert not fit.findings
 
 
 @pytest.mark.parametrize("name", ["drive PI 20 Hz with load", "drive PI 30 Hz, 500/s"])
