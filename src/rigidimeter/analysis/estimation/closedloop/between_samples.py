@@ -165,18 +165,6 @@ def acceleration_seen(drive: DriveModel, interval_s: float, times_s: Array) -> f
     return float((seen * turn / (1j * omega * velocity)).real.item())
 
 
-def acceleration_late_s(drive: DriveModel, interval_s: float) -> float:
-    """Return how late the acceleration at the ticks is against the slope of the velocity there.
-
-    Before its edge a command has not come yet, so the acceleration A at the ticks is that of the
-    command before. At low frequency A/(jω V) is a gain and a delay; the delay of a drive of second
-    order that is slow against the ticks is ζ ω₀ T²/6.
-    """
-    omega = np.array([LOW / interval_s])
-    acceleration, velocity, _ = drive.transfer(np.exp(1j * omega * interval_s), interval_s)
-    return float(-np.angle(acceleration / (1j * omega * velocity)).item() / omega.item())
-
-
 def acceleration_beyond_slope(
     rig: RigSettings, torque_filter: TorqueFilter | None, omega_rad_s: Array
 ) -> Complex:
