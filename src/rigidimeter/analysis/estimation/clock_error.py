@@ -14,7 +14,7 @@ At the ticks the acceleration alone is late: hardly with a drive of velocity, by
 with a motor that holds its torque between them. Where the drive is not known, that much of a delay
 that was taken out may have been the acceleration's. Then velocity and angle are δ too early, and
 J is B δ too high and B is K δ. Every δ from 0 to T/2 is as likely. A delay within T/2 that was not
-taken out may be all the acceleration's, or the torque's, and then J is B δ too low and B is K δ.
+taken out may be all the acceleration's or all the torque's, so it is an offset as well.
 """
 
 from __future__ import annotations
@@ -54,12 +54,12 @@ def with_clock_error(
     delays : sequence of Delay
         Where one was corrected, its standard error counts: of two clocks, in place of the offset's.
     """
-    alone, pooled = found
+    of = {delay.source: delay for delay in delays}
     sources = [one.epoch.source for one in epochs]
-    corrected = {delay.source: delay.delay_s_se for delay in delays if delay.corrected}
-    errors_s = [corrected.get(one.epoch.source, one.epoch.clock_error_s) for one in epochs]
-    by_drive = [_of_drive(one, own, delays) for one, own in zip(epochs, alone, strict=True)]
-    if not (any(errors_s) or np.any(by_drive)):
+    own = [of.get(source, Delay(source)) for source in sources]
+    moved = [delay.corrected for delay in own]
+    errors_s = [_error_s(one, delay) for one, delay in zip(epochs, own, strict=True)]
+    if not any(errors_s):
         return found
     early, late = (
         fit(
@@ -71,11 +71,14 @@ def with_clock_error(
             lambda _: None,
             False,
         )[0]
-        if any(errors_s)
-        else alone
         for sign in (1.0, -1.0)
     )
+    alone, pooled = found
     by_error = [(one.value - other.value) / 2 for one, other in zip(early, late, strict=True)]
+    by_drive = [
+        _of_drive(one, own) if there else np.zeros(3)
+        for one, own, there in zip(epochs, alone, moved, strict=True)
+    ]
     return (
         [_widened(own, both) for own, *both in zip(alone, by_error, by_drive, strict=True)],
         [
@@ -89,17 +92,23 @@ def with_clock_error(
     )
 
 
-def _of_drive(prepared: PreparedEpoch, fit: Fit, delays: Sequence[Delay]) -> Array:
+def _error_s(prepared: PreparedEpoch, delay: Delay) -> float:
+    """Return the standard error of the offset between torque and motion, in s."""
+    late_s, error_s = delay.delay_s, delay.delay_s_se
+    if delay.corrected:
+        return error_s
+    most_s = 0.5 / prepared.settings.rig.tick_rate_hz + SIGNIFICANT * error_s
+    unknown = matters(late_s, error_s) and 0.0 < late_s < most_s and not drive_followed(prepared)
+    return max(prepared.epoch.clock_error_s, late_s / math.sqrt(3.0) if unknown else 0.0)
+
+
+def _of_drive(prepared: PreparedEpoch, fit: Fit) -> Array:
     """Return what the standard error of δ changes; nothing where the drive is known."""
-    half_tick_s, most_s = 0.5 / prepared.settings.rig.tick_rate_hz, 0.0
-    for delay in () if drive_followed(prepared) else delays:
-        if delay.source == fit.source and delay.corrected:
-            most_s = half_tick_s
-        elif delay.source == fit.source and matters(delay.delay_s, delay.delay_s_se):
-            within = 0.0 < delay.delay_s < half_tick_s + SIGNIFICANT * delay.delay_s_se
-            most_s = delay.delay_s if within else 0.0
+    if drive_followed(prepared):
+        return np.zeros(3)
+    delay_s = 0.5 / prepared.settings.rig.tick_rate_hz / math.sqrt(3.0)
     _, B, K = fit.value
-    return np.where(fit.se > 0, np.array([B, K, 0.0]) * most_s / math.sqrt(3.0), 0.0)
+    return np.where(fit.se > 0, np.array([B, K, 0.0]) * delay_s, 0.0)
 
 
 def _changes_of_sources(

@@ -172,7 +172,7 @@ SENSOR_KINDS = (
     Kind(
         "torque_delay",
         "delay of the torque against the motion that was found and not corrected, in ms, where the "
-        "perturbation was not recorded and the delay would move J (by B τ) or B (by K τ) by more "
+        "perturbation was not recorded and a move of the torque by it changes J, B or K by more "
         "than half their intervals, which hold a delay up to half a tick where no drive was "
         "identified either",
         headline="Torque is {late_ms:.3g} ms late: {changes}",

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from tests.scenarios.catalogue import SCENARIOS
 from tests.scenarios.recordings import measured_alone
+from tests.scenarios.scenario import scenario
 
+from rigidimeter.analysis.estimation.prepared import torque_earlier
 from rigidimeter.analysis.reading import identify
 from rigidimeter.analysis.study import estimate
 
@@ -31,9 +33,24 @@ def test_a_delay_that_is_not_corrected_is_said_where_it_matters(name, late_ms, r
     assert "torque_delay" in {one.name for one in analysis.pooled[0].findings}
     assert finding.level == "caution"
     assert finding.value == pytest.approx(late_ms, rel=0.1)
-    # B τ off J is less than half its interval below that delay.
-    J = analysis.fits[0]
-    assert finding.limit <= 1e3 * 0.5 * (J.high[0] - J.low[0]) / J.value[1] * 1.001
+    assert max(np.abs(finding.effect.half_intervals)) == pytest.approx(
+        finding.value / finding.limit, rel=1e-3
+    )
+
+
+@pytest.mark.parametrize("subject", [{}, {"tremor_nm": 1.0}])
+def test_its_effect_is_what_a_move_of_the_torque_changes(subject):
+    """Under tremor weights move B of a torque 2 ms late by +30 %, where K τ is 3 % of it."""
+    uncorrected = {"estimation": {"correct_delay": False}}
+    late = scenario("late", subject=subject, torque={"late_s": 0.002}, settings=uncorrected)
+    (epoch,), _ = late.simulated(0, 1)
+    first = estimate([measured_alone(epoch)], "bandlimited", settings=late.analysed_with())
+    earlier = torque_earlier(measured_alone(epoch), first.delays[0].delay_s)
+    then = estimate([earlier], "bandlimited", settings=late.analysed_with())
+    (fit,), (moved,) = first.fits, then.fits
+    (finding,) = [one for one in fit.findings if one.name == "torque_delay"]
+    changed = 100 * (1 - moved.value / fit.value)
+    np.testing.assert_allclose(finding.effect.percent, changed, rtol=0.1, atol=0.3)
 
 
 def test_of_arrays_it_is_said_as_of_a_file():
