@@ -85,19 +85,21 @@ class OmittedTerm(NamedTuple):
     inner: tuple[float, ...] = ()
 
     def torque(self, beyond: BeyondLinear) -> Array:
-        """Return its torque in time, shape (n,), in N·m, its linear part included."""
-        term = term_named(self.name)
+        """Return its torque in time, shape (n,), in N·m, its linear part included.
+
+        B is the mean over both directions of motion, so of damping in one |θ'|/2 is beside it.
+        """
+        term, motion = term_named(self.name), beyond.motion
         if term is not None:
-            return self.value * term.regressor(beyond.motion)
+            both = 0.5 * motion.velocity_rad_s if self.name == "damping+" else 0.0
+            return np.asarray(self.value * (term.regressor(motion) - both))
         stretch, inner = stretch_velocity(beyond.motion, self.name), np.asarray(self.inner)
         passed = pass_through(stretch, beyond.motion.rate_hz, kernel(self.name), inner)
         return self.value * passed[0]
 
     def lines(self, beyond: BeyondLinear) -> Complex:
         """Return the lines of its torque, shape (m,)."""
-        if self.name in REFLEXES:
-            return beyond.lines(self.torque(beyond))
-        return np.asarray(self.value * beyond.term_lines(self.name)[:, 0])
+        return beyond.lines(self.torque(beyond))
 
 
 class _Found(NamedTuple):
