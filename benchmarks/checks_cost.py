@@ -62,7 +62,7 @@ def inputs(count: int) -> dict[str, list[Epoch]]:
 def no_checks() -> Iterator[None]:
     """Let an analysis pass over every check."""
 
-    def fit_alone(_: object, fit: object, **__: object) -> object:
+    def fit_alone(_: object, fit: object, *_other: object, **__: object) -> object:
         return fit
 
     def fits_alone(_: object, fits: list[Fit], pooled: list[Fit], *__: object) -> Together:
