@@ -40,6 +40,8 @@ def _subject() -> Iterator[Scenario]:
         yield scenario(f"voluntary {torque_nm} N·m", OWN, subject={"voluntary_nm": torque_nm})
     skirts = {"voluntary_nm": 0.2, "voluntary_skirts": True}
     yield scenario("voluntary 0.2 N·m, soft skirts", OWN, subject=skirts)
+    wide = {"voluntary_nm": 0.5, "voluntary_hz": (0.3, 30.0)}
+    yield scenario("voluntary 0.5 N·m, 0.3 to 30 Hz", OWN, subject=wide)
     yield another(
         "resists after 0.5 s, 0.5 N·m/rad",
         (*TERM, *OWN),
