@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from markupsafe import Markup
 
-from rigidimeter.analysis.report import shown_tables, source_names
+from rigidimeter.analysis import report  # what is taken from it is imported when it is used
 from rigidimeter.analysis.study import StudyResult, difference_cells, lead, statements
 from rigidimeter.cli.terminal_tables import Block, Heading, Table, paragraph, shown_table
 from rigidimeter.core.records import Analysis
@@ -130,8 +130,8 @@ def two_lines(*texts: str) -> str:
 
 def full_blocks(found: StudyResult, *, by_epoch: bool = False) -> Iterator[Block]:
     """Yield the tables of the report; with `by_epoch` also those with a row for each epoch."""
-    names = source_names(found)
-    for table in shown_tables(found):
+    names = report.source_names(found)
+    for table in report.shown_tables(found):
         if by_epoch or not (table.folding and any(c.name == "epoch" for c in table.columns)):
             yield from ("", Heading(table.title), shown_table(table, names))
             if table.note:

@@ -123,7 +123,7 @@ def _together(result: StudyResult, factors: Sequence[float]) -> Iterator[Sequenc
             value, low, high = (factor * size for size in (one.value, one.low, one.high))
             places = decimals((high - low) / 2, value)
             interval = f"{fixed(low, places)} to {fixed(high, places)}"
-            scatter = "–" if math.isnan(one.sd_percent) else f"{one.sd_percent:.2g} %"
+            scatter = f"{number(one.sd_percent, 2)} %" if one.sd_percent >= 0 else "–"
             known = "–" if math.isnan(low) else interval
             cells.append((fixed(value, places), known, scatter))
         values, intervals, scatters = zip(*cells, strict=True)
