@@ -98,6 +98,20 @@ def test_motion_above_the_band_is_told_and_noise_of_the_encoder_is_none(sound, h
     assert (without.failed, found.failed) == (told, told)
 
 
+@pytest.mark.parametrize("hum_hz", [40.0, 60.0, 90.0])
+def test_hum_of_the_mains_is_no_white_noise(sound, hum_hz):
+    epoch, signals, _ = sound
+    torque = epoch.channels["torque_nm"].values
+    hum = np.std(torque) * np.sin(2 * np.pi * hum_hz * T)
+    found = [
+        band_share(with_channel(epoch, "torque_nm", torque + size * hum), signals, SETTINGS)
+        for size in (1.5, 3.0)
+    ]
+    assert_failed(found[0], signal="torque")
+    # The share falls with v + a²/2: v is 1, the variance, less what of it counts as white noise.
+    assert (1 + 4.5) / (1 + 1.125) < found[0].value / found[1].value < 4.0
+
+
 @pytest.mark.parametrize("duration_s", [8.0, 10.0, 12.0, 15.0, 20.0])
 @pytest.mark.parametrize("phase", [0.0, 1.0, 2.0])
 def test_the_slowest_line_of_a_perturbation_is_no_drift(sound, duration_s, phase):
