@@ -179,10 +179,10 @@ def _as_told(epoch: Epoch, channel: Channel, start: int, stop: int, within_s: fl
     causes = [epoch.channels[name] for name in CAUSES if name in epoch.channels]
     if all(_keeps(cause, start_s, stop_s, 0.0, moving_most_s) for cause in causes):
         return True
-    inside = command.values[(command.time_s >= start_s) & (command.time_s <= stop_s)]
+    inside = _within(command, start_s, stop_s)
     if channel.name != "velocity_rad_s" or inside.size == 0:
         return False
-    told, largest = float(np.median(inside)), float(np.max(np.abs(command.values)))
+    told, largest = float(np.median(inside)), _largest(command)
     obeyed = abs(channel.values[start] - told) <= NEAR * largest and abs(told) > NEAR * largest
     return obeyed and _keeps(command, start_s, stop_s, told, moving_most_s)
 
@@ -191,8 +191,17 @@ def _keeps(
     cause: Channel, start_s: float, stop_s: float, level: float, other_most_s: float
 ) -> bool:
     """Return whether a cause has a level in a stretch, except for a time."""
-    inside = (cause.time_s >= start_s) & (cause.time_s <= stop_s)
-    if not np.any(inside):
+    inside = _within(cause, start_s, stop_s)
+    if inside.size == 0:
         return False
-    other = np.abs(cause.values[inside] - level) > ZERO * float(np.max(np.abs(cause.values)))
+    other = np.abs(inside - level) > ZERO * _largest(cause)
     return float(np.count_nonzero(other)) / cause.mean_rate_hz <= other_most_s
+
+
+def _within(channel: Channel, start_s: float, stop_s: float) -> NDArray[np.float64]:
+    first = np.searchsorted(channel.time_s, start_s)
+    return channel.values[first : np.searchsorted(channel.time_s, stop_s, side="right")]
+
+
+def _largest(channel: Channel) -> float:
+    return max(float(np.max(channel.values)), -float(np.min(channel.values)))
