@@ -22,11 +22,7 @@ from rigidimeter.analysis.estimation.closedloop.linear_problems import (
     instrumental,
     least_squares_start,
 )
-from rigidimeter.analysis.estimation.closedloop.observation import (
-    motion_of,
-    observe,
-    observe_motion,
-)
+from rigidimeter.analysis.estimation.closedloop.observe import motion_of, observe, observe_motion
 from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
 from rigidimeter.analysis.estimation.closedloop.refine import LineFit
 from rigidimeter.analysis.estimation.method_record import Progress
@@ -117,7 +113,9 @@ def _estimate(source: str, epochs: Sequence[PreparedEpoch]) -> Delay:
             )
         found = Delay(source, total_s, error_s)
         if not matters(total_s, error_s):
-            return replace(found, remark="not corrected: not significantly different from zero")
+            least_ms = f"{1e3 * LEAST_S:g} ms"
+            why = f"shorter than {least_ms} or not significantly different from zero"
+            return replace(found, remark=f"not corrected: {why}")
     except ValueError as error:
         return Delay(source, remark=f"the delay of the torque was not estimated: {error}")
     halves = [_in_half_the_band(one) for one in used]

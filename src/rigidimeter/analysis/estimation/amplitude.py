@@ -6,12 +6,13 @@ Hunter 1982), so a K is compared with another at the same amplitude only.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines
+from rigidimeter.analysis.estimation.closedloop.observation import Observation
 from rigidimeter.analysis.estimation.signals import Array, Signals
 from rigidimeter.analysis.estimation.stretches import sound
 from rigidimeter.core.records import Epoch, Fit
@@ -33,13 +34,13 @@ class Amplitude(NamedTuple):
     angle_range_rad: float
 
 
-def amplitude_of_lines(epoch: Epoch, lines: Lines) -> Amplitude:
+def amplitude_of_lines(epoch: Epoch, seen: Observation) -> Amplitude:
     """Return the amplitude of an epoch that was fitted at its lines.
 
     The RMS is weighted by the square of the window, by Parseval's theorem.
     """
-    grid = lines.grid
-    power = float(np.sum(np.abs(lines.motion[:, 2]) ** 2))
+    grid, angle = seen.grid, seen.motion[:, 2]
+    power = float(np.vdot(angle, angle).real)
     rms_rad = float(np.sqrt(2 * power / (grid.time_s.size * grid.energy)))
     return Amplitude(rms_rad, _range_rad(epoch, grid.time_s))
 
@@ -54,9 +55,9 @@ def amplitude_together(amplitudes: Sequence[Amplitude | Fit], samples: Sequence[
 
     The RMS over all of their samples, each epoch about its own mean, and the largest of the ranges.
     """
-    power = np.average([one.angle_rms_rad**2 for one in amplitudes], weights=samples)
-    ranges_rad = [one.angle_range_rad for one in amplitudes if np.isfinite(one.angle_range_rad)]
-    return Amplitude(float(np.sqrt(power)), max(ranges_rad, default=np.nan))
+    power = sum(n * one.angle_rms_rad**2 for one, n in zip(amplitudes, samples, strict=True))
+    ranges_rad = [one.angle_range_rad for one in amplitudes if math.isfinite(one.angle_range_rad)]
+    return Amplitude(math.sqrt(power / sum(samples)), max(ranges_rad, default=np.nan))
 
 
 def _range_rad(epoch: Epoch, time_s: Array) -> float:
@@ -65,5 +66,7 @@ def _range_rad(epoch: Epoch, time_s: Array) -> float:
         return np.nan
     first, stop = np.searchsorted(angle.time_s, (time_s[0], time_s[-1]), side="left")
     used = slice(int(first), int(stop) + 1)
-    values = angle.values[used][sound(epoch, angle.time_s[used])]
+    values = angle.values[used]
+    if epoch.left_out:
+        values = values[sound(epoch, angle.time_s[used])]
     return float(np.ptp(values)) if values.size else np.nan

@@ -57,7 +57,6 @@ def with_clock_error(
     of = {delay.source: delay for delay in delays}
     sources = [one.epoch.source for one in epochs]
     own = [of.get(source, Delay(source)) for source in sources]
-    moved = [delay.corrected for delay in own]
     errors_s = [_error_s(one, delay) for one, delay in zip(epochs, own, strict=True)]
     if not any(errors_s):
         return found
@@ -76,8 +75,8 @@ def with_clock_error(
     alone, pooled = found
     by_error = [(one.value - other.value) / 2 for one, other in zip(early, late, strict=True)]
     by_drive = [
-        _of_drive(one, own) if there else np.zeros(3)
-        for one, own, there in zip(epochs, alone, moved, strict=True)
+        _of_drive(one, fit_alone) if delay.corrected else np.zeros(3)
+        for one, fit_alone, delay in zip(epochs, alone, own, strict=True)
     ]
     return (
         [_widened(own, both) for own, *both in zip(alone, by_error, by_drive, strict=True)],

@@ -11,7 +11,7 @@ from rigidimeter.analysis.estimation.closedloop.line_methods import (
     IV,
     SPECTRAL,
 )
-from rigidimeter.analysis.estimation.closedloop.observation import observe
+from rigidimeter.analysis.estimation.closedloop.observe import observe
 from rigidimeter.analysis.estimation.closedloop.periodic_response import follows_perturbation
 from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
 from rigidimeter.analysis.estimation.method_record import Method

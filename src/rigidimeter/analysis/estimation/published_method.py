@@ -26,6 +26,7 @@ import scipy
 from rigidimeter.analysis.estimation.amplitude import amplitude_of_signals, amplitude_together
 from rigidimeter.analysis.estimation.closedloop.between_samples import acceleration_seen, phases_s
 from rigidimeter.analysis.estimation.closedloop.between_uncertainty import NAME
+from rigidimeter.analysis.estimation.closedloop.drive_motion import since_ticks
 from rigidimeter.analysis.estimation.found import found
 from rigidimeter.analysis.estimation.least_squares import fit_inertia_damping_stiffness
 from rigidimeter.analysis.estimation.method_record import Method, Progress
@@ -144,8 +145,9 @@ def as_they_are(prepared: PreparedEpoch) -> tuple[Finding, ...]:
     if drive is None or command is None:
         return ()
     settings = prepared.settings.diagnostics
-    times_s = phases_s(command, epoch.channels["torque_nm"].time_s)
-    seen = acceleration_seen(drive.model, 1.0 / command.mean_rate_hz, times_s)
+    interval_s = 1.0 / command.mean_rate_hz
+    _, after_s = since_ticks(command, epoch.channels["torque_nm"].time_s, 0.0)
+    seen = acceleration_seen(drive.model, interval_s, phases_s(after_s, interval_s))
     percent, most = 100.0 * abs(1.0 - seen), settings.max_between_samples_percent
     if not percent > most:
         return ()

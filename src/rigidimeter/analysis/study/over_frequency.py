@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigidimeter.analysis.estimation.bandlimited import bandlimited_signals
-from rigidimeter.analysis.estimation.closedloop.observation import Observation, observe_periods
+from rigidimeter.analysis.estimation.closedloop.observation import Observation
+from rigidimeter.analysis.estimation.closedloop.observe import observe_periods
 from rigidimeter.analysis.estimation.closedloop.periodic_response import impedance
 from rigidimeter.analysis.estimation.diagnostics import reconstructed_torque_nm
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
@@ -56,9 +57,9 @@ def same_lines(observations: Sequence[Observation]) -> list[Observation]:
     """Return the largest set of epochs that have their excited lines at the same frequencies."""
     groups: list[list[Observation]] = []
     for observation in observations:
-        lines = observation.lines.grid.omega_rad_s[observation.excited]
+        lines = observation.grid.omega_rad_s[observation.excited]
         for group in groups:
-            known = group[0].lines.grid.omega_rad_s[group[0].excited]
+            known = group[0].grid.omega_rad_s[group[0].excited]
             if known.size == lines.size and np.allclose(known, lines, rtol=SAME_FREQUENCY):
                 group.append(observation)
                 break

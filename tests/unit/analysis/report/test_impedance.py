@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimation.closedloop.observation import observe_periods
+from rigidimeter.analysis.estimation.closedloop.observe import observe_periods
 from rigidimeter.analysis.estimation.closedloop.periodic_response import impedance as without_model
 from rigidimeter.analysis.estimation.prepared import prepare
 from rigidimeter.analysis.report import SECTIONS, Figure
@@ -72,7 +72,7 @@ def test_lines_of_epochs_that_began_elsewhere_add_up_to_the_joint(observations) 
 
 def test_lines_as_they_are_would_cancel(observations) -> None:
     """The sum of three lines a third of a period apart is nearly nothing."""
-    first = [each.lines.torque_nm[each.excited][0] for each in observations]
+    first = [each.torque_nm[each.excited][0] for each in observations]
     assert np.abs(np.sum(first)) < 0.05 * np.sum(np.abs(first))
 
 
@@ -85,9 +85,9 @@ def test_only_epochs_with_the_same_lines_are_added(observations) -> None:
     (prepared,) = prepare([dataclasses.replace(shorter, channels=cut)], Settings())
     two = observe_periods(prepared)
     assert len(same_lines([two, *observations])) == 4  # two periods have the lines of three
-    grid = two.lines.grid
+    grid = two.grid
     other = dataclasses.replace(grid, omega_rad_s=1.01 * grid.omega_rad_s)
-    moved = dataclasses.replace(two, lines=dataclasses.replace(two.lines, grid=other))
+    moved = dataclasses.replace(two, grid=other)
     assert same_lines([moved, *observations]) == observations
     assert same_lines([]) == []
 

@@ -40,7 +40,7 @@ from rigidimeter.analysis.estimation.closedloop.normal_equations import (
     scaled_inverse,
     sums,
 )
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines
+from rigidimeter.analysis.estimation.closedloop.observation import Observation
 from rigidimeter.analysis.estimation.found import found, half_widths
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.core.findings import Effect, Finding, Three
@@ -82,15 +82,15 @@ class Member(NamedTuple):
     values: Array
 
     @property
-    def lines(self) -> Lines:
-        """Those of the problem."""
-        return self.problem.observation.wider or self.problem.observation.lines
+    def seen(self) -> Observation:
+        """The epoch at the lines of the problem."""
+        return self.problem.observation.wider or self.problem.observation
 
     @property
     def fitted(self) -> slice:
         """Which of them are those of the fit."""
-        line = self.problem.observation.lines.grid.line
-        first = int(line[0] - self.lines.grid.line[0])
+        line = self.problem.observation.grid.line
+        first = int(line[0] - self.seen.grid.line[0])
         return slice(first, first + line.size)
 
 
@@ -171,14 +171,14 @@ def band_changes(members: Sequence[Member]) -> tuple[Array, list[BandChange]]:
             squares += np.diag(covariance) ** 2 / degrees
         se = np.sqrt(variance)
         p = 2 * scipy.stats.t.sf(np.abs(change) / se, variance**2 / squares)
-        omega = members[0].lines.grid.omega_rad_s[within[0]]
+        omega = members[0].seen.grid.omega_rad_s[within[0]]
         edges_hz = float(omega[0] / (2 * np.pi)), float(omega[-1] / (2 * np.pi))
         changes.append(BandChange(*edges_hz, part, change, se, np.asarray(p)))
     return values, changes
 
 
 def _weighted(member: Member) -> _Epoch:
-    problem, grid = member.problem, member.lines.grid
+    problem, grid = member.problem, member.seen.grid
     smoother = Smoother.over(grid.line, SMOOTHED, NEIGHBOURS)
     residual = problem.target - problem.regressors @ member.values
     least = LEAST_POWER * float(np.max(np.abs(problem.target) ** 2))
@@ -203,7 +203,7 @@ def _variants(member: Member) -> list[tuple[float, float, Part]]:
 
 def _slice(member: Member, low: float, high: float) -> slice:
     """Return the lines of a band whose edges are these times those of the fit."""
-    line = member.lines.grid.line
+    line = member.seen.grid.line
     # The line below the band belongs to it, as in the fit.
     first = round(low * (line[member.fitted.start] + 1)) - 1
     last = round(high * line[member.fitted.stop - 1])

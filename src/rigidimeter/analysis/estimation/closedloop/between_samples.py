@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimation.closedloop.drive_motion import DrivenAt, driven, since_ticks
+from rigidimeter.analysis.estimation.closedloop.drive_motion import DrivenAt, driven
 from rigidimeter.analysis.estimation.signals import Array, motion_channels
 from rigidimeter.core.records import Channel, Epoch
 from rigidimeter.core.settings import EstimationSettings, RigSettings
@@ -173,37 +173,31 @@ def acceleration_beyond_slope(
     That is what the torque at the ticks holds of the acceleration beyond the slope of the velocity
     at the ticks, for each unit of the velocity.
     """
-    interval_s = 1.0 / rig.tick_rate_hz
     drive = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
-    z = np.exp(1j * omega_rad_s * interval_s)
-    velocity = drive.transfer(z, interval_s)[1] * filtered(torque_filter, omega_rad_s)[:, 0]
-    seen = behind(drive, torque_filter).transfer(z, interval_s)[0]
-    return np.asarray(seen / velocity - 1j * omega_rad_s)
+    beyond = beyond_samples(drive, torque_filter, omega_rad_s, 1.0 / rig.tick_rate_hz, 0.0)
+    return np.asarray(beyond.seen[:, 0] / beyond.velocity[:, 0])
 
 
-def phases_s(command: Channel, time_s: Array) -> Array:
-    """Return after how long since a tick samples were taken: one time, or ten that stand for all.
+def phases_s(after_s: Array, interval_s: float) -> Array:
+    """Return one time after a tick, or ten, that stand for those of all samples (`since_ticks`).
 
     Samples that do not keep step with the ticks see the acceleration at many times.
     """
-    _, after_s = since_ticks(command, time_s, 0.0)
-    if np.ptp(after_s) * command.mean_rate_hz < 2 * ON_EDGE:
+    if np.ptp(after_s) < 2 * ON_EDGE * interval_s:
         return np.asarray(np.mean(after_s, keepdims=True))
     return np.quantile(after_s, np.linspace(0.05, 0.95, 10))
 
 
-def step_kept_s(command: Channel, time_s: Array) -> float | None:
+def step_kept_s(after_s: Array, interval_s: float) -> float | None:
     """Return the time after the ticks that stamps scatter about; None if they do not scatter so.
 
     Then it is not known whether the samples came unevenly, or evenly and the stamps do not say so.
     """
-    interval_s = 1.0 / command.mean_rate_hz
-    _, after_s = since_ticks(command, time_s, 0.0)
     if np.ptp(after_s) < ON_EDGE * interval_s:
         return None
     turns = np.exp(2j * np.pi * after_s / interval_s)
     mean = complex(np.mean(turns))
-    if abs(mean) > 1.0 - ON_EDGE**2 or abs(mean) < SCATTERED / np.sqrt(time_s.size):
+    if abs(mean) > 1.0 - ON_EDGE**2 or abs(mean) < SCATTERED / np.sqrt(after_s.size):
         return None
     return float(np.angle(mean) / (2 * np.pi) % 1.0) * interval_s
 

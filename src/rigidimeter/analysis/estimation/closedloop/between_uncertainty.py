@@ -13,16 +13,11 @@ fall with their number. Where δ is more than a share of the parameter, it has t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from rigidimeter.analysis.estimation.closedloop.normal_equations import (
-    Problem,
-    solution,
-    sums,
-)
+from rigidimeter.analysis.estimation.closedloop.normal_equations import solution, sums
 from rigidimeter.analysis.estimation.closedloop.observation import Observation
+from rigidimeter.analysis.estimation.closedloop.refine import LineFit
 from rigidimeter.analysis.estimation.found import found
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.core.findings import Effect, Finding
@@ -35,25 +30,16 @@ UNSETTLED = 0.1
 """A parameter that another drive changes by more than this share hangs on the drive."""
 
 
-def moved_elsewhere(problems: Sequence[Problem], powers: Sequence[Array], values: Array) -> Array:
-    """Return δ, shape (p,).
-
-    Parameters
-    ----------
-    problems : sequence of Problem
-    powers : sequence of array, shape (m,)
-        Of the noise at the lines.
-    values : array, shape (p,)
-        The solution of the problems.
-    """
-    moved = [problem.observation.otherwise for problem in problems]
+def moved_elsewhere(fit: LineFit) -> Array:
+    """Return δ of a fit, shape (p,)."""
+    values, moved = fit.values, [problem.observation.otherwise for problem in fit.problems]
     count = max(map(len, moved))
     if not count:
         return np.zeros(values.size)
-    gram, moment, _ = sums(problems, powers)
-    grams, moments = np.repeat(gram[None], count, axis=0), np.repeat(moment[None], count, axis=0)
+    grams = np.repeat(fit.gram[None], count, axis=0)
+    moments = grams @ values
     # Another motion adds its difference to the sums.
-    for problem, power, more in zip(problems, powers, moved, strict=True):
+    for problem, power, more in zip(fit.problems, fit.powers, moved, strict=True):
         held = len(problem.held)
         target = -(more[:, :, :held] @ np.array(problem.held)) if held else 0 * problem.target
         change = problem._replace(regressors=more[:, :, held:], target=target)

@@ -143,8 +143,8 @@ def _alone(
     observation = member.once(method.observe)
     powers = None
     if known is not None:
-        first = known.problems[0].observation.lines.grid
-        powers = [power_on(observation.lines.grid, first, known.powers[0])]
+        first = known.problems[0].observation.grid
+        powers = [power_on(observation.grid, first, known.powers[0])]
     return fit_lines([observation], method.linearise, start, powers)
 
 
@@ -156,8 +156,8 @@ def _fit_of(
 ) -> Fit:
     """Return a fit as it is recorded, named after the first of its epochs."""
     epoch, observations = members[0].epoch, [member.once(method.observe) for member in members]
-    between = moved_elsewhere(fit.problems, fit.powers, fit.values)
-    pulled = np.nan_to_num(np.abs(loop_pull(fit.problems, fit.powers, fit.values)))
+    between = moved_elsewhere(fit)
+    pulled = np.nan_to_num(np.abs(loop_pull(fit.problems, fit.powers, fit.values, fit.inverse)))
     numbers = of_fit(
         fit.values,
         fit.covariance,
@@ -167,15 +167,15 @@ def _fit_of(
         between + pulled,
     )
     moved = [
-        amplitude_of_lines(member.epoch, one.lines)
+        amplitude_of_lines(member.epoch, one)
         for member, one in zip(members, observations, strict=True)
     ]
-    counts = [int(np.count_nonzero(one.lines.grid.window)) for one in observations]
+    counts = [one.grid.samples for one in observations]
     left, total = np.zeros(2)
     for one, count in zip(observations, counts, strict=True):
-        grid, torque = one.lines.grid, one.lines.torque_nm
+        grid, torque = one.grid, one.torque_nm
         per_line = 2 * count / (grid.time_s.size * grid.energy)
-        left += per_line * np.sum(np.abs(torque - one.lines.motion @ numbers["value"]) ** 2)
+        left += per_line * np.sum(np.abs(torque - one.motion @ numbers["value"]) ** 2)
         total += per_line * np.sum(np.abs(torque) ** 2)
     r_squared = 1.0 - float(left / total)
     diagnostics = members[0].settings.diagnostics
@@ -190,7 +190,7 @@ def _fit_of(
         condition_number=fit.condition_number,
         residual_sd_nm=float(np.sqrt(left / sum(counts))),
         n_samples=sum(counts),
-        band_hz=observations[0].lines.grid.band_hz,
+        band_hz=observations[0].grid.band_hz,
         findings=between_samples(epoch, observations[0], fit.values, between, diagnostics),
         **numbers,
         **amplitude_together(moved, counts)._asdict(),

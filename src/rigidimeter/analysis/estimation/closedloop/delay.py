@@ -52,7 +52,7 @@ def delayed(linearise: Linearise) -> Linearise:
         for observation, problem in zip(
             observations, linearise(observations, parameters), strict=True
         ):
-            omega, instruments = observation.lines.grid.omega_rad_s, problem.instruments
+            omega, instruments = observation.grid.omega_rad_s, problem.instruments
             if id(omega) not in turns:
                 turn = np.exp(-1j * omega * delay_s)[:, None]
                 turns[id(omega)] = turn, -1j * omega[:, None] * turn
@@ -110,9 +110,7 @@ def estimate_delay(
     best: LineFit | None = None
     for near_s in dict.fromkeys([*(float(delays[i]) for i in valleys), 0.0]):
         turned = [
-            one._replace(
-                target=one.target * np.exp(1j * one.observation.lines.grid.omega_rad_s * near_s)
-            )
+            one._replace(target=one.target * np.exp(1j * one.observation.grid.omega_rad_s * near_s))
             for one in problems
         ]
         near = solution(*sums(turned)[:2])  # every line with the same weight
@@ -148,7 +146,7 @@ def _unexplained(
     turns: dict[int, Complex] = {}
     bases: dict[tuple[int, int], Array] = {}
     for observation, problem in zip(observations, problems, strict=True):
-        omega, instruments = observation.lines.grid.omega_rad_s, problem.instruments
+        omega, instruments = observation.grid.omega_rad_s, problem.instruments
         low = omega < 2 * np.pi * SCAN_HIGH_HZ
         if id(omega) not in turns:
             turns[id(omega)] = np.exp(1j * omega[low, None] * delays_s)

@@ -33,11 +33,8 @@ from rigidimeter.analysis.estimation.closedloop.normal_equations import (
     solution,
     sums,
 )
-from rigidimeter.analysis.estimation.closedloop.observation import (
-    Observation,
-    observe,
-    observe_motion,
-)
+from rigidimeter.analysis.estimation.closedloop.observation import Observation
+from rigidimeter.analysis.estimation.closedloop.observe import observe, observe_motion
 from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array, velocity_at
@@ -98,7 +95,7 @@ def _of_joint(observation: Observation, joint: tuple[float, float, float]) -> Pr
     if observation.excitation is None:
         return direct([observation], np.array(joint))[0]
     instruments = observation.excitation.motion_lines(joint)
-    return Problem(instruments, observation.lines.motion, observation.lines.torque_nm, observation)
+    return Problem(instruments, observation.motion, observation.torque_nm, observation)
 
 
 def _rivals(
@@ -112,7 +109,7 @@ def _rivals(
     `without_delay` are J, B and K of the fit without delay or term.
     """
     observation = _observed(prepared)
-    grid = observation.lines.grid
+    grid = observation.grid
     omega = grid.omega_rad_s
     measured = velocity_at(prepared.epoch, grid.time_s) * grid.window
     excitation = observation.excitation

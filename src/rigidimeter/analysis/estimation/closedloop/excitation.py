@@ -18,6 +18,7 @@ from the perturbation alone, so it is an instrument.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,34 +73,29 @@ class Excitation:
 
     def motion_lines(self, parameters: Parameters) -> Complex:
         """Return acceleration, velocity and angle that the perturbation causes, shape (m, 3)."""
-        return self._lines(self._motion(parameters))
+        grid, found = self.grid, []
+        for signal in self._signals(parameters):
+            mean = signal @ grid.window / grid.energy
+            found.append(scipy.fft.rfft(signal)[grid.line] - mean * grid.window_lines)
+        return np.stack(found, axis=1)
 
     def windowed_motion(self, parameters: Parameters) -> Array:
         """Return the motion that the perturbation causes, times the window, shape (3, n)."""
-        return self._windowed(self._motion(parameters))
+        return np.stack(list(self._signals(parameters)))
 
-    def _motion(self, parameters: Parameters) -> Complex:
+    def _signals(self, parameters: Parameters) -> Iterator[Array]:
+        """Yield the windowed motion, one signal after the other: less memory is filled at once."""
         J, B, K = parameters
-        around = np.asarray(1 + (J * self.gain[0] + B * self.gain[1] + K * self.gain[2]))
-        if _unstable(around):
-            return self.motion * self.command
-        return np.asarray(self.motion * (self.command / around))
-
-    def _lines(self, spectra: Complex) -> Complex:
-        """Return the lines of signals whose spectra on the damped circle are given."""
-        windowed, grid = self._windowed(spectra), self.grid
-        mean = windowed @ grid.window / grid.energy
-        lines = scipy.fft.rfft(windowed, axis=1)[:, grid.line]
-        return np.asarray((lines - mean[:, None] * grid.window_lines).T)
-
-    def _windowed(self, spectra: Complex) -> Array:
+        around = 1 + (J * self.gain[0] + B * self.gain[1] + K * self.gain[2])
+        command = self.command if _unstable(around) else self.command / around
         # The inverse FFT gives only the samples that are wanted, where their number allows it.
         folds = self.stride if self.stride % 2 == 0 and self.size % (2 * self.stride) == 0 else 1
-        signals = scipy.fft.irfft(_folded(spectra, folds), self.size // folds, axis=1)
-        if self.ticks_s is not None and self.raising is not None:
-            raised = signals[:, : self.raising.size] * self.raising
-            signals = scipy.interpolate.CubicSpline(self.ticks_s, raised, axis=1)(self.grid.time_s)
-        return np.asarray(signals[:, :: self.stride // folds][:, : self.weight.size] * self.weight)
+        for motion in self.motion:
+            signal = scipy.fft.irfft(_folded(motion * command, folds), self.size // folds)
+            if self.ticks_s is not None and self.raising is not None:
+                raised = signal[: self.raising.size] * self.raising
+                signal = scipy.interpolate.CubicSpline(self.ticks_s, raised)(self.grid.time_s)
+            yield signal[:: self.stride // folds][: self.weight.size] * self.weight
 
 
 def excitation(perturbation: Channel, loop: Loop, grid: Grid) -> Excitation:
@@ -165,16 +161,16 @@ def _unstable(around: Complex) -> bool:
     return bool(turned < -0.5 * np.pi)
 
 
-def _folded(spectra: Complex, times: int) -> Complex:
-    """Return the half spectra of every `times`-th sample: the aliases of each line, added."""
+def _folded(spectrum: Complex, times: int) -> Complex:
+    """Return the half spectrum of every `times`-th sample: the aliases of each line, added."""
     if times == 1:
-        return spectra
-    kept = 2 * (spectra.shape[1] - 1) // times
-    blocks = spectra[:, :-1].reshape(len(spectra), times // 2, kept)
-    folded = blocks[:, :, : kept // 2 + 1].sum(axis=1)
+        return spectrum
+    kept = 2 * (spectrum.size - 1) // times
+    blocks = spectrum[:-1].reshape(times // 2, kept)
+    folded = blocks[:, : kept // 2 + 1].sum(axis=0)
     # The other half of the spectrum is the first one's mirror image.
-    folded[:, 1:] += blocks[:, :, kept // 2 :].sum(axis=1)[:, ::-1].conj()
-    folded[:, 0] += (blocks[:, 1:, 0].sum(axis=1) + spectra[:, -1]).conj()
+    folded[1:] += blocks[:, kept // 2 :].sum(axis=0)[::-1].conj()
+    folded[0] += (blocks[1:, 0].sum() + spectrum[-1]).conj()
     return np.asarray(folded / times)
 
 

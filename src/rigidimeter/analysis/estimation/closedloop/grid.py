@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy
@@ -70,10 +70,15 @@ class Grid:
     window_lines: Complex
     spread: float = 1.0
 
+    @cached_property
+    def samples(self) -> int:
+        """How many are not left out."""
+        return int(np.count_nonzero(self.window))
+
     @property
     def used_share(self) -> float:
         """The samples that are not left out, of all."""
-        return float(np.count_nonzero(self.window) / self.window.size)
+        return self.samples / self.window.size
 
     @property
     def band_hz(self) -> tuple[float, float]:

@@ -89,7 +89,7 @@ class Answer(NamedTuple):
     @property
     def grid(self) -> Grid:
         """Of the lines."""
-        return self.observation.lines.grid
+        return self.observation.grid
 
     @property
     def frequency_hz(self) -> Array:
@@ -166,6 +166,8 @@ def repeated(answers: Sequence[Answer]) -> list[Misfit]:
         m = part.size
         between = count * float(np.sum(np.abs(mean[part]) ** 2)) / (2 * m)
         within = float(np.sum(scatter[part])) / (2 * m)
+        if within == 0.0:
+            continue  # copies of one epoch
         p = scipy.stats.f.sf(between / within, 2 * m, 2 * m * (count - 1))
         own = np.mean(power[:, part], axis=0)
         beyond = np.sum((np.abs(mean[part]) ** 2 - scatter[part] / count) * own)

@@ -13,7 +13,7 @@ from rigidimeter.analysis.estimation.closedloop.linear_problems import (
     instrumental,
     periodic,
 )
-from rigidimeter.analysis.estimation.closedloop.observation import (
+from rigidimeter.analysis.estimation.closedloop.observe import (
     observe,
     observe_motion,
     observe_periods,

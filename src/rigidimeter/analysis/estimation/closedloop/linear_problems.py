@@ -61,13 +61,12 @@ def direct(observations: Sequence[Observation], values: Array) -> list[Problem]:
     """
     del values  # they do not depend on the parameters
     problems = []
-    for observation in observations:
-        lines = observation.lines
-        motion = instruments = lines.motion
-        if lines.noise is not None and lines.grid.rate_hz >= DENSE * lines.grid.band_hz[1]:
-            apart = lines.noise * np.where(lines.grid.line % 2, 1.0, -1.0)[:, None]
-            motion, instruments = lines.motion + apart, lines.motion - apart
-        problems.append(Problem(instruments, motion, lines.torque_nm, observation))
+    for one in observations:
+        motion = instruments = one.motion
+        if one.noise is not None and one.grid.rate_hz >= DENSE * one.grid.band_hz[1]:
+            apart = one.noise * np.where(one.grid.line % 2, 1.0, -1.0)[:, None]
+            motion, instruments = one.motion + apart, one.motion - apart
+        problems.append(Problem(instruments, motion, one.torque_nm, one))
     return problems
 
 
@@ -76,7 +75,7 @@ def instrumental(observations: Sequence[Observation], values: Array) -> list[Pro
     J, B, K = np.maximum(values, LEAST).tolist()
     made = _of_each(observations, lambda excitation: excitation.motion_lines((J, B, K)))
     return [
-        Problem(instruments, observation.lines.motion, observation.lines.torque_nm, observation)
+        Problem(instruments, observation.motion, observation.torque_nm, observation)
         for observation, instruments in zip(observations, made, strict=True)
     ]
 

@@ -17,13 +17,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.closedloop.grid import Grid
 from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST
 from rigidimeter.analysis.estimation.closedloop.normal_equations import (
     Problem,
-    solution,
-    sums,
 )
+from rigidimeter.analysis.estimation.closedloop.observation import Observation
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.model import Loop, OpenLoop
 
@@ -36,7 +34,9 @@ DIVERGED = 1e3
 """So does a bias of so many times a parameter."""
 
 
-def loop_pull(problems: Sequence[Problem], powers: Sequence[Array], values: Array) -> Array:
+def loop_pull(
+    problems: Sequence[Problem], powers: Sequence[Array], values: Array, inverse: Array
+) -> Array:
     """Return b, shape (p,); 0 for instruments, NaN where no joint fits recording and loop.
 
     Parameters
@@ -46,12 +46,13 @@ def loop_pull(problems: Sequence[Problem], powers: Sequence[Array], values: Arra
         S at the lines of each.
     values : array, shape (p,)
         The solution.
+    inverse : array, shape (p, p)
+        G⁻¹.
     """
     bias = np.zeros(values.size)
     if any(problem.observation.excitation is not None for problem in problems):
         return bias
-    gram, _, _ = sums(problems, powers)
-    opened = [_opened(one.observation.loop, one.observation.lines.grid) for one in problems]
+    opened = [_opened(problem.observation) for problem in problems]
     for _ in range(ITERATIONS):
         moment = np.zeros(values.size)
         for problem, power, loop in zip(problems, powers, opened, strict=True):
@@ -60,7 +61,7 @@ def loop_pull(problems: Sequence[Problem], powers: Sequence[Array], values: Arra
             comes_back = loop.motion_per_torque((J, B, K)).real[len(problem.held) :]
             u = problem.target - problem.regressors @ (values - bias)
             moment += comes_back @ (np.abs(u) ** 2 / power)
-        step = solution(gram, moment) - bias
+        step = inverse @ moment - bias
         bias = bias + DAMPING * step
         if not np.all(np.abs(bias) < DIVERGED * np.abs(values)):
             break
@@ -75,6 +76,8 @@ def _opened_at(loop: Loop, first: int, count: int, spacing_hz: float) -> OpenLoo
     return loop.at_frequency(np.minimum(spacing_hz * np.arange(first, first + count), highest_hz))
 
 
-def _opened(loop: Loop, grid: Grid) -> OpenLoop:
+def _opened(observation: Observation) -> OpenLoop:
+    loop, grid = observation.loop, observation.grid
+    assert loop is not None  # `observe_motion` gives it
     spacing_hz = float(f"{grid.rate_hz / grid.time_s.size:.9g}")
     return _opened_at(loop, int(grid.line[0]), grid.line.size, spacing_hz)

@@ -1,54 +1,61 @@
-"""One epoch as the methods of the closed loop see it: its lines, and what perturbed it."""
+"""One epoch as the methods of the closed loop see it: torque and motion at the lines of its grid.
+
+The integrals of `grid` are sums over the samples of the torque, at the stamps of the torque: a
+torque that was sampled at a point in time is held against the motion at that point. Where the
+command is recorded and explains the velocity, the motion at those points is the motion that the
+command causes, plus what the sensors saw beyond it; so neither slow sensors nor the ripple between
+the ticks bias the fit (`drive_fit`).
+"""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation.closedloop.between_samples import (
-    INEXACT,
-    Beyond,
-    acceleration_beyond_slope,
+    TorqueFilter,
     beyond_samples,
-    phases_s,
-    step_kept_s,
-    torque_filter_of,
+    driven_behind,
+    filtered,
+    in_step,
 )
-from rigidimeter.analysis.estimation.closedloop.controller_used import (
-    controller_used,
-    loop_shown,
-)
+from rigidimeter.analysis.estimation.closedloop.drive_motion import since_ticks
 from rigidimeter.analysis.estimation.closedloop.epoch_motion import EpochMotion
-from rigidimeter.analysis.estimation.closedloop.excitation import Excitation, excitation
-from rigidimeter.analysis.estimation.closedloop.grid import Grid, epoch_grid, grid_at
-from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import (
-    closed_loop_obstacle,
-    evenly,
-    while_sampled,
-    whole_periods,
-)
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines, epoch_lines
-from rigidimeter.analysis.estimation.prepared import PreparedEpoch
-from rigidimeter.analysis.estimation.screening import LEAST_BAND_RATIO
-from rigidimeter.analysis.estimation.signals import motion_channels
-from rigidimeter.analysis.estimation.stretches import longest_part
-from rigidimeter.core.records import Channel
-from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE
-from rigidimeter.model import DriveModel, Loop
-
-Complex = NDArray[np.complex128]
+from rigidimeter.analysis.estimation.closedloop.excitation import Excitation
+from rigidimeter.analysis.estimation.closedloop.grid import SAME_TIME, Complex, Grid
+from rigidimeter.analysis.estimation.signals import Array, motion_channels, sampled, values_at
+from rigidimeter.core.records import Channel, Epoch
+from rigidimeter.model import Loop
 
 DENSE = 16.0
 """Samples a cycle of the highest line from which half of them show the motion as well as all: an
 acceleration near half the rate is then an angle 49 times smaller than at that line, or less."""
 
-WIDER = 0.5, 1.4
-"""Lines are also kept of a band whose edges are these times those of the fit."""
+
+class Sent(NamedTuple):
+    """The command of a drive that is known.
+
+    Attributes
+    ----------
+    command : complex array, shape (m, 1)
+        At the lines, as it was in force at the samples.
+    interval_s : float
+        Of the ticks.
+    mean_s : float
+        How long after a tick the samples came, on average.
+    after_s : array
+        How long after a tick each sample of the torque came, at its own stamp.
+    """
+
+    command: Complex
+    interval_s: float
+    mean_s: float
+    after_s: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,31 +64,51 @@ class Observation:
 
     Attributes
     ----------
-    lines : Lines
+    grid : Grid
+    torque_nm : complex array, shape (m,)
+        At the lines.
+    motion : complex array, shape (m, 3)
+        Acceleration, velocity and angle.
+    noise : complex array, shape (m, 3), or None
+        Half the difference of what the even and the odd samples of the motion give, whose noise is
+        independent; None where that was not wanted, or the motion lies between its samples.
+    sent : Sent or None
+    loop : Loop or None
+        That the epoch ran in, by the settings and the drive that the recording shows; where the
+        perturbation is not used also with the controller that it shows.
     perturbation : Channel or None
         At every tick; None where it is not used.
     excitation : Excitation or None
         What the perturbation does in the loop; None where it is not used.
-    loop : Loop
-        That the epoch ran in, by the settings and the drive that the recording shows; where the
-        perturbation is not used also with the controller that it shows.
-    excited : array of bool, shape (m,)
-        The lines at which a periodic perturbation has power; all where it is not periodic.
-    drive_known : bool
-    wider : Lines or None
-        Those of a wider band, for `band_sensitivity`.
+    periods : int
+        A perturbation that repeats so many times has power at every so manieth line alone.
+    wider : Observation or None
+        The same at the lines of a wider band.
     make_otherwise : callable
-        Returns `otherwise`.
+        Takes the observation and returns `otherwise`.
     """
 
-    lines: Lines
-    perturbation: Channel | None
-    excitation: Excitation | None
-    loop: Loop
-    excited: NDArray[np.bool_]
-    drive_known: bool = False
-    wider: Lines | None = None
-    make_otherwise: Callable[[], Sequence[Complex]] = tuple
+    grid: Grid
+    torque_nm: Complex
+    motion: Complex
+    noise: Complex | None = None
+    sent: Sent | None = None
+    loop: Loop | None = None
+    perturbation: Channel | None = None
+    excitation: Excitation | None = None
+    periods: int = 1
+    wider: Observation | None = None
+    make_otherwise: Callable[[Observation], Sequence[Complex]] = lambda _: ()
+
+    @property
+    def excited(self) -> NDArray[np.bool_]:
+        """The lines at which the perturbation has power, shape (m,)."""
+        return np.asarray(self.grid.line % self.periods == 0)
+
+    @property
+    def drive_known(self) -> bool:
+        """Whether what the drive does between the samples is known."""
+        return self.sent is not None
 
     @cached_property
     def otherwise(self) -> Complex:
@@ -90,176 +117,104 @@ class Observation:
         If the samples were taken as they are, and then with other drives that explain the velocity
         as well; where the drive is unknown, with that of the settings.
         """
-        changes = self.make_otherwise()
-        return np.stack(changes) if changes else np.empty((0, *self.lines.motion.shape))
+        changes = self.make_otherwise(self)
+        return np.stack(changes) if changes else np.empty((0, *self.motion.shape))
+
+    def on(self, grid: Grid) -> Observation:
+        """Return the epoch at the lines of a grid of the same samples within this one."""
+        if grid is self.grid:
+            return self
+        first = int(grid.line[0] - self.grid.line[0])
+        part = slice(first, first + grid.line.size)
+        return replace(
+            self,
+            grid=grid,
+            torque_nm=self.torque_nm[part],
+            motion=self.motion[part],
+            noise=None if self.noise is None else self.noise[part],
+            sent=self.sent and self.sent._replace(command=self.sent.command[part]),
+            wider=self,
+        )
 
 
-def observe(prepared: PreparedEpoch, motion: EpochMotion | None = None) -> Observation:
-    """Return an epoch at all lines of the band.
+def epoch_lines(
+    epoch: Epoch,
+    grid: Grid,
+    motion: EpochMotion,
+    torque_filter: TorqueFilter | None = None,
+    *,
+    noise: bool = False,
+) -> Observation:
+    """Return torque and motion at the lines.
 
     Parameters
     ----------
-    prepared : PreparedEpoch
-    motion : EpochMotion, optional
-        That of the epoch, where it was made already.
-
-    Raises
-    ------
-    ValueError
-        If the epoch cannot be used; the text says why.
+    epoch : Epoch
+    grid : Grid
+        Of this epoch or one with the same stamps.
+    motion : EpochMotion
+        That of the epoch. Where its drive is known, what the command did between the samples is
+        taken into account.
+    torque_filter : TorqueFilter or None
+        That the torque went through; the motion is sent through it too.
+    noise : bool
+        Whether `Observation.noise` is wanted.
     """
-    perturbation = _perturbation(prepared)
-    grid = _grid(prepared, None)
-    band_hz, trim_s = _band_hz(prepared, WIDER), prepared.settings.estimation.trim_s
-    wider = grid_at(grid.time_s, grid.rate_hz, band_hz, trim_s, prepared.epoch)
-    everywhere = np.ones(grid.line.size, dtype=np.bool_)
-    return _observed(prepared, perturbation, grid, everywhere, wider, motion)
-
-
-def observe_periods(prepared: PreparedEpoch) -> Observation:
-    """Return whole periods of an epoch, so that the perturbation is in some of the lines alone.
-
-    Raises
-    ------
-    ValueError
-        If the epoch cannot be used, or does not hold two whole periods; the text says why.
-    """
-    # A window with a hole would spread the excited lines over those between them.
-    part = replace(prepared, epoch=longest_part(prepared.epoch))
-    perturbation = _perturbation(part)
-    known = while_sampled(perturbation, part.epoch.channels["torque_nm"])
-    periods = 0
-
-    def samples(available: int, rate_hz: float) -> int:
-        nonlocal periods
-        periods, count = whole_periods(known, rate_hz, available)
-        return count
-
-    grid = _grid(part, samples)
-    return _observed(part, perturbation, grid, grid.line % periods == 0)
-
-
-def observe_motion(prepared: PreparedEpoch, motion: EpochMotion | None = None) -> Observation:
-    """Return an epoch at all lines of the band, whatever perturbed it.
-
-    `motion` and errors are as for `observe`.
-    """
-    if prepared.obstacle:
-        raise ValueError(prepared.obstacle)
-    grid = _grid(prepared, None, alone=True)
-    everywhere = np.ones(grid.line.size, dtype=np.bool_)
-    return _observed(prepared, None, grid, everywhere, None, motion)
-
-
-def motion_of(prepared: PreparedEpoch) -> EpochMotion:
-    """Return the motion of an epoch, with the drive that its source shows."""
-    command = prepared.epoch.channels.get("velocity_command_rad_s")
-    found = prepared.source.drive if command is not None else None
-    return EpochMotion(prepared.epoch, None if found is None else found.model)
-
-
-def _perturbation(prepared: PreparedEpoch) -> Channel:
-    obstacle = prepared.obstacle or closed_loop_obstacle(prepared.epoch)
-    if obstacle:
-        raise ValueError(obstacle)
-    return evenly(prepared.epoch.channels["perturbation_nm"])
-
-
-def _grid(
-    prepared: PreparedEpoch,
-    samples: Callable[[int, float], int] | None,
-    *,
-    alone: bool = False,
-) -> Grid:
-    band_hz, trim_s = _band_hz(prepared, alone=alone), prepared.settings.estimation.trim_s
-    return epoch_grid(prepared.epoch, band_hz, trim_s, samples)
-
-
-def _band_hz(
-    prepared: PreparedEpoch, factors: tuple[float, float] = (1.0, 1.0), *, alone: bool = False
-) -> tuple[float, float]:
-    """Return the band, its edges times these factors as far as the rate allows.
-
-    `alone` says whether the motion is its own instrument.
-    """
-    epoch, estimation = prepared.epoch, prepared.settings.estimation
-    torque = epoch.channels["torque_nm"]
-    limiting = [torque] if prepared.source.drive else [torque, *motion_channels(epoch)]
-    slowest = min(channel.rate_hz for channel in limiting)
-    low, high = estimation.band_low_hz, estimation.band_high_closed_loop_hz
-    usable_hz = USABLE_FRACTION_OF_RATE * slowest
-    if alone and not prepared.source.drive:
-        # Higher, noise of the motion that no half of the samples shows would count as motion.
-        usable_hz = min(usable_hz, max(slowest / DENSE, LEAST_BAND_RATIO * low))
-    return factors[0] * low, min(factors[1] * high, usable_hz)
-
-
-def _observed(
-    prepared: PreparedEpoch,
-    perturbation: Channel | None,
-    grid: Grid,
-    excited: NDArray[np.bool_],
-    wider: Grid | None = None,
-    motion: EpochMotion | None = None,
-) -> Observation:
-    epoch = prepared.epoch
-    if perturbation is None:
-        made, loop = None, controller_used(prepared)
+    stamped, time_s = epoch.channels["torque_nm"], grid.time_s
+    moving = motion_channels(epoch)
+    own = {
+        one.name: one.values[place]
+        for one in moving
+        if (place := sampled(one, time_s, SAME_TIME)) is not None
+    }
+    angle, velocity = own.get("angle_rad"), own.get("velocity_rad_s")
+    recorded = angle is not None and len(own) == len(moving)
+    through = filtered(torque_filter, grid.omega_rad_s)
+    caused: list[Array] = []
+    if motion.driven_at is not None:
+        command = motion.driven_at.command
+        tick, after_s = stamps = since_ticks(command, stamped.time_s, 0.0)
+        if (place := sampled(stamped, time_s, SAME_TIME)) is not None:
+            tick, after_s = tick[place], after_s[place]
+        else:
+            tick, after_s = since_ticks(command, time_s, 0.0)
+        interval_s, mean_s = 1.0 / command.mean_rate_hz, float(np.mean(after_s))
+        recorded &= velocity is not None and in_step(tick, after_s, interval_s)
+        caused = [command.values[tick]]
+        if not recorded:
+            # At the stamps of the torque, and from there like the torque.
+            caused += [
+                values_at(Channel(stamped.name, stamped.time_s, part), time_s, SAME_TIME)
+                for part in driven_behind(motion.driven_at, torque_filter, stamped)
+            ]
+    if not recorded:
+        angle, velocity = motion.beyond_at(time_s, SAME_TIME)
+    assert angle is not None  # where it is not recorded it is made
+    torque = values_at(stamped, time_s, SAME_TIME)
+    lines, *apart = through * spectra(grid, angle, velocity, halves=noise and recorded)
+    noises = apart[0] if apart else None
+    first, *others = grid.transform(np.stack([torque, *caused]))
+    if motion.driven_at is None:
+        return Observation(grid, first, lines, noises)
+    sent = Sent(others[0][:, None], interval_s, mean_s, stamps[1])
+    if recorded:
+        at = grid.omega_rad_s, interval_s, mean_s
+        lines += sent.command * beyond_samples(motion.driven_at.drive, torque_filter, *at).seen
     else:
-        loop = loop_shown(prepared)
-        key = (
-            hashlib.sha256(perturbation.values.tobytes()).digest(),
-            loop,
-            round((grid.time_s[0] - perturbation.time_s[0]) * 1e9),
-            grid.time_s.size,
-            round(1e6 * grid.rate_hz),
-            int(grid.line[0]),
-            int(grid.line[-1]),
-            prepared.epoch.left_out,
-        )
-        cause = perturbation
-        made = prepared.source.once(key, lambda: excitation(cause, loop, grid))
-    torque_filter = torque_filter_of(prepared.settings.estimation)
-    motion = motion_of(prepared) if motion is None else motion
-    everything = epoch_lines(epoch, wider or grid, motion, torque_filter, noise=made is None)
-    lines = everything.on(grid)
-    return Observation(
-        lines,
-        perturbation,
-        made,
-        loop,
-        excited,
-        lines.sent is not None,
-        everything if wider is not None else None,
-        partial(_otherwise, prepared, lines),
-    )
+        lines += np.stack(others[1:], axis=-1)
+    return Observation(grid, first, lines, noises, sent)
 
 
-def _otherwise(prepared: PreparedEpoch, lines: Lines) -> list[Complex]:
-    """Return what would add to the motion without a drive, and with others.
+def spectra(
+    grid: Grid, angle_rad: Array, velocity_rad_s: Array | None, *, halves: bool = True
+) -> Complex:
+    """Return acceleration, velocity and angle (of which the velocity may be made) at the lines.
 
-    One that tells a little less, the rivals, samples that kept step with the ticks where it may be
-    the stamps that did not, and motion that the command does not cause as if it did.
+    The shape is (1 or 2, m, 3): `halves` are those of `Grid.transforms`.
     """
-    epoch, found, sent = prepared.epoch, prepared.source.drive, lines.sent
-    omega = lines.grid.omega_rad_s
-    torque_filter = torque_filter_of(prepared.settings.estimation)
-    if found is None or sent is None:
-        beyond = acceleration_beyond_slope(prepared.settings.rig, torque_filter, omega)
-        change = np.zeros_like(lines.motion)
-        change[:, 0] = beyond * lines.motion[:, 1]
-        return [np.zeros_like(change), change]
-
-    def seen(drive: DriveModel, after_s: float = sent.after_s) -> Beyond:
-        return beyond_samples(drive, torque_filter, omega, sent.interval_s, after_s)
-
-    ours, velocity = seen(found.model)
-    changes = [-ours, -INEXACT * ours, *(seen(rival).seen - ours for rival in found.rivals)]
-    command = epoch.channels["velocity_command_rad_s"]
-    stamps_s = epoch.channels["torque_nm"].time_s
-    kept_s = step_kept_s(command, stamps_s)
-    if kept_s is not None:
-        there = [seen(found.model, late_s).seen for late_s in phases_s(command, stamps_s).tolist()]
-        changes.append(seen(found.model, kept_s).seen - np.mean(there, axis=0))
-    more = ours * (lines.motion[:, 1:2] / velocity - sent.command)
-    return [*(np.asarray(change * sent.command) for change in changes), more]
+    if velocity_rad_s is None:
+        found = grid.transforms(angle_rad, 2, halves=halves)[:, ::-1]
+    else:
+        fast = grid.transforms(velocity_rad_s, 1, halves=halves)[:, ::-1]
+        found = np.concatenate([fast, grid.transforms(angle_rad, 0, halves=halves)], axis=1)
+    return np.moveaxis(found, 1, -1)

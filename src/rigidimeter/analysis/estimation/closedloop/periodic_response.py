@@ -56,22 +56,22 @@ def impedance(observations: Sequence[Observation]) -> Impedance:
     torque, angle = np.zeros(count, dtype=np.complex128), np.zeros(count, dtype=np.complex128)
     noise = np.zeros(count)
     for observation in observations:
-        lines, mask = observation.lines, observation.excited
+        mask = observation.excited
         turn = toward_zero_phase(perturbation_lines(observation))[mask]
-        torque += turn * lines.torque_nm[mask]
-        angle += turn * lines.motion[mask, 2]
-        between = np.where(mask, np.nan, np.abs(lines.torque_nm) ** 2)
+        torque += turn * observation.torque_nm[mask]
+        angle += turn * observation.motion[mask, 2]
+        between = np.where(mask, np.nan, np.abs(observation.torque_nm) ** 2)
         beside = sliding_window_view(np.pad(between, 2, constant_values=np.nan), 5)
         noise += np.nanmean(beside[mask], axis=1)
     power = np.abs(torque) ** 2
-    grid = observations[0].lines.grid
+    grid = observations[0].grid
     frequency_hz = grid.omega_rad_s[observations[0].excited] / (2 * np.pi)
     return Impedance(frequency_hz, np.asarray(torque / angle), np.clip(1 - noise / power, 0.0, 1.0))
 
 
 def perturbation_lines(observation: Observation) -> Complex:
     """Return the perturbation at the lines, held from tick to tick, shape (m,)."""
-    grid, cause = observation.lines.grid, observation.perturbation
+    grid, cause = observation.grid, observation.perturbation
     assert cause is not None  # without one an epoch has no lines of it
     # A hundredth of a tick of rounding must not hold the level before.
     stamps = cause.time_s - 0.01 / cause.mean_rate_hz
@@ -85,7 +85,6 @@ def follows_perturbation(observation: Observation) -> bool:
     The velocity is regressed on the perturbation in groups of neighbouring lines, so a perturbation
     with stamps of another clock, or of another epoch, has no answer.
     """
-    lines = observation.lines
-    answer = Answer(observation, perturbation_lines(observation), lines.motion[:, 1])
+    answer = Answer(observation, perturbation_lines(observation), observation.motion[:, 1])
     parts = proportional([answer])
     return min(part.p for part in parts) * len(parts) < CHANCE

@@ -23,6 +23,7 @@ from rigidimeter.analysis.estimation.closedloop.linear_problems import Linearise
 from rigidimeter.analysis.estimation.closedloop.normal_equations import (
     Complex,
     Problem,
+    Sums,
     scaled_inverse,
     sums,
 )
@@ -65,6 +66,8 @@ class LineFit:
         Of each epoch, at the solution.
     powers : sequence of array, shape (m,)
         S at the lines of each.
+    gram, inverse : array, shape (p, p)
+        Σ Re(U^H Φ) over the epochs, and its inverse.
     """
 
     values: Array
@@ -74,6 +77,8 @@ class LineFit:
     condition_number: float
     problems: Sequence[Problem]
     powers: Sequence[Array]
+    gram: Array
+    inverse: Array
 
     @property
     def standard_errors(self) -> Array:
@@ -110,11 +115,11 @@ def fit_lines(
         problems = linearise(observations, values)
         if powers is None or (given is None and free):
             powers = shared_powers(problems, values)
-        gram, moment, weighted = sums(problems, powers)
-        inverse = scaled_inverse(gram)
-        step = (inverse @ moment - values) * (1.0 if free else 0.5)
+        made = sums(problems, powers)
+        inverse = scaled_inverse(made.gram)
+        step = (inverse @ made.moment - values) * (1.0 if free else 0.5)
         values = values + step
-        scale = np.sqrt(np.diag(scaled_inverse(_information(problems, weighted))))
+        scale = np.sqrt(np.diag(scaled_inverse(_information(problems, made.weighted))))
         if np.all(np.abs(step) < CONVERGED * scale):
             break
     if not np.all(np.abs(step) < np.maximum(SETTLED * scale, SETTLED_SHARE * np.abs(values))):
@@ -124,7 +129,7 @@ def fit_lines(
             "motion or the controller's values are far off (--controller, per rad)"
         )
     assert powers is not None
-    return _with_uncertainty(problems, powers, weighted, inverse, values, found=given is None)
+    return _with_uncertainty(problems, powers, made, inverse, values, found=given is None)
 
 
 def fit_at(problems: Sequence[Problem], powers: Sequence[Array]) -> LineFit:
@@ -135,9 +140,10 @@ def fit_at(problems: Sequence[Problem], powers: Sequence[Array]) -> LineFit:
     ValueError
         As `fit_lines`.
     """
-    gram, moment, weighted = sums(problems, powers)
-    inverse = scaled_inverse(gram)
-    return _with_uncertainty(problems, powers, weighted, inverse, inverse @ moment, found=False)
+    made = sums(problems, powers)
+    inverse = scaled_inverse(made.gram)
+    values = inverse @ made.moment
+    return _with_uncertainty(problems, powers, made, inverse, values, found=False)
 
 
 def shared_powers(problems: Sequence[Problem], values: Array) -> list[Array]:
@@ -150,7 +156,7 @@ def shared_powers(problems: Sequence[Problem], values: Array) -> list[Array]:
     ValueError
         If nothing is left at some lines.
     """
-    grids = [problem.observation.lines.grid for problem in problems]
+    grids = [problem.observation.grid for problem in problems]
     finest = max(grids, key=lambda grid: grid.line.size)
     total = np.zeros(finest.line.size)
     for problem, grid in zip(problems, grids, strict=True):
@@ -170,14 +176,14 @@ def _information(problems: Sequence[Problem], weighted: Sequence[Complex]) -> Ar
     for problem, own in zip(problems, weighted, strict=True):
         if id(own) not in made:
             made[id(own)] = 2 * (own.conj().T @ problem.instruments).real
-        total = total + made[id(own)] * problem.observation.lines.grid.used_share
+        total = total + made[id(own)] * problem.observation.grid.used_share
     return total
 
 
 def _with_uncertainty(
     problems: Sequence[Problem],
     powers: Sequence[Array],
-    weighted: Sequence[Complex],
+    summed: Sums,
     inverse: Array,
     values: Array,
     *,
@@ -189,15 +195,15 @@ def _with_uncertainty(
     joint that is not quite the same each time. With fewer, the scatter itself is poorly known, and
     each variance is the larger of that and what the lines say.
     """
-    p, count = values.size, len(problems)
+    p, count, plain, weighted = values.size, len(problems), inverse, summed.weighted
     made = [
-        Solved(inverse, own, problem.regressors, power, problem.observation.lines.grid.spread)
+        Solved(inverse, own, problem.regressors, power, problem.observation.grid.spread)
         for problem, power, own in zip(problems, powers, weighted, strict=True)
     ]
     if found:
         taken = np.zeros((p, p))
         for problem, solved in zip(problems, made, strict=True):
-            line = problem.observation.lines.grid.line
+            line = problem.observation.grid.line
             taken += solved.taken_by_weights(smoother_for(line, count), count)
         inverse = with_weights(inverse, taken)
     effects, of_lines, squares = np.empty((count, p)), np.zeros((p, p)), np.zeros(p)
@@ -206,7 +212,7 @@ def _with_uncertainty(
         effects[place] = inverse @ (residual @ solved.weighted.conj()).real
         if count >= ENOUGH_EPOCHS:
             continue
-        smoother = smoother_for(problem.observation.lines.grid.line, 1)
+        smoother = smoother_for(problem.observation.grid.line, 1)
         # The epoch's own level on the common shape.
         own = replace(solved, inverse=inverse)
         left = own.density(residual, smoother)
@@ -230,6 +236,8 @@ def _with_uncertainty(
         _condition_number(problems[0], powers[0]),
         problems,
         powers,
+        summed.gram,
+        plain,
     )
 
 

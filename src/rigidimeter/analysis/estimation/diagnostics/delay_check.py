@@ -20,7 +20,7 @@ import numpy as np
 from rigidimeter.analysis.estimation.alignment import matters
 from rigidimeter.analysis.estimation.closedloop.linear_problems import direct
 from rigidimeter.analysis.estimation.closedloop.normal_equations import solution, sums
-from rigidimeter.analysis.estimation.closedloop.observation import observe_motion
+from rigidimeter.analysis.estimation.closedloop.observe import observe_motion
 from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
 from rigidimeter.analysis.estimation.closedloop.refine import shared_powers
 from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look
@@ -39,7 +39,7 @@ def torque_delay(case: Case) -> Look | None:
         return None
     observation = case.prepared.once(observe_motion)
     problems = direct([observation], case.parameters)
-    turn = np.exp(1j * observation.lines.grid.omega_rad_s * delay.delay_s) - 1.0
+    turn = np.exp(1j * observation.grid.omega_rad_s * delay.delay_s) - 1.0
     added = [one._replace(target=turn * one.target) for one in problems]
     bias = -solution(*sums(added, shared_powers(problems, case.parameters))[:2])
     effect = Effect.of(bias, case.parameters, case.half_widths)

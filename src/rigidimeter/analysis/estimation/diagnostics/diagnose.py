@@ -14,9 +14,7 @@ from rigidimeter.analysis.estimation.diagnostics.computed_torque_checks import (
     COMPUTED_TORQUE_CHECKS,
     STATIC_TORQUE_CHECKS,
 )
-from rigidimeter.analysis.estimation.diagnostics.controller_checks import (
-    CONTROLLER_CHECKS,
-)
+from rigidimeter.analysis.estimation.diagnostics.controller_checks import CONTROLLER_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.delay_check import DELAY_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS

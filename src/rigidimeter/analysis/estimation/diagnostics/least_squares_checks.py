@@ -22,7 +22,7 @@ from rigidimeter.analysis.estimation.closedloop.line_noise import Solved, smooth
 from rigidimeter.analysis.estimation.closedloop.linear_problems import direct, least_squares
 from rigidimeter.analysis.estimation.closedloop.loop_pull import loop_pull
 from rigidimeter.analysis.estimation.closedloop.normal_equations import scaled_inverse, sums
-from rigidimeter.analysis.estimation.closedloop.observation import observe_motion
+from rigidimeter.analysis.estimation.closedloop.observe import observe_motion
 from rigidimeter.analysis.estimation.closedloop.refine import shared_powers
 from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look, too_biased
 from rigidimeter.analysis.estimation.found import half_widths
@@ -58,8 +58,12 @@ def unbiased(prepared: PreparedEpoch, fit: Fit, by_noise: bool) -> Array:
     if by_noise:
         values, powers = fit.value, shared_powers(problems, fit.value)
     else:
-        values, powers = least_squares(problems), [np.ones(observation.lines.torque_nm.size)]
-    return values - loop_pull(problems, powers, values)
+        values, powers = least_squares(problems), [np.ones(observation.torque_nm.size)]
+    try:
+        inverse = scaled_inverse(sums(problems, powers).gram)
+    except ValueError:
+        return np.full(3, np.nan)
+    return values - loop_pull(problems, powers, values, inverse)
 
 
 def loop_bias(
@@ -90,11 +94,11 @@ def _unweighted(case: Case) -> _Unweighted | None:
     if case.uses_perturbation:
         return None
     observation = case.prepared.once(observe_motion)
-    problems, grid = direct([observation], case.parameters), observation.lines.grid
+    problems, grid = direct([observation], case.parameters), observation.grid
     gram, moment, (instruments,) = sums(problems)
     inverse = scaled_inverse(gram)
     alike = inverse @ moment
-    pull = loop_pull(problems, [np.ones(grid.line.size)], alike)
+    pull = loop_pull(problems, [np.ones(grid.line.size)], alike, inverse)
     if not np.all(np.isfinite(pull)):
         return None
     (shape,) = shared_powers(problems, alike)

@@ -25,7 +25,7 @@ import scipy
 from rigidimeter.analysis.estimation.closedloop.line_noise import Smoother
 from rigidimeter.analysis.estimation.closedloop.linear_problems import instrumental
 from rigidimeter.analysis.estimation.closedloop.normal_equations import solution, sums
-from rigidimeter.analysis.estimation.closedloop.observation import observe
+from rigidimeter.analysis.estimation.closedloop.observe import observe
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
     HARMFUL,
     Case,
@@ -178,7 +178,7 @@ def _moved(
     """
     terms = dict.fromkeys(term for group in groups for term in group)
     if case.uses_perturbation and case.prepared is not None:
-        grid, here = case.prepared.once(observe).lines.grid, beyond.motion.time_s
+        grid, here = case.prepared.once(observe).grid, beyond.motion.time_s
         torques = [np.interp(grid.time_s, here, term.torque(beyond), 0.0, 0.0) for term in terms]
         lines = grid.transform(np.reshape(torques, (-1, grid.time_s.size)))
         alone = dict(zip(terms, _added(case, case.prepared, lines), strict=True))
@@ -187,8 +187,8 @@ def _moved(
     first, last = np.searchsorted(beyond.frequency_hz, (low, np.nextafter(high, np.inf))).tolist()
     inside = slice(first, last)
     plain = [term for term in terms if term.name not in REFLEXES]
-    with_motion = [beyond.linear, *(beyond.term_lines(term.name) for term in plain)]
-    columns, torque = np.concatenate(with_motion, axis=1)[inside], beyond.torque_lines[inside]
+    with_motion = [beyond.linear, *(term.lines(beyond) for term in plain)]
+    columns, torque = np.column_stack(with_motion)[inside], beyond.torque_lines[inside]
     upper = triangle(columns, torque)
 
     def joint(group: Sequence[OmittedTerm]) -> Array:
@@ -216,8 +216,8 @@ def _moved_by_linear(case: Case, beyond: BeyondLinear, term: LinearTerm) -> Arra
     """Return what a linear term adds to J, B and K while it is left out, shape (1, 3)."""
     if not case.uses_perturbation or case.prepared is None:
         return (case.parameters - term.joint)[None]
-    lines = case.prepared.once(observe).lines
-    torque = term.torque(lines.motion, lines.grid.omega_rad_s)
+    seen = case.prepared.once(observe)
+    torque = term.torque(seen.motion, seen.grid.omega_rad_s)
     return _added(case, case.prepared, torque)[None]
 
 
@@ -225,7 +225,7 @@ def _added(case: Case, prepared: PreparedEpoch, torque: Complex) -> Array:
     """Return (Σ Re U^H Φ)⁻¹ Σ Re U^H T for each torque, of shape (..., m); shape (..., 3)."""
     (problem,) = instrumental([prepared.once(observe)], case.parameters)
     residual = problem.target - problem.regressors @ case.parameters
-    power = Smoother.over(problem.observation.lines.grid.line, 4, 0.1)(np.abs(residual) ** 2)
+    power = Smoother.over(problem.observation.grid.line, 4, 0.1)(np.abs(residual) ** 2)
     gram, moment, _ = sums([problem._replace(target=torque)], [np.maximum(power, 1e-300)])
     return solution(gram, moment)
 

@@ -31,12 +31,13 @@ from rigidimeter.analysis.estimation.closedloop.lack_of_fit import (
     same_sequence,
 )
 from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST
-from rigidimeter.analysis.estimation.closedloop.normal_equations import Problem, solution, sums
-from rigidimeter.analysis.estimation.closedloop.observation import (
-    Observation,
-    observe,
-    observe_periods,
+from rigidimeter.analysis.estimation.closedloop.normal_equations import (
+    Problem,
+    solution,
+    sums,
 )
+from rigidimeter.analysis.estimation.closedloop.observation import Observation
+from rigidimeter.analysis.estimation.closedloop.observe import observe, observe_periods
 from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
 from rigidimeter.analysis.estimation.diagnostics.least_squares_checks import loop_bias, unbiased
 from rigidimeter.analysis.estimation.found import found, in_half_intervals
@@ -44,7 +45,7 @@ from rigidimeter.analysis.estimation.method_record import Method
 from rigidimeter.analysis.estimation.methods import method_named
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array
-from rigidimeter.core.findings import Effect, Finding
+from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import BandEstimate, Fit
 from rigidimeter.core.settings import DiagnosticsSettings
 
@@ -140,7 +141,7 @@ def misfits(
     values = np.array([fit.value for _, fit in known])
     common = np.maximum(np.median(values, axis=0), LEAST)
     observed: list[Member] = []
-    made: dict[int, Complex] = {}
+    made: dict[tuple[int, int], Complex] = {}
     for (epoch, _), own in zip(known, values, strict=True):
         try:
             observed.append(_member(epoch.once(observe), own, common, made))
@@ -152,24 +153,25 @@ def misfits(
 
 
 def _member(
-    observation: Observation, values: Array, common: Array, made: dict[int, Complex]
+    observation: Observation, values: Array, common: Array, made: dict[tuple[int, int], Complex]
 ) -> Member:
     """Return an epoch as observed; `made` keeps what each perturbation causes, made once."""
-    excitation, lines = observation.excitation, observation.wider or observation.lines
+    excitation, seen = observation.excitation, observation.wider or observation
     assert excitation is not None  # `observe` gives it
     J, B, K = common.tolist()
-    if id(excitation) not in made:
-        made[id(excitation)] = replace(excitation, grid=lines.grid).motion_lines((J, B, K))
-    problem = Problem(made[id(excitation)], lines.motion, lines.torque_nm, observation)
+    key = id(excitation), seen.grid.line.size
+    if key not in made:
+        made[key] = replace(excitation, grid=seen.grid).motion_lines((J, B, K))
+    problem = Problem(made[key], seen.motion, seen.torque_nm, observation)
     return Member(problem, values)
 
 
 def _answer(member: Member) -> Answer:
     """Return what the lack of fit is tested with."""
-    lines = member.problem.observation.lines
+    seen = member.problem.observation
     caused = member.problem.instruments[member.fitted]
-    residual = lines.torque_nm - lines.motion @ member.values
-    return Answer(member.problem.observation, caused @ np.maximum(member.values, LEAST), residual)
+    residual = seen.torque_nm - seen.motion @ member.values
+    return Answer(seen, caused @ np.maximum(member.values, LEAST), residual)
 
 
 def _tested(
@@ -251,7 +253,7 @@ def _pooled_bias(
 def _of_every(pool: Fit, fits: Sequence[Fit]) -> list[Finding]:
     """Return what casts doubt on every epoch of a pool, and is not said of the pool yet.
 
-    What all epochs share does not average out: the effect on the pool is the mean of theirs.
+    What all epochs share does not average out. It is said as the epoch has it that has it most.
     """
     own = [fit for fit in fits if fit.outcome.included and pool.condition in ("", fit.condition)]
     doubts = [{one.name: one for one in fit.findings if one.level != "note"} for fit in own]
@@ -260,10 +262,9 @@ def _of_every(pool: Fit, fits: Sequence[Fit]) -> list[Finding]:
     for name in doubts[0] if doubts else ():
         shown = [one[name] for one in doubts if name in one]
         if len(shown) == len(own) and name not in said:
-            J, B, K = np.mean([one.effect.percent for one in shown], axis=0).tolist()
             most = max(shown, key=lambda one: abs(one.value - one.limit))
-            labels, effect = tuple(fit.epoch for fit in own), Effect((J, B, K))
-            common.append(replace(most, epochs=labels, condition=pool.condition, effect=effect))
+            labels = tuple(fit.epoch for fit in own)
+            common.append(replace(most, epochs=labels, condition=pool.condition))
     return common
 
 

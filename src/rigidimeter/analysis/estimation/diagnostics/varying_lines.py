@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rigidimeter.analysis.estimation.closedloop.grid import Grid
 from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST
 from rigidimeter.analysis.estimation.closedloop.normal_equations import Problem
-from rigidimeter.analysis.estimation.closedloop.observation import observe, observe_motion
+from rigidimeter.analysis.estimation.closedloop.observe import observe, observe_motion
 from rigidimeter.analysis.estimation.closedloop.recorded_perturbation import closed_loop_obstacle
 from rigidimeter.analysis.estimation.closedloop.refine import shared_powers
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
@@ -118,13 +118,13 @@ def varying_lines(prepared: PreparedEpoch, parameters: Array) -> VaryingLines:
         If the epoch cannot be observed; the text says why.
     """
     observation = prepared.once(observe_motion if closed_loop_obstacle(prepared.epoch) else observe)
-    grid = observation.lines.grid
+    grid = observation.grid
     n = scipy.fft.next_fast_len(int(POINTS_PER_CYCLE * (grid.line[-1] + 1)), real=True)
     time_s = grid.time_s[0] + np.arange(n) * (grid.time_s.size / grid.rate_hz / n)
     angle, velocity = _coarse_motion(prepared.epoch, time_s)
     wide = _from_first_line(grid)
     below = int(grid.line[0]) - 1
-    torque, motion = observation.lines.torque_nm, observation.lines.motion
+    torque, motion = observation.torque_nm, observation.motion
     (noise,) = shared_powers([Problem(motion, motion, torque, observation)], parameters)
     motion = np.concatenate([_low_motion(grid, wide.omega_rad_s[:below], angle, velocity), motion])
     instruments = motion

@@ -12,7 +12,6 @@ from rigidimeter.analysis.estimation.closedloop.band_sensitivity import Member, 
 from rigidimeter.analysis.estimation.closedloop.grid import epoch_grid
 from rigidimeter.analysis.estimation.closedloop.normal_equations import Problem
 from rigidimeter.analysis.estimation.closedloop.observation import Observation
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines
 from rigidimeter.core.records import Channel, Epoch
 
 TIME_S = np.arange(2000) / 100.0
@@ -37,29 +36,28 @@ def member(rng, sd_nm=1.0, missing_nm_s=0.0, truth=TRUTH):
     motion = angle[:, None] * np.stack([-(omega**2), 1j * omega, np.ones(omega.size)], axis=1)
     missing = missing_nm_s * np.abs(omega) * angle
     torque = motion @ truth + missing + sd_nm * noise(rng, omega.size)
-    return as_member(Lines(wide, torque, motion), fit, truth)
+    return as_member(Observation(wide, torque, motion), fit, truth)
 
 
 def as_member(wider, fit, truth):
     """Return an epoch whose motion is its own instrument."""
-    everywhere = np.ones(fit.line.size, dtype=bool)
-    observation = Observation(wider.on(fit), None, None, None, everywhere, wider=wider)
-    return Member(Problem(wider.motion, wider.motion, wider.torque_nm, observation), truth)
+    problem = Problem(wider.motion, wider.motion, wider.torque_nm, wider.on(fit))
+    return Member(problem, truth)
 
 
 def solved(member, power, part):
     weighted = member.problem.instruments[part] / power[part, None]
-    gram = (weighted.conj().T @ member.lines.motion[part]).real
-    return np.linalg.solve(gram, (weighted.conj().T @ member.lines.torque_nm[part]).real)
+    gram = (weighted.conj().T @ member.seen.motion[part]).real
+    return np.linalg.solve(gram, (weighted.conj().T @ member.seen.torque_nm[part]).real)
 
 
 def test_a_change_is_that_of_the_problem_of_those_lines_alone():
     made = member(np.random.default_rng(1), sd_nm=1e-9, missing_nm_s=0.01)
     values, changes = band_changes([made])
-    residual = made.lines.torque_nm - made.lines.motion @ TRUTH
+    residual = made.seen.torque_nm - made.seen.motion @ TRUTH
     # The residual's power is smooth enough here to be known without the module's smoother.
     power = np.convolve(np.pad(np.abs(residual) ** 2, 40, mode="edge"), np.ones(41), "same")[40:-40]
-    frequency_hz = made.lines.grid.omega_rad_s / (2 * np.pi)
+    frequency_hz = made.seen.grid.omega_rad_s / (2 * np.pi)
     for found in changes[:-2]:
         inside = (frequency_hz > found.low_hz - 1e-9) & (frequency_hz < found.high_hz + 1e-9)
         there = solved(made, power, np.flatnonzero(inside))
@@ -106,13 +104,13 @@ def test_of_nested_bands_the_error_is_the_difference_of_the_variances():
     made = member(np.random.default_rng(3))
     _, changes = band_changes([made])
     lines, narrow = np.flatnonzero, changes[4]
-    frequency_hz = made.lines.grid.omega_rad_s / (2 * np.pi)
+    frequency_hz = made.seen.grid.omega_rad_s / (2 * np.pi)
     variances = []
     for inside in (
         lines((frequency_hz > 0.09) & (frequency_hz < narrow.high_hz + 1e-9)),
-        np.arange(made.lines.torque_nm.size)[made.fitted],
+        np.arange(made.seen.torque_nm.size)[made.fitted],
     ):
-        motion = made.lines.motion[inside]
+        motion = made.seen.motion[inside]
         # Noise of power 2 in a line.
         variances.append(np.diag(np.linalg.inv((motion.conj().T @ motion).real)))
     expected = np.sqrt(variances[0] - variances[1])
@@ -138,7 +136,7 @@ def test_a_half_is_the_window_times_a_half_of_the_epoch():
     motion = np.stack([-(omega**2) * lines[2], 1j * omega * lines[2], lines[2]], axis=1)
     torque = 1.751 * wide.transform(course * angle) + motion[:, :2] @ TRUTH[:2]
     torque = torque + 0.01 * noise(rng, omega.size)
-    made = as_member(Lines(wide, torque, motion), fit, TRUTH)
+    made = as_member(Observation(wide, torque, motion), fit, TRUTH)
     values, changes = band_changes([made])
     halves = {c.part: c for c in changes if c.part != "all"}
     # The window ½ (1 + sin) has a mean of sin over it of one half.
@@ -148,9 +146,9 @@ def test_a_half_is_the_window_times_a_half_of_the_epoch():
 
 def test_what_a_hole_in_the_window_repeats_widens_the_error():
     made = member(np.random.default_rng(6))
-    grid = made.lines.grid
-    spread = replace(made.lines, grid=replace(grid, spread=4 * grid.spread))
-    other = as_member(spread, made.problem.observation.lines.grid, TRUTH)
+    grid = made.seen.grid
+    spread = replace(made.seen, grid=replace(grid, spread=4 * grid.spread))
+    other = as_member(spread, made.problem.observation.grid, TRUTH)
     plain, wider = (band_changes([m])[1] for m in (made, other))
     assert wider[0].change_se == pytest.approx(2 * plain[0].change_se, rel=0.01)
     assert np.all(wider[0].p > plain[0].p)

@@ -17,7 +17,6 @@ from rigidimeter.analysis.estimation.closedloop.lack_of_fit import (
     same_sequence,
 )
 from rigidimeter.analysis.estimation.closedloop.observation import Observation
-from rigidimeter.analysis.estimation.closedloop.spectral_lines import Lines
 from rigidimeter.analysis.estimation.diagnostics.together import checked_together, misfits
 from rigidimeter.analysis.estimation.prepared import prepare
 from rigidimeter.core.records import Channel, Epoch
@@ -32,7 +31,7 @@ def grid():
 
 def observed(layout):
     """Return an epoch of which nothing but its lines matters."""
-    return Observation(Lines(layout, None, None), None, None, None, None)
+    return Observation(layout, None, None)
 
 
 def noise(rng, size, slope=0.0):

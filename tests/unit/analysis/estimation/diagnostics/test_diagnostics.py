@@ -126,11 +126,8 @@ def test_what_all_epochs_share_is_said_of_their_pool_too(late):
         return
     (finding,) = found
     of_each = [one for fit in own for one in fit.findings if one.name == "velocity_delay"]
-    assert finding.value == max(one.value for one in of_each)
-    assert finding.epochs == tuple(fit.epoch for fit in own)
-    assert finding.effect.percent == pytest.approx(np.mean([o.effect.percent for o in of_each], 0))
-    percent, half = np.array(finding.effect)
-    np.testing.assert_allclose(half, percent / 50 * pool.value / (pool.high - pool.low), rtol=1e-9)
+    worst = max(of_each, key=lambda one: one.value)
+    assert finding == replace(worst, epochs=tuple(fit.epoch for fit in own))
 
 
 def test_sentences_of_findings_hold_for_an_axis_on_a_bench_too():
