@@ -81,7 +81,8 @@ class Observation:
     excitation : Excitation or None
         What the perturbation does in the loop; None where it is not used.
     periods : int
-        A perturbation that repeats so many times has power at every so manieth line alone.
+        How often the perturbation repeats within the grid, so that only lines whose number is a
+        multiple of it have power; 1 where it need not repeat.
     wider : Observation or None
         The same at the lines of a wider band.
     make_otherwise : callable
