@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import two_rigs
+from benchmarks import hard_epochs, two_rigs
 from benchmarks.known_joint import TRUTH, array, sessions, settings_with
 from rigidimeter.analysis.estimation import estimate_delays, fit_epochs
 from rigidimeter.analysis.estimation.closedloop.line_methods import LINE_METHODS
@@ -290,6 +290,33 @@ def rigs(n: int) -> list[str]:
     ]
 
 
+def lost(n: int) -> list[str]:
+    """Epochs of which a stretch is lost."""
+    start_s, stop_s = hard_epochs.LOST_S
+    return [
+        "## A stretch that is lost",
+        "",
+        f"`iv`, {n} epochs of 20 s with 0.1 N·m of voluntary torque, each fitted alone; what was "
+        f"measured from {start_s:g} to {stop_s:g} s is lost. In % for J, B, K. The interval of two "
+        "segments is the wider of their lines and their scatter, which two do not tell well.",
+        "",
+        *table(hard_epochs.LOST_HEADER, hard_epochs.lost_rows(n)),
+    ]
+
+
+def pushed(n: int) -> list[str]:
+    """Torque and motion alone, the subject pushing up to over all of the band."""
+    return [
+        "## Torque of the subject over all of the band",
+        "",
+        f"`bandlimited` on torque and motion alone, {n} epochs of 20 s a row, single epochs. In % "
+        "for J, B, K. The share of information is Σ |X|²/S of the lines where S is more than "
+        f"{100 * hard_epochs.DOMINATED:g} % of the torque's power, of that of all lines.",
+        "",
+        *table(hard_epochs.PUSHED_HEADER, hard_epochs.pushed_rows(n)),
+    ]
+
+
 PARTS: Mapping[str, tuple[Callable[[int], list[str]], int]] = {
     "pooled": (pooled_bias, 1000),
     "relaxed": (
@@ -310,6 +337,8 @@ PARTS: Mapping[str, tuple[Callable[[int], list[str]], int]] = {
         500,
     ),
     "two-rigs": (rigs, 200),
+    "lost": (lost, 200),
+    "pushed": (pushed, 100),
     "delay": (delay, 50),
     "rates": (paper_rates, 100),
     "section-3.4": (section_3_4, 100),
