@@ -123,7 +123,7 @@ def _together(result: StudyResult, factors: Sequence[float]) -> Iterator[Sequenc
             value, low, high = (factor * size for size in (one.value, one.low, one.high))
             places = decimals((high - low) / 2, value)
             interval = f"{fixed(low, places)} to {fixed(high, places)}"
-            scatter = f"{number(one.sd_percent, 2)} %" if one.sd_percent >= 0 else "–"
+            scatter = "–" if math.isnan(one.sd_percent) else f"{number(one.sd_percent, 2)} %"
             known = "–" if math.isnan(low) else interval
             cells.append((fixed(value, places), known, scatter))
         values, intervals, scatters = zip(*cells, strict=True)
@@ -140,7 +140,7 @@ def _scores(result: StudyResult) -> Table:
         found = {one.measure.short: one for one in each if one.measure.origin == "scores"}
         if found:
             cells = [
-                f"{number(found[name].value, 3)} (SD {found[name].sd_percent:.2g} %)"
+                f"{number(found[name].value, 3)} (SD {number(found[name].sd_percent, 2)} %)"
                 if not math.isnan(found[name].sd_percent)
                 else number(found[name].value, 3)
                 for name in ("impulse", "work")

@@ -6,7 +6,7 @@ the analysis of all. Methods of the sensitivity analysis run once each.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -36,6 +36,7 @@ from rigidimeter.analysis.study.results import SensitivityRow, SessionEntry, Stu
 from rigidimeter.analysis.study.sensitivity import sensitivity_methods, sensitivity_rows
 from rigidimeter.analysis.study.sessions import Gathered, gather
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Analysis, Epoch, Notice
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.study_files import StudyFolder, TableRow, read_study_folder
@@ -276,6 +277,16 @@ def _by_subject(
     return {subject: Preparation(epochs, settings) for subject, epochs in own.items()}
 
 
+def _beyond_epochs(part: Analysis) -> Iterator[tuple[str, Finding]]:
+    """Yield the cautions of a subject that no epoch carries, each with its condition."""
+    carried = {(fit.condition, one.name, one.level) for fit in part.fits for one in fit.findings}
+    carried |= {("", name, level) for _, name, level in carried}
+    pooled = [(fit.condition, one) for fit in part.pooled for one in fit.findings]
+    for where, one in (*pooled, *((one.condition, one) for one in part.across)):
+        if one.level != "note" and (where, one.name, one.level) not in carried:
+            yield where, one
+
+
 def _analysed(
     subjects: Mapping[str, Preparation],
     method: str,
@@ -299,12 +310,7 @@ def _analysed(
     across = [
         replace(finding, condition=where, facts={**finding.facts, "subject": subject})
         for subject, part in parts.items()
-        for carried in [{(one.name, one.level) for fit in part.fits for one in fit.findings}]
-        for where, finding in (
-            *((fit.condition, one) for fit in part.pooled for one in fit.findings),
-            *((one.condition, one) for one in part.across),
-        )
-        if finding.level != "note" and (finding.name, finding.level) not in carried
+        for where, finding in _beyond_epochs(part)
     ]
     reasons = dict.fromkeys([reason, *(part.method_reason for part in parts.values())])
     fits = [fit for part in parts.values() for fit in part.fits]

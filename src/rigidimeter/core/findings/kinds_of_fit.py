@@ -77,8 +77,8 @@ FIT_KINDS = (
         headline="Only {value:.0f} % of the {signal}'s power lies in the band",
         measured="Only {value:.0f} % of the {signal}'s power lies in the band, {low_hz:g} to "
         "{high_hz:.3g} Hz (at least {limit:g} %).",
-        meaning="Most of what was measured is drift below or motion above the band, so J, B and K "
-        "are from a small part of it.",
+        meaning="Most of what was measured lies below or above the band, so J, B and K are from a "
+        "small part of it.",
         remedy="Look for drift and slow pushes, check rate and unit of the time, and set the band "
         "to what was perturbed (--band-hz).",
         setting="min_band_share_percent",

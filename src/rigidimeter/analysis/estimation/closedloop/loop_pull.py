@@ -18,9 +18,7 @@ from functools import lru_cache
 import numpy as np
 
 from rigidimeter.analysis.estimation.closedloop.linear_problems import LEAST
-from rigidimeter.analysis.estimation.closedloop.normal_equations import (
-    Problem,
-)
+from rigidimeter.analysis.estimation.closedloop.normal_equations import Problem
 from rigidimeter.analysis.estimation.closedloop.observation import Observation
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.model import Loop, OpenLoop

@@ -174,9 +174,9 @@ def epoch_lines(
     caused: list[Array] = []
     if motion.driven_at is not None:
         command = motion.driven_at.command
-        tick, after_s = stamps = since_ticks(command, stamped.time_s, 0.0)
+        ticks, stamps_s = since_ticks(command, stamped.time_s, 0.0)
         if (place := sampled(stamped, time_s, SAME_TIME)) is not None:
-            tick, after_s = tick[place], after_s[place]
+            tick, after_s = ticks[place], stamps_s[place]
         else:
             tick, after_s = since_ticks(command, time_s, 0.0)
         interval_s, mean_s = 1.0 / command.mean_rate_hz, float(np.mean(after_s))
@@ -197,7 +197,7 @@ def epoch_lines(
     first, *others = grid.transform(np.stack([torque, *caused]))
     if motion.driven_at is None:
         return Observation(grid, first, lines, noises)
-    sent = Sent(others[0][:, None], interval_s, mean_s, stamps[1])
+    sent = Sent(others[0][:, None], interval_s, mean_s, stamps_s)
     if recorded:
         at = grid.omega_rad_s, interval_s, mean_s
         lines += sent.command * beyond_samples(motion.driven_at.drive, torque_filter, *at).seen

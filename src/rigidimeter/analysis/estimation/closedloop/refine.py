@@ -195,7 +195,7 @@ def _with_uncertainty(
     joint that is not quite the same each time. With fewer, the scatter itself is poorly known, and
     each variance is the larger of that and what the lines say.
     """
-    p, count, plain, weighted = values.size, len(problems), inverse, summed.weighted
+    p, count, weighted, widened = values.size, len(problems), summed.weighted, inverse
     made = [
         Solved(inverse, own, problem.regressors, power, problem.observation.grid.spread)
         for problem, power, own in zip(problems, powers, weighted, strict=True)
@@ -205,16 +205,16 @@ def _with_uncertainty(
         for problem, solved in zip(problems, made, strict=True):
             line = problem.observation.grid.line
             taken += solved.taken_by_weights(smoother_for(line, count), count)
-        inverse = with_weights(inverse, taken)
+        widened = with_weights(inverse, taken)
     effects, of_lines, squares = np.empty((count, p)), np.zeros((p, p)), np.zeros(p)
     for place, (problem, solved) in enumerate(zip(problems, made, strict=True)):
         residual = problem.target - problem.regressors @ values
-        effects[place] = inverse @ (residual @ solved.weighted.conj()).real
+        effects[place] = widened @ (residual @ solved.weighted.conj()).real
         if count >= ENOUGH_EPOCHS:
             continue
         smoother = smoother_for(problem.observation.grid.line, 1)
         # The epoch's own level on the common shape.
-        own = replace(solved, inverse=inverse)
+        own = replace(solved, inverse=widened)
         left = own.density(residual, smoother)
         part, degrees = own.covariance(left, smoother)
         of_lines += part
@@ -237,7 +237,7 @@ def _with_uncertainty(
         problems,
         powers,
         summed.gram,
-        plain,
+        inverse,
     )
 
 

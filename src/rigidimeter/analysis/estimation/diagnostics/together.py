@@ -251,16 +251,16 @@ def _pooled_bias(
 
 
 def _of_every(pool: Fit, fits: Sequence[Fit]) -> list[Finding]:
-    """Return what casts doubt on every epoch of a pool, and is not said of the pool yet.
+    """Return the cautions that all epochs of a pool carry and the pool does not carry yet.
 
-    What all epochs share does not average out. It is said as the epoch has it that has it most.
+    What all epochs share does not average out. Each is that of the epoch furthest beyond the limit.
     """
     own = [fit for fit in fits if fit.outcome.included and pool.condition in ("", fit.condition)]
-    doubts = [{one.name: one for one in fit.findings if one.level != "note"} for fit in own]
+    cautions = [{one.name: one for one in fit.findings if one.level != "note"} for fit in own]
     said = {one.name for one in pool.findings}
     common = []
-    for name in doubts[0] if doubts else ():
-        shown = [one[name] for one in doubts if name in one]
+    for name in cautions[0] if cautions else ():
+        shown = [one[name] for one in cautions if name in one]
         if len(shown) == len(own) and name not in said:
             most = max(shown, key=lambda one: abs(one.value - one.limit))
             labels = tuple(fit.epoch for fit in own)
