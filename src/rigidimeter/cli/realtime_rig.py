@@ -44,7 +44,7 @@ def run_loop(
 
     clock = DeadlineClock()
     if rig_path is None:
-        rig, new_joint = _virtual(settings, protocol)
+        rig, new_joint = virtual_rig(settings, protocol)
         _run(settings, protocol, rig, new_joint, clock, side, lambda _: ())
         return
     # What is slow to load is loaded before the sensor's samples flow.
@@ -104,15 +104,20 @@ def _run(
         rig.close()
 
 
-def _virtual(
+def virtual_rig(
     settings: Settings, protocol: Protocol
 ) -> tuple[Rig, Callable[[PlannedEpoch], Mapping[str, Any]]]:
+    """Return the virtual rig, and what gives its joint to each epoch.
+
+    Until the first epoch the subject is relaxed, as a person is asked to be while the torque sensor
+    is zeroed.
+    """
     import numpy as np
 
     from rigidimeter.rig.devices import SimulatedRig
 
     first = settings.subject[protocol.epochs[0].condition]
-    rig = SimulatedRig(settings.rig, first, np.random.default_rng(settings.seed))
+    rig = SimulatedRig(settings.rig, first.relaxed, np.random.default_rng(settings.seed))
 
     def new_joint(planned: PlannedEpoch) -> dict[str, Any]:
         return {"true_joint": asdict(rig.new_epoch(settings.subject[planned.condition]))}

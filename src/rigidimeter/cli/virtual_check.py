@@ -32,10 +32,8 @@ class _VirtualRig:
     """The virtual rig with a clock, and with the facts of a device; its arm pushes nothing."""
 
     def __init__(self, settings: Settings) -> None:
-
         first = next(iter(settings.subject.values()))
-        passive = first.model_copy(update={"voluntary_sd_nm": 0.0, "tremor_amplitude_nm": 0.0})
-        self._rig = SimulatedRig(settings.rig, passive, np.random.default_rng(settings.seed))
+        self._rig = SimulatedRig(settings.rig, first.relaxed, np.random.default_rng(settings.seed))
         self._settings, self._reads = settings, 0
 
     def __getattr__(self, name: str) -> Any:

@@ -59,3 +59,8 @@ class SubjectSettings(Section):
     voluntary_high_hz: float = quantity(4.0, "Hz", 0.05, 50.0)
     tremor_amplitude_nm: float = quantity(0.0, "N·m", 0.0, 10.0)
     tremor_frequency_hz: float = quantity(5.0, "Hz", 1.0, 20.0)
+
+    @property
+    def relaxed(self) -> SubjectSettings:
+        """The same arm with no torque of the subject's own: neither voluntary nor tremor."""
+        return self.model_copy(update={"voluntary_sd_nm": 0.0, "tremor_amplitude_nm": 0.0})
