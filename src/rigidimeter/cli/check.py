@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ from rigidimeter.core.errors import UserError
 if TYPE_CHECKING:
     from rigidimeter.core.settings import Settings
     from rigidimeter.rig.commissioning import DailyRecord, ZeroFound
+    from rigidimeter.rig.devices import RigFile
 
 
 def check(
@@ -40,6 +42,11 @@ def check(
         "Only zero and noise of the torque sensor. Without power, by the limits of [zeroing], as "
         "`run` does when it begins; nothing is recorded.",
     ),
+    live: bool = OPTIONS.flag(
+        "--live",
+        "Show what the sensors read, until Ctrl-C. Without power, on the drive's own scale, while "
+        "you wire, turn the joint or hang a weight; nothing is asked or recorded.",
+    ),
     yes: bool = OPTIONS.flag("--yes", "Consent in advance, for an emulated rig only."),
     piped: bool = OPTIONS.flag(
         "--piped", "A program asks somebody and pipes the answer.", hidden=True
@@ -58,6 +65,7 @@ def check(
       rigidimeter check RIG.toml --settings study.toml
       rigidimeter check RIG.toml --known-inertia-kg-m2 0.012
       rigidimeter check RIG.toml --zero
+      rigidimeter check RIG.toml --live
     """
     from rigidimeter.cli.rig_checks import claimed, operator, require_answers
     from rigidimeter.cli.virtual_check import virtual_check, virtual_setup
@@ -80,8 +88,8 @@ def check(
             f"--known-inertia-kg-m2 {known_inertia:g}: must be a number above 0, in kg·m²"
         )
     if rigfile is None:
-        if known_inertia is not None or new_reference:
-            raise UserError("--known-inertia-kg-m2 and --new-reference need a RIG.toml")
+        if known_inertia is not None or new_reference or live:
+            raise UserError("--known-inertia-kg-m2, --new-reference and --live need a RIG.toml")
         setup = virtual_setup(chosen, operator(yes=not piped, piped=piped))
         if zero:
             _say_zero(zero_check(setup), chosen)
@@ -89,6 +97,9 @@ def check(
             _say_checked(virtual_check(setup), chosen, "the virtual rig")
         return
     path = daily_path(rigfile.path)
+    if live:
+        _show_live(rigfile, chosen)
+        return
     if zero:
         with claimed(rigfile, chosen, path, "do it again", operator(yes=True)) as setup:
             at_rest = zero_check(setup)
@@ -126,6 +137,23 @@ def check(
         was = "" if kept.before_kg_m2 is None else f"; it was {kept.before_kg_m2:.3g} kg·m²"
         echo(f"Stored as the reference: {kept.inertia_kg_m2:.3g} kg·m², {kept.reason}{was}.")
     echo(f"Valid until {found.valid_until:%Y-%m-%d %H:%M} UTC.")
+
+
+def _show_live(rigfile: RigFile, settings: Settings) -> None:
+    """Show the readings in one line that is replaced; in a file or a pipe a line each."""
+    from rigidimeter.cli.rig_checks import claimed, operator
+    from rigidimeter.rig.commissioning import HEADING, LiveReading, live_readings
+
+    ending = "\r" if sys.stdout.isatty() else "\n"
+
+    def show_line(reading: LiveReading) -> bool:
+        sys.stdout.write(f"{reading.words:<79}{ending}")
+        sys.stdout.flush()
+        return True
+
+    with claimed(rigfile, settings, None, "", operator(yes=True)) as setup:
+        echo(f"Live readings, without power. Ctrl-C ends.\n{HEADING}")
+        live_readings(setup, show_line)
 
 
 def _say_checked(found: DailyRecord, settings: Settings, what: str) -> None:

@@ -94,13 +94,14 @@ class _Piped:
 def claimed(
     rigfile: RigFile,
     settings: Settings,
-    record: Path,
+    record: Path | None,
     again: str,
     asked: Operator,
 ) -> Iterator[Setup]:
     """Prepare this process for the loop and claim the rig; give it, not connected yet.
 
-    An interrupt says that `record` was not written, and to do it `again`.
+    An interrupt says that `record` was not written, and to do it `again`; where there is no record
+    it is the end that was waited for.
     """
     for line in str(prepare_loop_process()).splitlines():
         echo(line, err=True)
@@ -111,7 +112,7 @@ def claimed(
 
 
 @contextlib.contextmanager
-def interrupted_once(record: Path, again: str) -> Iterator[None]:
+def interrupted_once(record: Path | None, again: str) -> Iterator[None]:
     """Let Ctrl-C, Ctrl-\\, SIGTERM and the end of the terminal end it, once; say what that left.
 
     A second one would break off the steps that bring the drive to rest and take its power away.
@@ -129,9 +130,10 @@ def interrupted_once(record: Path, again: str) -> Iterator[None]:
     try:
         yield
     except (KeyboardInterrupt, typer.Abort):
-        raise UserError(
-            f"interrupted: the rig was stopped, and {record} was not written; {again}"
-        ) from None
+        if record is not None:
+            raise UserError(
+                f"interrupted: the rig was stopped, and {record} was not written; {again}"
+            ) from None
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

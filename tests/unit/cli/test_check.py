@@ -59,3 +59,9 @@ def test_a_damaged_reference_is_given_up_knowingly(rig, rigidimeter, monkeypatch
         "is no daily check of the schema rigidimeter.check/1; its reference is lost, so add"
         in ran.err
     )
+
+
+def test_live_readings_need_a_rig(rigidimeter):
+    ran = rigidimeter("check", "--live")
+    assert ran.status == 1
+    assert "--live need a RIG.toml" in ran.err

@@ -34,6 +34,7 @@ from rigidimeter.rig.commissioning.inertia_fit import (
     quick_motion,
     torque_answer,
 )
+from rigidimeter.rig.commissioning.live_readings import HEADING, LiveReading, live_readings
 from rigidimeter.rig.commissioning.response import fit_arm, following, velocity_per_angle
 from rigidimeter.rig.commissioning.sealed_record import digest
 from rigidimeter.rig.commissioning.sequence import commission_rig

@@ -118,15 +118,21 @@ def rate_checks(
     ]
 
 
+def bad_counts(counts: Mapping[str, int]) -> dict[str, int]:
+    """Return the counts of messages that were lost, damaged or out of order."""
+    return {name: count for name, count in counts.items() if name.endswith(BAD_COUNTS)}
+
+
 def lost_check(
     before: Mapping[str, int], after: Mapping[str, int], limit_percent: float
 ) -> RigCheck:
     """Check that what the wires counted as lost or damaged is next to nothing."""
     gone = {name: count - before.get(name, 0) for name, count in after.items()}
     received = sum(count for name, count in gone.items() if name.endswith("_received"))
-    bad = sum(count for name, count in gone.items() if name.endswith(BAD_COUNTS))
-    percent = 100.0 * bad / received if received else (100.0 if bad else 0.0)
-    worst = ", ".join(f"{n} {c}" for n, c in gone.items() if c and n.endswith(BAD_COUNTS))
+    bad = bad_counts(gone)
+    total = sum(bad.values())
+    percent = 100.0 * total / received if received else (100.0 if total else 0.0)
+    worst = ", ".join(f"{name} {count}" for name, count in bad.items() if count)
     remedy = f"check cables, switches and other traffic ({worst})"
     return below("lost or damaged messages", percent, "%", limit_percent, remedy)
 
