@@ -22,6 +22,13 @@ from rigidimeter.model.drive_model import (
     state_later,
     with_conjugates,
 )
+from rigidimeter.model.drive_side import (
+    DriveSide,
+    DriveSideState,
+    drive_side,
+    drive_side_step,
+    reported_torque_nm,
+)
 from rigidimeter.model.joint import (
     JointDynamics,
     arm_response,

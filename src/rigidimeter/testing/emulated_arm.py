@@ -2,7 +2,7 @@
 
 Emulators are read at any time, not at fixed ticks. At each call the state is advanced exactly to
 the present time, under the command in force since the last call. The equations are those of
-`rigidimeter.model.velocity_drive` and `joint`.
+`rigidimeter.model.velocity_drive`, `joint` and `drive_side`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,18 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rigidimeter.model import DriveState, JointDynamics, arm_torque_nm, drive, drive_step
+from rigidimeter.core.settings import DriveSideSettings
+from rigidimeter.model import (
+    DriveSideState,
+    DriveState,
+    JointDynamics,
+    arm_torque_nm,
+    drive,
+    drive_side_step,
+    drive_step,
+    reported_torque_nm,
+)
+from rigidimeter.model import drive_side as make_drive_side
 
 LONGEST_STEP_S = 0.5
 DAMPING_RATIO = 0.7071
@@ -37,6 +48,8 @@ class EmulatedArm:
         Of the noise.
     now : callable
         Monotonic time in s.
+    drive_side : DriveSideSettings, optional
+        Motor and gear of the drive, and how it reports its torque; by default a small joint's.
     """
 
     def __init__(
@@ -48,8 +61,10 @@ class EmulatedArm:
         voluntary_nm: Callable[[float], float] = lambda _: 0.0,
         seed: int = 1,
         now: Callable[[], float] = time.monotonic,
+        drive_side: DriveSideSettings | None = None,
     ) -> None:
         self.joint = joint
+        self.drive_side = side = drive_side or DriveSideSettings()
         self.voluntary_nm = voluntary_nm
         self._bandwidth_hz = bandwidth_hz
         self._noise_sd_nm = noise_sd_nm
@@ -57,6 +72,7 @@ class EmulatedArm:
         self._now = now
         self._start_s = self._at_s = now()
         self._state = DriveState()
+        self._side, self._side_state = make_drive_side(side), DriveSideState()
         self._target_rad_s = 0.0
         self._command_rad_s = 0.0
         self._ramp_rad_s2 = np.inf
@@ -82,21 +98,30 @@ class EmulatedArm:
         """Return the present torque from the drive on the joint, plus sensor noise, in N·m."""
         with self._lock:
             self._advance()
-            joint = self.joint
-            torque_nm = arm_torque_nm(
-                joint.inertia_kg_m2,
-                joint.damping_nm_s_rad,
-                joint.stiffness_nm_rad,
-                *self._state,
-                self.voluntary_nm(self._at_s - self._start_s),
-            )
-            return torque_nm + self._noise_sd_nm * float(self._rng.standard_normal())
+            return self._torque_nm() + self._noise_sd_nm * float(self._rng.standard_normal())
+
+    def drive_torque_nm(self) -> float:
+        """Return the present torque of the motor, by the drive's own scale and in its steps."""
+        with self._lock:
+            self._advance()
+            return reported_torque_nm(self._side, self._side_state)
+
+    def _torque_nm(self) -> float:
+        joint = self.joint
+        return arm_torque_nm(
+            joint.inertia_kg_m2,
+            joint.damping_nm_s_rad,
+            joint.stiffness_nm_rad,
+            *self._state,
+            self.voluntary_nm(self._at_s - self._start_s),
+        )
 
     def place(self, angle_rad: float) -> None:
         """Put the arm at an angle, at rest, as if moved by hand."""
         with self._lock:
             self._advance()
             self._state = DriveState(angle_rad)
+            self._side_state = self._side_state._replace(angle_rad=angle_rad)
             self._command_rad_s = self._target_rad_s = 0.0
 
     def _advance(self) -> None:
@@ -114,3 +139,7 @@ class EmulatedArm:
             coefficients = drive(self._bandwidth_hz, DAMPING_RATIO, step_s)
             self._state = drive_step(coefficients, self._state, self._command_rad_s)
             elapsed_s -= step_s
+        angle, _, acceleration = self._state
+        self._side_state = drive_side_step(
+            self._side, self._side_state, angle, acceleration, self._torque_nm()
+        )

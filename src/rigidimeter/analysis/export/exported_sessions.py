@@ -41,6 +41,8 @@ _UNITS: Mapping[str, str] = {
     "target_angle_rad": "rad",
     "velocity_request_rad_s": "rad/s",
     "lateness_s": "s",
+    "drive_torque_nm": "N·m",
+    "drive_torque_time_s": "s",
 }
 """The unit of every column that has one; the others are counts and codes."""
 

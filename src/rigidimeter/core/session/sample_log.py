@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Iterable, Mapping
+from math import nan
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -29,7 +30,8 @@ class Sample(NamedTuple):
 
     `epoch` is the number of the epoch, -1 during rests. `limited` is a `guard.Limited` value, and
     `cause` a `guard.Cause` value. The command is what was sent after the guard; the request is what
-    the controller asked for. Sequences and status words are the devices' own.
+    the controller asked for. Sequences and status words are the devices' own. The drive's torque is
+    that of its motor by its own measurement, NaN where it reports none.
     """
 
     tick: int
@@ -51,6 +53,8 @@ class Sample(NamedTuple):
     motion_sequence: int = -1
     motion_status: int = 0
     cause: int = 0
+    drive_torque_nm: float = nan
+    drive_torque_time_s: float = nan
 
 
 SAMPLE_UNITS: Mapping[str, str] = {
@@ -73,6 +77,8 @@ SAMPLE_UNITS: Mapping[str, str] = {
     "motion_sequence": "count of the drive, -1 where it has none",
     "motion_status": "status word of the drive",
     "cause": "number of the cause for which the guard latched, 0 none",
+    "drive_torque_nm": "N·m of the motor at the joint, as the drive reports, NaN where it does not",
+    "drive_torque_time_s": "s, stamp of the drive's torque",
 }
 """The unit of every recorded column, as the manifest states them."""
 

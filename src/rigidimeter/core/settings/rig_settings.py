@@ -29,6 +29,25 @@ class MotionSensorSettings(Section):
     jitter_s: float = quantity(0.0, "s", 0.0, 0.1)
 
 
+class DriveSideSettings(Section):
+    """The motor and gear of the virtual drive, at the joint, and the torque that it reports.
+
+    `friction_ripple_deg` is the angle of the joint in which the friction goes through one ripple.
+    The true torque of the motor is `torque_scale` times the reported one, which is that of
+    `torque_latency_ticks` before.
+    """
+
+    reflected_inertia_kg_m2: float = quantity(0.05, "kg·m²", 0.0, 20.0)
+    friction_nm: float = quantity(0.3, "N·m", 0.0, 50.0)
+    friction_ripple_percent: float = quantity(20.0, "%", 0.0, 90.0)
+    friction_ripple_deg: float = quantity(3.6, "deg", 0.1, 360.0)
+    reports_torque: bool = True
+    rated_torque_nm: float = quantity(10.0, "N·m", 0.01, 1000.0)
+    torque_resolution_percent: float = quantity(0.1, "%", 0.0, 10.0)
+    torque_latency_ticks: int = quantity(1, "ticks", 0, 100)
+    torque_scale: float = quantity(0.9, "1", 0.1, 10.0)
+
+
 class RigSettings(Section):
     """The virtual rig: loop rate, drive and sensors."""
 
@@ -37,6 +56,7 @@ class RigSettings(Section):
     drive_damping_ratio: float = quantity(0.7071, "1", 0.6, 0.99)
     torque: TorqueSensorSettings = TorqueSensorSettings()
     motion: MotionSensorSettings = MotionSensorSettings()
+    drive_side: DriveSideSettings = DriveSideSettings()
 
 
 class SubjectSettings(Section):

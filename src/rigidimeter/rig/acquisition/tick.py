@@ -322,6 +322,8 @@ def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: i
         reading.motion_sequence,
         reading.motion_status,
         loop.guard.cause,
+        reading.drive_torque_nm,
+        reading.drive_torque_time_s,
     )
     loop.record(sample)
     return k

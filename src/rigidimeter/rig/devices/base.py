@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from math import nan
 from typing import Any, NamedTuple, Protocol
 
 from rigidimeter.core.errors import UserError
@@ -69,7 +70,13 @@ class TorqueSample(NamedTuple):
 
 
 class MotionSample(NamedTuple):
-    """The newest angle and velocity; fields as in `TorqueSample`."""
+    """The newest angle and velocity; fields as in `TorqueSample`.
+
+    `drive_torque_nm` is the torque of the motor by the drive's own measurement, taken with angle
+    and velocity: at the joint as far as the drive's rated torque and the gear say, friction and
+    inertia of motor and gear included, positive toward positive angle. NaN if the drive does not
+    report it.
+    """
 
     angle_rad: float
     velocity_rad_s: float
@@ -78,6 +85,7 @@ class MotionSample(NamedTuple):
     raw: tuple[int, ...] = ()
     status: int = 0
     cause: int = int(Cause.NONE)
+    drive_torque_nm: float = nan
 
 
 class TorqueSensor(Protocol):
@@ -154,7 +162,8 @@ class Reading(NamedTuple):
     """The newest samples, with their times on the loop's clock.
 
     Sensors sample by their own clocks, so a reading may repeat the sample of the previous tick,
-    with the same time. `cause` is what a device reports, NONE if all is well.
+    with the same time. `cause` is what a device reports, NONE if all is well. `drive_torque_nm` is
+    as in `MotionSample`; where it is NaN, its time is too.
     """
 
     torque_nm: float
@@ -167,6 +176,8 @@ class Reading(NamedTuple):
     motion_sequence: int = -1
     motion_status: int = 0
     cause: int = int(Cause.NONE)
+    drive_torque_nm: float = nan
+    drive_torque_time_s: float = nan
 
 
 class Rig(Protocol):

@@ -180,6 +180,7 @@ class ComposedRig:
         cause = torque.cause
         if REACTIONS[motion.cause] > REACTIONS[cause] or not cause:
             cause = motion.cause
+        drive_nm = motion.drive_torque_nm
         return Reading(
             torque.torque_nm - self._bias_nm,
             torque.time_s,
@@ -191,6 +192,8 @@ class ComposedRig:
             motion.sequence,
             motion.status,
             cause,
+            drive_nm,
+            math.nan if math.isnan(drive_nm) else motion.time_s,
         )
 
     @property

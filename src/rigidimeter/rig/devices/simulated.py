@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
@@ -14,6 +15,7 @@ from rigidimeter.core.units import rad_from_deg
 from rigidimeter.model import (
     BLOCK_TICKS,
     SAME_TIME_S,
+    DriveSideState,
     DriveState,
     JointDynamics,
     SubjectTorque,
@@ -21,9 +23,12 @@ from rigidimeter.model import (
     between,
     draw_joint,
     drive,
+    drive_side,
+    drive_side_step,
     drive_step,
     moment,
     quantised,
+    reported_torque_nm,
     rig_streams,
     sample_times_s,
 )
@@ -34,7 +39,8 @@ class SimulatedRig:
     """Drive, arm, subject and sensors, one tick for each `read`.
 
     The arm follows the velocity command that was in force since the last tick. Its state at the
-    time of each sensor sample is exact, also between ticks.
+    time of each sensor sample is exact, also between ticks. The drive measures its own torque once
+    a tick, 0 without power, and sends it with angle and velocity.
 
     Parameters
     ----------
@@ -73,7 +79,10 @@ class SimulatedRig:
         self._torque_next_s = next(self._torque_times)
         self._motion_next_s = next(self._motion_times)
         self._torque_queue: deque[tuple[float, float, float]] = deque()
-        self._motion_queue: deque[tuple[float, float, float, float]] = deque()
+        self._motion_queue: deque[tuple[float, float, float, float, float]] = deque()
+        self._side, self._side_state = drive_side(settings.drive_side), DriveSideState()
+        reported = 0.0 if settings.drive_side.reports_torque else math.nan
+        self._drive_torques_nm = deque([reported], settings.drive_side.torque_latency_ticks + 1)
         self._reading = Reading(0.0, -t.latency_s, 0.0, 0.0, -m.latency_s)
         self._tick = 0
         self._state = DriveState()
@@ -115,7 +124,12 @@ class SimulatedRig:
 
     def configure(self) -> Mapping[str, Any]:
         """Return facts that say the rig is simulated."""
-        return {"torque_sensor": {"model": "simulated"}, "drive": {"model": "simulated"}}
+        side = self._settings.drive_side
+        values = {"rated_torque_nm": side.rated_torque_nm} if side.reports_torque else {}
+        return {
+            "torque_sensor": {"model": "simulated"},
+            "drive": {"model": "simulated", "values": values},
+        }
 
     def zero(self, bias_nm: float) -> None:
         """Subtract `bias_nm` from every torque from now on."""
@@ -176,6 +190,8 @@ class SimulatedRig:
             self._voluntary_before = self._voluntary_now
             self._voluntary_now = next(self._voluntary)
             self._state = drive_step(self._full_tick, before, self._command)
+        if self._settings.drive_side.reports_torque:
+            self._drive_torques_nm.append(self._drive_torque_nm())
         until_s = now_s + SAME_TIME_S
         while self._torque_next_s <= until_s:
             self._take_torque(self._torque_next_s, now_s, before)
@@ -184,15 +200,35 @@ class SimulatedRig:
             self._take_motion(self._motion_next_s, now_s, before)
             self._motion_next_s = next(self._motion_times)
         self._tick += 1
-        torque_nm, torque_s, angle, velocity, motion_s, *_ = self._reading
+        torque_nm, torque_s, angle, velocity, motion_s, *_, drive_nm, drive_s = self._reading
         queue = self._torque_queue
         while queue and queue[0][0] <= until_s:
             _, torque_s, torque_nm = queue.popleft()
         samples = self._motion_queue
         while samples and samples[0][0] <= until_s:
-            _, motion_s, angle, velocity = samples.popleft()
-        self._reading = Reading(torque_nm, torque_s, angle, velocity, motion_s)
+            _, motion_s, angle, velocity, drive_nm = samples.popleft()
+            drive_s = motion_s if self._settings.drive_side.reports_torque else math.nan
+        self._reading = Reading(
+            torque_nm,
+            torque_s,
+            angle,
+            velocity,
+            motion_s,
+            drive_torque_nm=drive_nm,
+            drive_torque_time_s=drive_s,
+        )
         return self._reading
+
+    def _drive_torque_nm(self) -> float:
+        """Advance the drive's side to this tick and return the torque that it reports."""
+        angle, velocity, acceleration = self._state
+        torque_nm = arm_torque_nm(
+            self._J, self._B, self._K, angle, velocity, acceleration, self._voluntary_now
+        )
+        self._side_state = drive_side_step(
+            self._side, self._side_state, angle, acceleration, torque_nm
+        )
+        return reported_torque_nm(self._side, self._side_state) if self._enabled else 0.0
 
     def _take_torque(self, taken_s: float, now_s: float, before: DriveState) -> None:
         """Measure the torque at a time since the last tick."""
@@ -219,6 +255,7 @@ class SimulatedRig:
                 arrives_s - sensor.stamp_latency_s,
                 quantised(angle, sensor.resolution),
                 quantised(velocity, sensor.velocity_resolution),
+                self._drive_torques_nm[0],
             )
         )
 

@@ -84,7 +84,8 @@ class Cia402Emulator:
         self._bus = can.Bus(interface=interface, channel=channel, ignore_config=True, **options)
         self._network = network = canopen.Network(self._bus)
         network.send_message = self._transmit
-        objects = dictionary(canopen.objectdictionary, node_id)
+        rated_mnm = self._servo.rated_torque_mnm
+        objects = dictionary(canopen.objectdictionary, node_id, rated_mnm)
         self._node = node = network.create_node(canopen.LocalNode(node_id, objects))
         network.unsubscribe(0x600 + node_id, node.sdo.on_request)
         network.subscribe(0x600 + node_id, self._on_sdo_request)
@@ -116,6 +117,8 @@ class Cia402Emulator:
                 self._servo.go(Phase.SWITCHED_ON, name)
             elif name == "encoder frozen":
                 self._servo.wrong[name] = self._servo.measured()
+            elif name == "torque frozen":
+                self._servo.wrong[name] = self._servo.torque()
             elif name in ("stop heartbeat", "die"):
                 self._node.nmt.stop_heartbeat()
             elif name == "reboot":
@@ -221,6 +224,8 @@ class Cia402Emulator:
             return self._servo.measured()[0]
         if index == 0x606C:
             return self._servo.measured()[1]
+        if index == 0x6077:
+            return self._servo.torque()
         if index == 0x60FF and "stale target" in self._servo.wrong:
             return round(self._servo.target())
         if (index, subindex) == (0x1016, 1) and "wrong watchdog" in self._servo.wrong:

@@ -29,7 +29,15 @@ class Entry:
     default: int | str = 0
 
 
-def _entries(node_id: int) -> tuple[Entry, ...]:
+def _entries(node_id: int, rated_torque_mnm: int | None) -> tuple[Entry, ...]:
+    torque = (
+        ()
+        if rated_torque_mnm is None
+        else (
+            Entry(0x6076, 0, "motor rated torque in mN·m", U32, "const", rated_torque_mnm),
+            Entry(0x6077, 0, "actual torque in thousandths of it", I16, "ro"),
+        )
+    )
     return (
         Entry(0x1000, 0, "device type", U32, "const", 0x00020192),
         Entry(0x1001, 0, "error register", U8, "ro"),
@@ -57,6 +65,7 @@ def _entries(node_id: int) -> tuple[Entry, ...]:
         Entry(0x6061, 0, "mode of operation display", I8, "ro"),
         Entry(0x6064, 0, "actual position", I32, "ro"),
         Entry(0x606C, 0, "actual velocity", I32, "ro"),
+        *torque,
         Entry(0x607F, 0, "max profile velocity", U32, "rw", 0xFFFF_FFFF),
         Entry(0x6083, 0, "profile acceleration", U32, "rw", 1_000_000),
         Entry(0x6084, 0, "profile deceleration", U32, "rw", 1_000_000),
@@ -79,10 +88,13 @@ def _message(index: int, identifier: int, mapped: tuple[int, ...]) -> tuple[Entr
     )
 
 
-def dictionary(objectdictionary: Any, node_id: int) -> Any:
-    """Return the object dictionary, made with `canopen.objectdictionary`."""
+def dictionary(objectdictionary: Any, node_id: int, rated_torque_mnm: int | None) -> Any:
+    """Return the object dictionary, made with `canopen.objectdictionary`.
+
+    Without a rated torque the drive has no object of its torque.
+    """
     made = objectdictionary.ObjectDictionary()
-    entries = _entries(node_id)
+    entries = _entries(node_id, rated_torque_mnm)
     several = {entry.index for entry in entries if entry.subindex}
     for entry in entries:
         variable = objectdictionary.ODVariable(entry.name, entry.index, entry.subindex)

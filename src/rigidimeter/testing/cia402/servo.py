@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import deque
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
@@ -35,6 +36,7 @@ CIA402_MISBEHAVIOURS = {
     "encoder jump": "reports a position with an error (value: in rad)",
     "encoder sign": "reports position and velocity with the wrong sign",
     "velocity gain": "reports so many times the velocity (value: 0 or less, as a rule)",
+    "torque frozen": "keeps reporting the present torque of its motor",
     "slow answers": "answers SDO requests late (value: by how many s)",
     "wrong watchdog": "accepts the heartbeat watchdog but uses another (value: in ms)",
     "ignores quick stop": "keeps moving after a quick-stop command",
@@ -56,6 +58,8 @@ DEFAULTS = {
 
 UNITS_PER_RAD = 819_200.0 / (2 * math.pi)
 """Drive units of position, velocity and acceleration: 819,200 counts in a turn of the joint."""
+
+GEAR_RATIO = 100.0
 
 AT_REST_RAD_S = 0.01
 GENERIC_ERROR, COMMUNICATION_ERROR = 0x01, 0x11
@@ -150,6 +154,12 @@ class Servo:
         self.wrong: dict[str, Any] = {}
         """Active misbehaviours and their values."""
         self.last_stop = LastStop()
+        side = arm.drive_side
+        self.rated_torque_mnm = (
+            round(1e3 * side.rated_torque_nm / GEAR_RATIO) if side.reports_torque else None
+        )
+        """Of the motor; None if the drive does not report its torque."""
+        self._torques = deque([0], side.torque_latency_ticks + 1)
 
     def restart(self) -> None:
         """Return to the state after power-up."""
@@ -173,6 +183,16 @@ class Servo:
         units = sign * UNITS_PER_RAD
         velocity_rad_s *= self.wrong.get("velocity gain", 1.0)
         return round(angle_rad * units), round(velocity_rad_s * units)
+
+    def torque(self) -> int:
+        """Take the motor's torque and return an earlier one, in thousandths of the rated torque."""
+        if isinstance(frozen := self.wrong.get("torque frozen"), int):
+            return frozen
+        powered = self.phase in POWERED
+        torque_nm = self._arm.drive_torque_nm() if powered else 0.0
+        part = round(1e3 * torque_nm / self._arm.drive_side.rated_torque_nm)
+        self._torques.append(max(-(2**15), min(2**15 - 1, part)))
+        return self._torques[0]
 
     def control(self, control: int) -> None:
         """Execute a controlword."""

@@ -18,7 +18,8 @@ from rigidimeter.rig.acquisition.processes import (
 
 
 def sample(k: int) -> Sample:
-    return Sample(k, *[k + 0.5] * 2, k % 3 - 1, *[k + 0.25] * 9, k % 5, k, 1 << 40, -1, 0, k % 31)
+    devices = k, 1 << 40, -1, 0, k % 31, k / 4, k / 8
+    return Sample(k, *[k + 0.5] * 2, k % 3 - 1, *[k + 0.25] * 9, k % 5, *devices)
 
 
 @pytest.fixture
@@ -146,7 +147,7 @@ def test_memory_that_is_not_there_is_refused_with_its_size(tmp_path, monkeypatch
     monkeypatch.setattr(shared_memory, "WHERE", tmp_path)
     with (
         file_size_limit(1_000_000),
-        pytest.raises(UserError, match=r"no 4\.6 MB of shared memory .*\(File too large\)"),
+        pytest.raises(UserError, match=r"no 5\.0 MB of shared memory .*\(File too large\)"),
     ):
         SampleRing.create(30_000)
     assert list(tmp_path.iterdir()) == []

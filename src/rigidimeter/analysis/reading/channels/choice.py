@@ -22,6 +22,8 @@ from rigidimeter.core.errors import UserError
 LABELS = ("epoch", "condition", "task")
 MOTION = ("velocity_rad_s", "angle_rad")
 STANDARD = (*BY_STANDARD, *LABELS)
+OF_THE_DRIVE = ("drive_torque_nm", "drive_torque_time_s")
+"""Columns of an exported session that are neither the joint's torque nor a time of samples."""
 _LEAST_LIKE = 0.4
 """Of a column that is named as the nearest, where its unit does not tell."""
 _UNCALIBRATED = ("volt", "millivolt", "microvolt", "count")
@@ -128,7 +130,8 @@ def _candidates(
     if standard in table.columns:
         return [standard]
     name = BY_STANDARD[standard].name
-    free = [column for column in table.columns if column not in used and column not in STANDARD]
+    known = {*used, *STANDARD, *OF_THE_DRIVE}
+    free = [column for column in table.columns if column not in known]
     found = [column for column in free if headers[column].kind == name]
     if standard == "torque_nm" and not found:
         found = [column for column in free if headers[column].kind == "force"]
