@@ -48,7 +48,7 @@ PAGE, SERVER_STATE = "rig/console/page/live_socket.py", "rig/console/page/server
 STEP, WATCH, LIMITS = "rig/guard/step.py", "rig/guard/watch.py", "rig/guard/limits.py"
 AGREEMENT = "rig/guard/agreement.py"
 CONSISTENCY, ANSWER = "rig/guard/consistency.py", "rig/guard/torque_answer.py"
-CONTROLLER = "model/controller.py"
+CONTROLLER, COMPOSED = "model/controller.py", "rig/devices/composed.py"
 
 HAND_MADE = tuple(
     HandMade(*fault)
@@ -424,6 +424,15 @@ HAND_MADE = tuple(
             "a disk with room again is given up at once",
         ),
         (RECORDER, "        self._recording = new\n", "", "the operator is told of another disk"),
+        # The contact
+        (
+            COMPOSED,
+            "            if self._line is not None:\n                self._line.open_contact()\n"
+            "        finally:\n            self._drive.disable()",
+            "            self._drive.disable()\n        finally:\n"
+            "            if self._line is not None:\n                self._line.open_contact()",
+            "a drive that does not answer keeps its power for as long",
+        ),
         # The page
         (
             PAGE,

@@ -138,6 +138,16 @@ def test_the_code_of_an_emergency_is_kept(wire):
     assert drive.counts["emergencies"] == 1
 
 
+@pytest.mark.parametrize(("length", "code"), [(0, 0x1000), (3, 0x4210), (7, 0x4210)])
+def test_an_emergency_of_another_length_ends_the_run(wire, length, code):
+    drive = wire.ready()
+    wire.emulator.misbehave("short emergency", length)
+    sample = run_loop(drive, 0.5)
+    assert Cause(sample.cause) is Cause.DRIVE_FAULT
+    assert sample.status >> 16 == code
+    assert (drive.counts["emergencies"], drive.counts["damaged"]) == (1, 1)
+
+
 @pytest.mark.parametrize("code", [0x8130, 0x8250])
 def test_a_node_that_missed_our_frames_before_it_was_enabled_has_no_fault(wire, code):
     """A watchdog that ends with one session speaks while the next is being configured."""

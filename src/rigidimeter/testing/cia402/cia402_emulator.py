@@ -110,6 +110,9 @@ class Cia402Emulator:
                 self._servo.fault(self._servo.wrong[name], name)
             elif name == "emergency":
                 self.emergency(self._servo.wrong[name], GENERIC_ERROR)
+            elif name == "short emergency":
+                message = bytes.fromhex("1042010000000000")[: int(self._servo.wrong[name])]
+                self._transmit(0x80 + self._node_id, message)
             elif name == "leave operation":
                 self._servo.go(Phase.SWITCH_ON_DISABLED, name)
             elif name == "fall to switched on":

@@ -20,6 +20,7 @@ from rigidimeter.testing.emulated_arm import EmulatedArm
 CIA402_MISBEHAVIOURS = {
     "fault": "brakes, reports a fault (value: its code) and cannot be reset",
     "emergency": "sends an emergency message (value: its code) but keeps moving",
+    "short emergency": "sends an emergency message of so many bytes (value) but keeps moving",
     "leave operation": "removes its own power, as if its hardware enable opened",
     "fall to switched on": "disables its operation once; the next controlword can enable it again",
     "change mode": "reports another mode of operation (value: which)",
@@ -46,6 +47,7 @@ CIA402_MISBEHAVIOURS = {
 DEFAULTS = {
     "fault": 0x2310,
     "emergency": 0x4210,
+    "short emergency": 3,
     "change mode": 1,
     "stale target": 0.5,
     "runs away": 6.0,

@@ -30,6 +30,11 @@ def cal_text(force="N", torque="N-m", matrix=MATRIX, rows=AXES, serial="FT00001"
     )
 
 
+TZ_TWICE = cal_text().replace(
+    '<UserAxis Name="Tz"', '<UserAxis Name="Tz" values="1 2 3 4 5 6"/><UserAxis Name="Tz"'
+)
+
+
 class Reader:
     def __init__(self):
         self.ready = [np.array([BIAS])]
@@ -113,6 +118,7 @@ def test_rows_are_found_by_name_not_by_place(tmp_path):
     [
         (cal_text(torque="cubit"), "torque unit 'cubit'"),
         (cal_text(force=""), "force unit ''"),
+        (TZ_TWICE, "Fx, Fy, Fz, Tx, Ty, Tz, Tz; .* each once"),
         (cal_text(rows=AXES[:5]), "UserAxis rows Fx, Fy, Fz, Tx, Ty;"),
         (cal_text(gain="2"), "GainMultiplier 2"),
         (cal_text(matrix=np.ones((6, 6))), "singular"),

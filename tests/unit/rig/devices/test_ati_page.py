@@ -80,6 +80,10 @@ def test_known_units_are_positive_numbers():
         ("comrdtrate", None),
         ("runrate", "0"),
         ("cfgcalsel", "two"),
+        ("cfgcalsel", "-1"),
+        ("runstat", "-1"),
+        ("runstat", "-0x1"),
+        ("runstat", "0x100000000"),
         ("comrdte", "Disabled"),
     ],
 )
@@ -102,3 +106,15 @@ def test_every_change_is_named_but_the_status():
         "torque_unit 'Nm' became 'lbf-in', serial 'FT27462' became 'FT1'"
     )
     assert "bias" in page_changes(before, page(setbias="0;0;0;0;0;0"))
+
+
+@pytest.mark.parametrize("tag", ["cfgcpt", "scfgtu", "runstat", "cfgcalsn", "setuserfilter"])
+@pytest.mark.parametrize("again", ["another", "the same"])
+def test_a_page_that_says_one_thing_twice_is_refused(tag, again):
+    """Which of two would be the torque's is not known; nor whose page it is."""
+    values = {"setuserfilter": "0", **PAGE}
+    body = "".join(f"<{name}>{value}</{name}>" for name, value in values.items())
+    second = values[tag] if again == "the same" else "12345"
+    text = f"<netft>{body}<more><{tag}>{second}</{tag}></more></netft>".encode()
+    with pytest.raises(DeviceError, match=f"torque sensor: {tag} is in /netftapi2.xml twice"):
+        parse_page(text, "torque sensor")

@@ -101,10 +101,26 @@ def test_frames_are_little_endian_and_signed():
     assert emergency(bytes.fromhex("3081 11 0000000000")) == (0x8130, 0x11)
 
 
-@pytest.mark.parametrize("decode", [position_of, velocity_of, emergency])
+@pytest.mark.parametrize("decode", [position_of, velocity_of])
 @pytest.mark.parametrize("length", [0, 1, 3, 5, 6])
 def test_a_frame_of_the_wrong_length_is_none(decode, length):
     assert decode(bytes(length)) is None
+
+
+@pytest.mark.parametrize(
+    ("data", "found"),
+    [
+        ("", (0x1000, 0)),
+        ("30", (0x1000, 0)),
+        ("3081", (0x8130, 0)),
+        ("308111", (0x8130, 0x11)),
+        ("1023 01 00000000", (0x2310, 0x01)),
+        ("0000 00 00000000", (0x1000, 0)),  # too short to revoke anything
+        ("0000 00 0000000000", (0, 0)),
+    ],
+)
+def test_an_emergency_of_another_length_is_an_emergency(data, found):
+    assert emergency(bytes.fromhex(data)) == found
 
 
 def test_an_expedited_write_is_as_cia_301_writes_it():

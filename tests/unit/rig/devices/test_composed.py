@@ -86,6 +86,21 @@ def test_closing_takes_the_power_first_and_the_contacts_port_last(drive, line, p
     rig.close()  # twice does no harm
 
 
+def test_the_contact_is_open_before_the_drive_is_told(line, port):
+    """A drive that does not answer keeps its driver waiting, and must not keep the power."""
+    contact: list[bool] = []
+
+    class Waited(Drive):
+        def disable(self) -> None:
+            contact.append(port.rts)
+
+    rig = ComposedRig(Sensor(), Waited(), 100.0, line)
+    rig.enable()
+    assert port.rts
+    rig.disable()
+    assert contact == [False]
+
+
 def test_angle_and_torque_count_from_where_it_was_enabled(drive):
     rig = ComposedRig(Sensor(), drive, 100.0)
     rig.enable()

@@ -102,11 +102,17 @@ def _from_xml(path: Path, text: bytes) -> Calibration:
     gain = found.get("GainMultiplier", "1")
     if gain != "1":
         raise DeviceError(f"torque sensor: {path} has GainMultiplier {gain}; only 1 is known here")
-    rows = {axis.get("Name", ""): axis.get("values", "").split() for axis in found.iter("UserAxis")}
-    if set(rows) != set(AXES):
+    if len(root.findall("Calibration")) > 1:
         raise DeviceError(
-            f"torque sensor: {path} has UserAxis rows {', '.join(rows) or 'none'}; "
-            f"{', '.join(AXES)} expected (ask ATI for a newer file)"
+            f"torque sensor: {path} has several <Calibration>; keep the one that is used"
+        )
+    axes = list(found.iter("UserAxis"))
+    rows = {axis.get("Name", ""): axis.get("values", "").split() for axis in axes}
+    if set(rows) != set(AXES) or len(axes) > len(AXES):
+        names = ", ".join(axis.get("Name", "") for axis in axes)
+        raise DeviceError(
+            f"torque sensor: {path} has UserAxis rows {names or 'none'}; "
+            f"{', '.join(AXES)} expected, each once (ask ATI for a newer file)"
         )
     return _calibration(
         path,

@@ -21,6 +21,8 @@ from rigidimeter.rig.devices.ati.rdt_packets import status_cause, status_words
 from rigidimeter.rig.devices.base import DeviceError, Now
 
 LARGEST_PAGE_BYTES = 65536
+LARGEST_INTEGER = 0xFFFFFFFF
+"""Of a status word and of an index."""
 
 
 class AtiRdtSettings(Section):
@@ -163,7 +165,8 @@ def parse_page(text: bytes, device: str) -> SensorPage:
     Raises
     ------
     DeviceError
-        If it is no such page, a unit is unknown, or RDT is disabled on the sensor.
+        If it is no such page, says one thing twice, a number or unit is not possible, or RDT is
+        disabled on the sensor.
     """
     try:
         root = ElementTree.fromstring(text)
@@ -172,7 +175,16 @@ def parse_page(text: bytes, device: str) -> SensorPage:
             f"{device}: /netftapi2.xml is not the page of a Net F/T ({error}); "
             "check that the address is the sensor's"
         ) from error
-    found = {item.tag: (item.text or "").strip() for item in root.iter()}
+    found: dict[str, str] = {}
+    for item in root.iter():
+        text_of = (item.text or "").strip()
+        if item.tag in found:
+            raise DeviceError(
+                f"{device}: {item.tag} is in /netftapi2.xml twice, as {found[item.tag]!r} and "
+                f"{text_of!r}; a Net F/T says each thing once, so restart the sensor and check "
+                "that nothing stands between it and this computer"
+            )
+        found[item.tag] = text_of
 
     def positive(tag: str) -> float:
         try:
@@ -188,12 +200,18 @@ def parse_page(text: bytes, device: str) -> SensorPage:
 
     def integer(tag: str, base: int = 10) -> int:
         written = found.get(tag, "")
+        if not written:
+            return -1
         try:
-            return int(written, base) if written else -1
+            value = int(written, base)
         except ValueError:
+            value = -1
+        if not 0 <= value <= LARGEST_INTEGER:
             raise DeviceError(
-                f"{device}: {tag} in /netftapi2.xml is {written!r}; it must be a whole number"
-            ) from None
+                f"{device}: {tag} in /netftapi2.xml is {written!r}; it must be a whole number from "
+                f"0 to {LARGEST_INTEGER}"
+            )
+        return value
 
     def unit(tag: str, known: dict[str, float]) -> str:
         name = unit_name(found.get(tag, ""))

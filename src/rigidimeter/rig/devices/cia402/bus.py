@@ -306,8 +306,6 @@ class NodeBus:
 
     def _take_emergency(self, data: bytearray) -> bool:
         report = emergency(data)
-        if report is None:
-            return False
         if report.code:  # 0 revokes earlier ones, which are kept all the same
             self.emergency = report.code
             if report.code >> 8 in COMMUNICATION:
@@ -315,4 +313,4 @@ class NodeBus:
             else:
                 self.alarmed = True
             self.counts["emergencies"] += 1
-        return True
+        return len(data) == 8

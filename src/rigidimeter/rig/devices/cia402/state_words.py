@@ -188,9 +188,20 @@ class Emergency(NamedTuple):
     register: int
 
 
-def emergency(data: bytes | bytearray) -> Emergency | None:
-    """Return the code and the error register of an emergency frame, None if it is damaged."""
-    return Emergency(*_EMERGENCY.unpack_from(data)) if len(data) == 8 else None
+UNREADABLE = 0x1000
+"""The code of an emergency frame whose own cannot be read: CiA 301's generic error."""
+
+
+def emergency(data: bytes | bytearray) -> Emergency:
+    """Return the code and the error register of an emergency frame.
+
+    A frame of another length than 8 bytes is an emergency all the same: a drive sends this
+    identifier for nothing else. Only a whole one revokes, and what one lacks is `UNREADABLE`.
+    """
+    if len(data) == 8:
+        return Emergency(*_EMERGENCY.unpack_from(data))
+    code = int.from_bytes(data[:2], "little") if len(data) >= 2 else 0
+    return Emergency(code or UNREADABLE, data[2] if len(data) > 2 else 0)
 
 
 def sdo_write_bytes(index: int, subindex: int, value: int, size: int) -> bytes:
