@@ -30,7 +30,7 @@ from benchmarks.loop import PRIORITY, patient, virtual_session
 from rigidimeter.core.session import read_samples
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.planning import prbs_nm
-from rigidimeter.rig.acquisition import SimulatedClock, perturb, rest, tick
+from rigidimeter.rig.acquisition import SimulatedClock, decision, perturb, rest, tick
 from rigidimeter.rig.acquisition.processes import LoopSide, Realtime, RecordingPlan, supervise
 from rigidimeter.rig.devices import SimulatedRig
 from rigidimeter.rig.guard import consistency_limits, consistency_state
@@ -63,14 +63,14 @@ def tick_us() -> float:
 
 def in_turn(settings: Settings, duration_s: float, side: LoopSide) -> None:
     """Run a session whose laws are left out in every other window."""
-    laws, ticks = tick.consistency_step, itertools.count()
+    laws, ticks = decision.consistency_step, itertools.count()
     new = consistency_state(consistency_limits(settings))
 
     def step(*arguments: Any) -> Any:
         # Those who have looked away begin anew.
         return laws(*arguments) if next(ticks) // WINDOW_TICKS % 2 == 0 else (new, 0)
 
-    with patch.object(tick, "consistency_step", step):
+    with patch.object(decision, "consistency_step", step):
         virtual_session(settings, duration_s, side)
 
 
@@ -116,7 +116,7 @@ def main() -> None:
     found: tuple[list[float], list[float]] = ([], [])
     for _ in range(repeats):
         found[0].append(tick_us())
-        with patch.object(tick, "consistency_step", _agrees):
+        with patch.object(decision, "consistency_step", _agrees):
             found[1].append(tick_us())
     ours, without = min(found[0]), min(found[1])
     print(f"{ours:.1f} µs a tick, {without:.1f} µs without the laws: {ours / without:.2f}")

@@ -30,6 +30,7 @@ class HandMade(NamedTuple):
 
 
 TICK = "rig/acquisition/tick.py"
+DECISION = "rig/acquisition/decision.py"
 MODES = "rig/acquisition/control_modes.py"
 SESSION = "rig/acquisition/session_run.py"
 SESSION_END = "rig/acquisition/session_end.py"
@@ -59,19 +60,29 @@ HAND_MADE = tuple(
         (TICK, "    loop.tick += ticks\n", "", "a late tick is made up for: commands in a burst"),
         (TICK, "elapsed_ticks = ticks + 1", "elapsed_ticks = 1", "missed ticks told to nobody"),
         (
-            TICK,
-            "from_outside),\n        loop.elapsed_ticks,",
-            "from_outside),\n        1,",
+            DECISION,
+            "reported,\n        elapsed_ticks,",
+            "reported,\n        1,",
             "the guard counts less than was sent: position and following are wrong",
         ),
         (TICK, "k = min(k + loop.elapsed_ticks - 1, last)", "pass", "the target lags"),
-        (TICK, "if ticks >= loop.stall_ticks:", "if False:", "a stall is only a missed tick"),
-        (TICK, "int(Cause.DEADLINES_MISSED)", "int(Cause.NONE)", "a loop ever late goes on"),
+        (
+            DECISION,
+            "if missed_ticks >= stall_ticks:",
+            "if False:",
+            "a stall is only a missed tick",
+        ),
+        (
+            DECISION,
+            "Cause.DEADLINES_MISSED if",
+            "Cause.NONE if",
+            "a loop ever late goes on",
+        ),
         (TICK, "    loop.late_in_a_row += 1\n", "", "a loop ever late goes on"),
         (TICK, ", loop.late_in_a_row = 1, 0", " = 1", "rare late ticks add up to a stop"),
         (
-            TICK,
-            "loop.guard = loop.guard._replace(velocity_rad_s=0.0)",
+            DECISION,
+            "guard = guard._replace(velocity_rad_s=0.0)",
             "pass",
             "after a stall the old velocity sets the arm going again",
         ),
@@ -104,21 +115,21 @@ HAND_MADE = tuple(
             "and was_cut == 0",
             "an emergency stop in a ramp cuts nothing",
         ),
-        (TICK, "_stronger(late, reading.cause)", "late", "what the devices report is dropped"),
+        (TICK, "stronger(late, reading.cause)", "late", "what the devices report is dropped"),
         (
             TICK,
-            "_stronger(_stronger(late, reading.cause), from_outside)",
-            "_stronger(late, reading.cause)",
+            "stronger(stronger(late, reading.cause), from_outside)",
+            "stronger(late, reading.cause)",
             "emergency stop, console, recorder are dropped",
         ),
         (
             TICK,
-            "_stronger(_stronger(late, reading.cause), from_outside)",
-            "_stronger(reading.cause, from_outside)",
+            "stronger(stronger(late, reading.cause), from_outside)",
+            "stronger(reading.cause, from_outside)",
             "stalls and missed deadlines are dropped",
         ),
         (
-            TICK,
+            DECISION,
             "REACTIONS[other] > REACTIONS[cause]",
             "REACTIONS[other] < REACTIONS[cause]",
             "of two causes the weaker wins",
@@ -136,11 +147,16 @@ HAND_MADE = tuple(
             "False",
             "no order is taken",
         ),
-        (TICK, "        disagreement,\n    )", "    )", "motion nobody commanded is not stopped"),
         (
-            TICK,
-            "        loop.elapsed_ticks,\n    )\n    loop.guard",
-            "    )\n    loop.guard",
+            DECISION,
+            "        disagreement,\n    )",
+            "    )",
+            "motion nobody commanded is not stopped",
+        ),
+        (
+            DECISION,
+            "        elapsed_ticks,\n    )\n    guard,",
+            "    )\n    guard,",
             "it is seen late after missed ticks",
         ),
         (STEP, "if cause == _NO_CAUSE:", "if True:", "the first cause is overwritten"),

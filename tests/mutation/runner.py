@@ -81,6 +81,7 @@ TESTS = {
         *("rig/acquisition/test_session_run.py", "rig/acquisition/test_stop_report.py"),
     ),
     "rig/acquisition/tick.py": _RUN,
+    "rig/acquisition/decision.py": _RUN,
     "rig/acquisition/stop_report.py": (
         *("rig/acquisition/test_stop_numbers.py", "rig/acquisition/test_stop_report.py"),
     ),

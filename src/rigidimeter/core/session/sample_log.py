@@ -28,10 +28,11 @@ BATCH_S = 0.1
 class Sample(NamedTuple):
     """One tick of the loop. The units are in the names; see `SAMPLE_UNITS`.
 
-    `epoch` is the number of the epoch, -1 during rests. `limited` is a `guard.Limited` value, and
-    `cause` a `guard.Cause` value. The command is what was sent after the guard; the request is what
-    the controller asked for. Sequences and status words are the devices' own. The drive's torque is
-    that of its motor by its own measurement, NaN where it reports none.
+    `epoch` is the number of the epoch, -1 during rests. `limited` is a `guard.Limited` value,
+    `cause` and `reported_cause` are `guard.Cause` values. The command is what was sent after the
+    guard; the request is what the controller asked for. Sequences and status words are the devices'
+    own. The drive's torque is that of its motor by its own measurement, NaN where it reports
+    none.
     """
 
     tick: int
@@ -55,6 +56,7 @@ class Sample(NamedTuple):
     cause: int = 0
     drive_torque_nm: float = nan
     drive_torque_time_s: float = nan
+    reported_cause: int = 0
 
 
 SAMPLE_UNITS: Mapping[str, str] = {
@@ -79,6 +81,7 @@ SAMPLE_UNITS: Mapping[str, str] = {
     "cause": "number of the cause for which the guard latched, 0 none",
     "drive_torque_nm": "N·m of the motor at the joint, as the drive reports, NaN where it does not",
     "drive_torque_time_s": "s, stamp of the drive's torque",
+    "reported_cause": "number of the cause that loop or device reported at this tick, 0 none",
 }
 """The unit of every recorded column, as the manifest states them."""
 
@@ -91,6 +94,7 @@ _INTEGERS = {
     "motion_sequence": pa.int64(),
     "motion_status": pa.int64(),
     "cause": pa.int8(),
+    "reported_cause": pa.int8(),
 }
 SAMPLE_SCHEMA = pa.schema(
     [pa.field(name, _INTEGERS.get(name, pa.float64()), nullable=False) for name in Sample._fields]

@@ -27,27 +27,25 @@ from rigidimeter.model import (
     butterworth_lowpass,
 )
 from rigidimeter.rig.acquisition.clock import Clock
+from rigidimeter.rig.acquisition.decision import STALLED, decide, late_cause, stronger
 from rigidimeter.rig.acquisition.run_states import Command, Order
 from rigidimeter.rig.acquisition.stop_report import Latched, StopReport, report_stop
 from rigidimeter.rig.acquisition.supervision import NoSupervision, Supervision
 from rigidimeter.rig.devices.base import Reading, Rig
 from rigidimeter.rig.guard import (
-    REACTIONS,
     Cause,
     Limited,
     Reaction,
     consistency_limits,
     consistency_state,
-    consistency_step,
     guard_limits,
     guard_state,
-    guard_step,
 )
 
 REST = -1
 """The epoch number of samples between epochs."""
 
-POSITION_LIMITED, CUT, STALLED = int(Limited.POSITION), int(Reaction.CUT), int(Cause.STALLED)
+POSITION_LIMITED, CUT = int(Limited.POSITION), int(Reaction.CUT)
 
 Controller = Callable[[Reading, float, int], tuple[float, float, float]]
 """Takes reading, filtered torque and number of the tick in its stretch; returns velocity,
@@ -254,37 +252,23 @@ def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: i
     from_outside = loop.supervision.cause(now_s)
     if from_outside == STALLED:  # the computer was suspended: its clock knows nothing of it
         late = STALLED
-    if late == STALLED:
-        # A drive with a watchdog has stopped by now, and a ramp down from the velocity before
-        # would set the arm going again; one without brakes by its own ramp.
-        loop.guard = loop.guard._replace(velocity_rad_s=0.0)
+    # A loop that stood still comes first: the drive's own watchdog follows from it.
+    reported = stronger(stronger(late, reading.cause), from_outside)
     was_cut = loop.guard.reaction
-    motion_age_s, torque_age_s = due_s - motion_s, due_s - torque_s
-    loop.consistency, disagreement = consistency_step(
+    loop.guard, loop.consistency, allowed, limited = decide(
+        loop.limits,
         loop.agreement,
+        loop.guard,
         loop.consistency,
-        loop.guard.velocity_rad_s,
+        request,
         perturbation_nm,
         torque_nm,
         angle,
         velocity,
-        motion_age_s,
-        torque_age_s,
+        due_s - motion_s,
+        due_s - torque_s,
+        reported,
         loop.elapsed_ticks,
-    )
-    loop.guard, allowed, limited = guard_step(
-        loop.limits,
-        loop.guard,
-        request,
-        torque_nm,
-        angle,
-        velocity,
-        motion_age_s,
-        torque_age_s,
-        # A loop that stood still comes first: the drive's own watchdog follows from it.
-        _stronger(_stronger(late, reading.cause), from_outside),
-        loop.elapsed_ticks,
-        disagreement,
     )
     # The guard has counted this tick. Where one of the calls below fails, what follows is due at
     # the next tick: the velocity may change by one tick's worth only once a tick.
@@ -324,6 +308,7 @@ def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: i
         loop.guard.cause,
         reading.drive_torque_nm,
         reading.drive_torque_time_s,
+        reported,
     )
     loop.record(sample)
     return k
@@ -335,13 +320,4 @@ def _miss(loop: ControlLoop, ticks: int) -> int:
     loop.elapsed_ticks = ticks + 1
     loop.missed_ticks += ticks
     loop.late_in_a_row += 1
-    if ticks >= loop.stall_ticks:
-        return int(Cause.STALLED)
-    if loop.late_in_a_row >= loop.missed_limit:
-        return int(Cause.DEADLINES_MISSED)
-    return int(Cause.NONE)
-
-
-def _stronger(cause: int, other: int) -> int:
-    """Return the cause with the stronger reaction: an emergency stop is not masked by a fault."""
-    return other if REACTIONS[other] > REACTIONS[cause] else cause
+    return late_cause(ticks, loop.late_in_a_row, loop.stall_ticks, loop.missed_limit)

@@ -65,10 +65,15 @@ def epochs_of_samples(
     UserError
         If a column of a session is missing.
     """
-    missing = [name for name in Sample._fields if name not in columns]
+    later = Sample._field_defaults  # channels that earlier versions did not send
+    missing = [name for name in Sample._fields if name not in columns and name not in later]
     if missing:
         raise UserError(f"{source}: its stream of samples has no channel {missing[0]}")
-    samples = {name: columns[name].astype(kind) for name, kind in sample_dtypes().items()}
+    n = len(columns["tick"])
+    samples = {
+        name: columns[name].astype(kind) if name in columns else np.full(n, later[name], kind)
+        for name, kind in sample_dtypes().items()
+    }
     settings, notices = _settings(described, source)
     virtual = _fact(described, "virtual") == "true"
     ticks_late = samples["lateness_s"] * settings.rig.tick_rate_hz
