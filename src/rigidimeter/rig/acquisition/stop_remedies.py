@@ -71,5 +71,7 @@ REMEDIES: dict[Cause, str] = {
     Cause.SELDOM_FRESH: "check the sensor's connection and the rate that the rig file states",
     Cause.HELD_AT_LIMIT: "see whether the subject pushes; if not, zero the torque sensor and check "
     "its sign with `rigidimeter check`",
+    Cause.TORQUE_DISAGREES: f"{_CABLE}; if the sensor is in order, gear, motor or what is mounted "
+    "on the drive's side were changed: `rigidimeter commission`",
 }
 """What to do about each cause."""

@@ -192,7 +192,7 @@ _OF_INDICATOR = {
     "sensor": {
         *(Cause.TORQUE_NOT_FINITE, Cause.TORQUE_STALE, Cause.TORQUE_FROZEN, Cause.TORQUE_SATURATED),
         *(Cause.TORQUE_STATUS, Cause.TORQUE_PACKETS, Cause.SENSOR_CHANGED, Cause.TORQUE_SILENT),
-        *(Cause.TORQUE_SIGN, Cause.SELDOM_FRESH, Cause.STAMP_AHEAD),
+        *(Cause.TORQUE_SIGN, Cause.SELDOM_FRESH, Cause.STAMP_AHEAD, Cause.TORQUE_DISAGREES),
     },
     "drive": {
         *(Cause.MOTION_NOT_FINITE, Cause.MOTION_STALE, Cause.NOT_FOLLOWING, Cause.DRIVE_FAULT),

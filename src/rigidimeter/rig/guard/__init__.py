@@ -18,6 +18,24 @@ from rigidimeter.rig.guard.consistency import (
     consistency_state,
     consistency_step,
 )
+from rigidimeter.rig.guard.drive_torque import (
+    PRESLIDING_RAD,
+    SETTLED_S,
+    SHARE,
+    SLIPS_RAD_S,
+    TIMES_SCATTER,
+    WINDOW_S,
+    DriveModel,
+    DriveTorqueLimits,
+    DriveTorqueState,
+    Terms,
+    beyond,
+    drive_torque_limits,
+    drive_torque_state,
+    drive_torque_step,
+    from_drive,
+    zeroed,
+)
 from rigidimeter.rig.guard.limits import (
     GuardLimits,
     GuardState,

@@ -64,6 +64,7 @@ class Cause(IntEnum):
     TORQUE_SIGN = 34
     SELDOM_FRESH = 35
     HELD_AT_LIMIT = 36
+    TORQUE_DISAGREES = 37
 
     @property
     def sentence(self) -> str:
@@ -117,6 +118,7 @@ _SENTENCES = {
     Cause.SELDOM_FRESH: "fresh readings came too seldom",
     Cause.HELD_AT_LIMIT: "the joint was driven against the position limit for too long: the "
     "subject pushes, or the torque has an offset or the wrong sign",
+    Cause.TORQUE_DISAGREES: "the torque sensor did not agree with the drive's own torque",
 }
 
 _HOLD = {Cause.TORQUE_HIGH, Cause.POWER_HIGH, Cause.HELD_AT_LIMIT}
