@@ -30,7 +30,7 @@ from benchmarks.loop import PRIORITY, patient, virtual_session
 from rigidimeter.core.session import read_samples
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.planning import prbs_nm
-from rigidimeter.rig.acquisition import SimulatedClock, decision, perturb, rest, tick
+from rigidimeter.rig.acquisition import SimulatedClock, decision, go_back, perturb, rest, tick
 from rigidimeter.rig.acquisition.processes import LoopSide, Realtime, RecordingPlan, supervise
 from rigidimeter.rig.devices import SimulatedRig
 from rigidimeter.rig.guard import consistency_limits, consistency_state
@@ -57,7 +57,8 @@ def tick_us() -> float:
     perturbation_nm = prbs_nm(settings.prbs, settings.rig.tick_rate_hz).tolist()
     began_s = time.process_time()
     perturb(loop, 0, perturbation_nm)
-    rest(loop, 20.0, 2.0)
+    go_back(loop, 2.0, 0.35)
+    rest(loop, 18.0, 0.35)
     return 1e6 * (time.process_time() - began_s) / loop.tick
 
 

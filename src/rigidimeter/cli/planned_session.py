@@ -114,7 +114,7 @@ def rest_of_session(
     if not rest.epochs:
         raise UserError(f"{resume}: nothing is left to run, all {rest.done} epochs are done")
     echo(f"{rest.done} epochs are done; {len(rest.epochs)} are left")
-    protocol = Protocol(rest.settings.seed, rest.epochs)
+    protocol = Protocol(rest.settings.seed, rest.epochs, rest.settings.protocol.return_s)
     return PlannedSession(rest.settings, protocol, rest.continues, rest.done, rest.about)
 
 

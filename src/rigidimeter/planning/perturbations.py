@@ -94,7 +94,7 @@ def plan(
         PlannedEpoch(number, str(number), block.task, block.condition, duration_s[block.task], rest)
         for number, (block, rest) in enumerate(zip(in_order, rests_s, strict=True), start=1)
     )
-    return Protocol(seed, epochs)
+    return Protocol(seed, epochs, protocol.return_s)
 
 
 def exact_decimal(value: float, name: str) -> Fraction:

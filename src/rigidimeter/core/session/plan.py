@@ -63,15 +63,24 @@ class PlannedEpoch:
 
 @dataclass(frozen=True)
 class Protocol:
-    """The epochs of a session in order, and the seed from which the rests came."""
+    """The epochs of a session in order, and the seed from which the rests came.
+
+    Attributes
+    ----------
+    seed : int
+    epochs : tuple of PlannedEpoch
+    return_s : float
+        The least time of the return after each epoch, before its rest.
+    """
 
     seed: int
     epochs: tuple[PlannedEpoch, ...]
+    return_s: float = 0.0
 
     @property
     def total_s(self) -> float:
-        """How long the session takes, the last rest included, in s."""
-        return sum(epoch.duration_s + epoch.rest_s for epoch in self.epochs)
+        """How long the session takes, returns and the last rest included, in s."""
+        return sum(epoch.duration_s + self.return_s + epoch.rest_s for epoch in self.epochs)
 
     @property
     def counts(self) -> dict[tuple[Task, str], int]:

@@ -4,11 +4,13 @@ from rigidimeter.rig.acquisition.clock import Clock, DeadlineClock, SimulatedClo
 from rigidimeter.rig.acquisition.control_modes import (
     change_parameter,
     follow,
+    go_back,
     hold,
     perturb,
     ramp_to_rest,
     release,
     rest,
+    return_duration_s,
     skip_passed_ticks,
 )
 from rigidimeter.rig.acquisition.controller_run import ControllerRun
@@ -16,6 +18,7 @@ from rigidimeter.rig.acquisition.run_states import (
     NOTHING,
     Command,
     Order,
+    Phase,
     Run,
     State,
     after,

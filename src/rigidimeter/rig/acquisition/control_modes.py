@@ -34,6 +34,12 @@ from rigidimeter.rig.guard import released
 LARGEST_FACTOR = 10.0
 """A parameter may grow to so many times the protocol's value."""
 
+PEAK_OVER_MEAN = 15.0 / 8.0
+"""Of the speed of a minimum-jerk motion."""
+
+ROUNDING = 1e-9
+"""Of a tick: what floats may add to a whole number of them."""
+
 SPARE_TICKS = 10
 """A ramp to rest may take so many ticks more than the speed and the acceleration limit say."""
 
@@ -77,18 +83,43 @@ def follow(
     return run_ticks(loop, epoch, len(angle_rad), command)
 
 
-def rest(loop: ControlLoop, duration_s: float, return_s: float) -> TickResult:
-    """Return to the initial position by a minimum-jerk motion, then hold it."""
-    start_rad, interval_s = loop.angle_rad, loop.interval_s
+def return_duration_s(angle_rad: float, return_s: float, speed_rad_s: float) -> float:
+    """Return how long the way back takes: T = max(`return_s`, 15/8 |θ₀| / `speed_rad_s`).
+
+    The peak speed of a minimum-jerk motion is 15/8 of its mean speed (Flash and Hogan 1985).
+    """
+    return max(return_s, PEAK_OVER_MEAN * abs(angle_rad) / speed_rad_s)
+
+
+def go_back(loop: ControlLoop, duration_s: float, speed_rad_s: float) -> TickResult:
+    """Return to the initial position by a minimum-jerk motion, never faster than `speed_rad_s`."""
+    start_rad = loop.angle_rad
+    # The ticks are whole ones, and not fewer than the time asks for.
+    ticks = math.ceil(duration_s * loop.rate_hz - ROUNDING)
+    return _led(loop, ticks, ticks * loop.interval_s, start_rad, speed_rad_s)
+
+
+def rest(loop: ControlLoop, duration_s: float, speed_rad_s: float) -> TickResult:
+    """Keep the joint at the initial position, by at most `speed_rad_s`."""
+    return _led(loop, round(duration_s * loop.rate_hz), 0.0, 0.0, speed_rad_s)
+
+
+def _led(
+    loop: ControlLoop, ticks: int, duration_s: float, start_rad: float, speed_rad_s: float
+) -> TickResult:
+    """Lead the joint from `start_rad` to the initial position in `duration_s`; keep it there."""
+    interval_s, gain = loop.interval_s, loop.tracking_gain_per_s
 
     def command(reading: Reading, _: float, k: int) -> tuple[float, float, float]:
-        target, velocity = minimum_jerk(start_rad, return_s, k * interval_s)
+        target, velocity = minimum_jerk(start_rad, duration_s, k * interval_s)
         before_s = max(k - _age_ticks(loop, reading), 0) * interval_s
-        then, _ = minimum_jerk(start_rad, return_s, before_s)
-        gain = loop.tracking_gain_per_s
-        return tracking_step(gain, then, velocity, reading.angle_rad), 0.0, target
+        then, _ = minimum_jerk(start_rad, duration_s, before_s)
+        led = tracking_step(gain, then, velocity, reading.angle_rad)
+        if abs(led) > speed_rad_s:  # not so where it is no number, which the guard names
+            led = math.copysign(speed_rad_s, led)
+        return led, 0.0, target
 
-    return run_ticks(loop, REST, round(duration_s * loop.rate_hz), command)
+    return run_ticks(loop, REST, ticks, command)
 
 
 def hold(

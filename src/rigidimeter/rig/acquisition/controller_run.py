@@ -14,7 +14,7 @@ from rigidimeter.core.session import Ending
 from rigidimeter.core.settings import Settings
 from rigidimeter.rig.acquisition.clock import Clock
 from rigidimeter.rig.acquisition.control_modes import change_parameter
-from rigidimeter.rig.acquisition.run_states import Command, Order, Run, State, after
+from rigidimeter.rig.acquisition.run_states import Command, Order, Phase, Run, State, after
 from rigidimeter.rig.acquisition.stop_remedies import REMEDIES
 from rigidimeter.rig.acquisition.stop_report import StopReport
 from rigidimeter.rig.acquisition.supervision import NoSupervision, Sink, Supervision
@@ -89,6 +89,10 @@ class ControllerRun:
         if run != self.run:
             self.run = run
             self._state_changed(run)
+
+    def begin(self, phase: Phase) -> None:
+        """Say what is asked of the joint from the next tick on."""
+        self.loop.phase = phase
 
     def _take_order(self, order: Order) -> bool:
         """Take an order; return whether the stretch that runs ends now."""

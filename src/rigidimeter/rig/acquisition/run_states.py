@@ -25,6 +25,16 @@ class State(IntEnum):
     FAULTED = 4
 
 
+class Phase(IntEnum):
+    """What the loop asks of the joint."""
+
+    HOLD = 0
+    ZEROING = 1
+    EPOCH = 2
+    RETURN = 3
+    REST = 4
+
+
 class Command(IntEnum):
     """What an operator can ask for."""
 

@@ -7,7 +7,7 @@ import math
 from rigidimeter.core.units import deg_from_rad
 from rigidimeter.rig.acquisition.control_modes import hold, ramp_to_rest
 from rigidimeter.rig.acquisition.controller_run import ControllerRun
-from rigidimeter.rig.acquisition.run_states import Run, State
+from rigidimeter.rig.acquisition.run_states import Phase, Run, State
 from rigidimeter.rig.acquisition.supervision import Sink
 from rigidimeter.rig.acquisition.tick import ControlLoop
 from rigidimeter.rig.devices.base import Rig
@@ -22,6 +22,7 @@ WATCHED_S = 1.0
 
 def end_session(run: ControllerRun, rig: Rig, sink: Sink) -> None:
     """Stop, disable, close: every step is tried even when one before it fails."""
+    run.begin(Phase.HOLD)
     try:
         ramp_to_rest(run.loop)
     finally:

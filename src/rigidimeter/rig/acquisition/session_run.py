@@ -11,24 +11,34 @@ from typing import Any
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import Ending, PlannedEpoch, Protocol
 from rigidimeter.core.settings import Settings
+from rigidimeter.core.units import rad_from_deg
 from rigidimeter.planning import prbs_nm, sinusoid
 from rigidimeter.rig.acquisition.clock import Clock
 from rigidimeter.rig.acquisition.control_modes import (
     follow,
+    go_back,
     hold,
     perturb,
     release,
     rest,
+    return_duration_s,
     skip_passed_ticks,
 )
 from rigidimeter.rig.acquisition.controller_run import ControllerRun
-from rigidimeter.rig.acquisition.run_states import Command, Run, State, after, epoch_over
+from rigidimeter.rig.acquisition.run_states import (
+    Command,
+    Phase,
+    Run,
+    State,
+    after,
+    epoch_over,
+)
 from rigidimeter.rig.acquisition.session_end import end_session
 from rigidimeter.rig.acquisition.supervision import Sink, Supervision
 from rigidimeter.rig.acquisition.tick import ControlLoop
 from rigidimeter.rig.acquisition.zeroing import bias_and_noise, motion_objection
 from rigidimeter.rig.devices.base import Reading, Rig
-from rigidimeter.rig.guard import Cause, Reaction, why_ended
+from rigidimeter.rig.guard import Cause, why_ended
 
 BeforeEpoch = Callable[[PlannedEpoch], Mapping[str, Any]]
 
@@ -161,35 +171,61 @@ def _run_epochs(session: _Session) -> None:
         if not run.may_go_on():
             return
         if run.is_in(State.RUNNING):
-            rest(run.loop, planned.rest_s, session.settings.protocol.return_s)
-            if not run.may_go_on():
+            if not _go_back(session):
                 return
+            # A pause on the way back leaves the rest out: the run goes back again, and then on.
+            if run.is_in(State.RUNNING) and not run.run.stop_next:
+                run.begin(Phase.REST)
+                rest(run.loop, planned.rest_s, _return_speed_rad_s(session))
+                if not run.may_go_on():
+                    return
 
 
 def _ready_for_epoch(session: _Session) -> bool:
-    """Wait out a pause and return to where epochs begin; return whether the session goes on."""
-    run, loop = session.run, session.run.loop
-    return_s = session.settings.protocol.return_s
+    """Wait out a pause and return to where epochs begin; return whether the session goes on.
+
+    A paused arm is held still where it is. It is led back once the operator has resumed.
+    """
+    run = session.run
     run.change_state(epoch_over(run.run))
     while run.is_in(State.PAUSED):
-        if loop.reaction is Reaction.NONE:
-            rest(loop, return_s, return_s)
-            if not run.may_go_on():
-                return False
         while run.is_in(State.PAUSED):
             if not _stand_by(run):
                 return False
-        while run.is_in(State.RUNNING) and not loop.at_rest:
-            if not _stand_by(run):
-                return False
-        if run.is_in(State.RUNNING):
-            release(loop)
-            # The full way back, whatever was ordered before it: an epoch begins at its place.
-            rest(loop, return_s, return_s)
-        if not run.may_go_on():
+        if not _go_back(session):
             return False
         run.change_state(epoch_over(run.run))
     return run.is_in(State.RUNNING)
+
+
+def _go_back(session: _Session) -> bool:
+    """Let the arm come to rest and lead it back; return whether the session goes on.
+
+    A pause or a stop that comes meanwhile ends the way back, and the next one begins anew.
+    """
+    run, loop, protocol = session.run, session.run.loop, session.settings.protocol
+    while run.is_in(State.RUNNING) and not loop.still:
+        if not _stand_by(run):
+            return False
+    if not run.is_in(State.RUNNING):
+        return run.may_go_on()
+    release(loop)
+    if not run.run.stop_next:
+        speed_rad_s = _return_speed_rad_s(session)
+        duration_s = return_duration_s(loop.angle_rad, protocol.return_s, speed_rad_s)
+        session.sink.event(
+            "return_started",
+            time_s=loop.time_s,
+            from_rad=loop.angle_rad,
+            duration_s=duration_s,
+        )
+        run.begin(Phase.RETURN)
+        go_back(loop, duration_s, speed_rad_s)
+    return run.may_go_on()
+
+
+def _return_speed_rad_s(session: _Session) -> float:
+    return rad_from_deg(session.settings.protocol.return_speed_deg_s)
 
 
 def _stand_by(run: ControllerRun) -> bool:
@@ -198,6 +234,7 @@ def _stand_by(run: ControllerRun) -> bool:
     A hold that comes meanwhile pauses it again: what was ordered before it does not end it.
     """
     before = run.loop.reaction
+    run.begin(Phase.HOLD)
     hold(run.loop, POLL_S)
     return run.loop.reaction is before or run.may_go_on()
 
@@ -217,6 +254,7 @@ def _run_epoch(session: _Session, planned: PlannedEpoch) -> None:
         **facts,
     )
     run.open_epoch = planned.number
+    run.begin(Phase.EPOCH)
     if planned.task == "prbs":
         ticks = perturb(run.loop, planned.number, session.perturbation_nm)
     else:
@@ -267,6 +305,7 @@ def _zero_sensor(session: _Session) -> bool:
     limits, run = session.settings.zeroing, session.run
     while True:
         readings: list[Reading] = []
+        run.begin(Phase.ZEROING)
         ticks = hold(run.loop, limits.duration_s, readings.append)
         if not run.may_go_on():
             return False

@@ -28,7 +28,7 @@ from rigidimeter.model import (
 )
 from rigidimeter.rig.acquisition.clock import Clock
 from rigidimeter.rig.acquisition.decision import STALLED, decide, late_cause, stronger
-from rigidimeter.rig.acquisition.run_states import Command, Order
+from rigidimeter.rig.acquisition.run_states import Command, Order, Phase
 from rigidimeter.rig.acquisition.stop_report import Latched, StopReport, report_stop
 from rigidimeter.rig.acquisition.supervision import NoSupervision, Supervision
 from rigidimeter.rig.devices.base import Reading, Rig
@@ -132,6 +132,7 @@ class ControlLoop:
         self.limited_ticks = 0
         self.limit_time_s = math.nan
         self.angle_rad = 0.0
+        self.phase = Phase.HOLD
         self.stop: StopReport | None = None
 
     @property
@@ -158,6 +159,18 @@ class ControlLoop:
     def at_rest(self) -> bool:
         """Whether the last command was zero."""
         return self.guard.velocity_rad_s == 0.0
+
+    @property
+    def still(self) -> bool:
+        """Whether the joint stands still, by what was commanded and by its angle.
+
+        Zero has been commanded for longer than the longest ramp and the drive's settling, and the
+        angle is within `guard.hold_limit_deg` of where it then was.
+        """
+        known, limits = self.consistency, self.limits
+        ramp_s = limits.speed_rad_s / limits.acceleration_rad_s2
+        near = abs(self.angle_rad - known.held_rad) <= self.agreement.hold_rad  # not so of a NaN
+        return self.at_rest and known.still_s > ramp_s and near
 
 
 def set_admittance(loop: ControlLoop, inertia_kg_m2: float, damping_nm_s_rad: float) -> None:

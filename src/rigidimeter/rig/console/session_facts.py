@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from rigidimeter.core.session import PlannedEpoch
 from rigidimeter.core.units import deg_from_rad
-from rigidimeter.rig.acquisition import State
+from rigidimeter.rig.acquisition import Phase, State
 from rigidimeter.rig.acquisition.processes import PAUSE_NEXT, STOP_NEXT, LiveEstimate, LoopStatus
 from rigidimeter.rig.console.indicators import (
     Indicator,
@@ -25,6 +25,24 @@ from rigidimeter.rig.console.indicators import (
 from rigidimeter.rig.console.live_parameters import LiveValue, live_values
 from rigidimeter.rig.console.session_progress import Progress, SessionPlan
 from rigidimeter.rig.guard import Cause, Reaction
+
+COUNTED = {
+    Phase.HOLD: "",
+    Phase.ZEROING: "zero of the torque sensor",
+    Phase.EPOCH: "epoch",
+    Phase.RETURN: "return",
+    Phase.REST: "rest",
+}
+"""Of what a countdown is."""
+
+DOING = {
+    Phase.HOLD: "the arm comes to rest",
+    Phase.ZEROING: "the torque sensor is zeroed",
+    Phase.EPOCH: "epoch runs",
+    Phase.RETURN: "the arm moves back to its start",
+    Phase.REST: "rest",
+}
+"""What is asked of the arm while a run goes on."""
 
 
 @dataclass(frozen=True)
@@ -136,8 +154,8 @@ def facts(
     """
     recent, recorder = recent or RecentSamples(), recorder or RecorderState()
     state = State(loop.state)
-    words, countdown_s = _countdown(progress, loop, state)
-    left_s = session_left_s(progress, loop)
+    words, countdown_s = _countdown(progress, loop)
+    left_s = session_left_s(progress, loop, plan.settings.protocol.return_s)
     distances = limit_distances(plan.settings.guard, recent, loop.energy_j)
     live, live_words = _live(plan, progress, history)
     return Facts(
@@ -163,48 +181,46 @@ def facts(
     )
 
 
-def session_left_s(progress: Progress, loop: LoopStatus) -> float:
+def session_left_s(progress: Progress, loop: LoopStatus, return_s: float) -> float:
     """Return how long the session takes from now on, the last rest included.
 
-    Where the arm rests the time that this rest still lasts is counted, in an epoch what it still
-    lasts and its rest.
+    What runs counts by the time that it still lasts, and what follows it before the next epoch.
     """
     if progress.outcome:
         return 0.0
-    left_s = sum(epoch.duration_s + epoch.rest_s for epoch in progress.to_run)
-    until_s = loop.until_s - loop.time_s
-    if State(loop.state) is State.RUNNING and math.isfinite(until_s):
+    left_s = sum(epoch.duration_s + return_s + epoch.rest_s for epoch in progress.to_run)
+    until_s, phase = loop.until_s - loop.time_s, Phase(loop.phase)
+    if phase is not Phase.HOLD and math.isfinite(until_s):
         left_s += max(until_s, 0.0)
-    if progress.running and progress.current is not None:
-        left_s += progress.current.rest_s
+    if progress.current is not None:
+        if phase is Phase.EPOCH:
+            left_s += return_s
+        if phase in (Phase.EPOCH, Phase.RETURN):
+            left_s += progress.current.rest_s
     return left_s
 
 
-def _countdown(progress: Progress, loop: LoopStatus, state: State) -> tuple[str, float]:
+def _countdown(progress: Progress, loop: LoopStatus) -> tuple[str, float]:
     """Return of what a countdown is, and how much is left of it in s."""
-    left_s = loop.until_s - loop.time_s
-    if state is not State.RUNNING or not math.isfinite(left_s) or progress.outcome:
+    left_s, what = loop.until_s - loop.time_s, COUNTED[Phase(loop.phase)]
+    if not what or not math.isfinite(left_s) or progress.outcome:
         return "", math.nan
-    what = "rest"
-    if progress.running:
-        what = "epoch"
-    elif progress.current is None and not progress.zeroed:
-        what = "zero of the torque sensor"
     return what, max(left_s, 0.0)
 
 
 def _state_words(progress: Progress, loop: LoopStatus, state: State) -> str:
+    """Return what is asked of the arm and whether it stands still, by what the loop shows."""
     if progress.outcome:
         return f"ended: {progress.outcome}"
-    words = {
-        State.IDLE: "starts",
-        State.RUNNING: "epoch runs" if progress.running else "between epochs",
-        State.PAUSED: "paused",
-        State.STOPPING: "stops",
-        State.FAULTED: "stopped by a fault",
-    }[state]
-    if state is State.PAUSED and loop.cause:
-        words = "held by the guard"
+    if state is State.IDLE:
+        words = "starts"
+    elif state is State.PAUSED:
+        words = "held by the guard" if loop.cause else "paused"
+        words += ", the arm is still" if loop.still else ", the arm comes to rest"
+    elif state is State.RUNNING:
+        words = DOING[Phase(loop.phase)]
+    else:
+        words = "stops" if state is State.STOPPING else "stopped by a fault"
     if loop.pending & STOP_NEXT:
         return f"{words}, ends after this epoch"
     return f"{words}, pauses after this epoch" if loop.pending & PAUSE_NEXT else words

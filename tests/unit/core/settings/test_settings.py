@@ -45,8 +45,8 @@ def test_the_controller_is_read_per_degree():
             "protocol.rests_s[1] = 'a': Input should be a valid number, in s",
         ),
         (
-            {"protocol": {"rests_s": [1.0]}},
-            "each rest must last at least return_s (3 s)",
+            {"protocol": {"rests_s": [-1.0]}},
+            "rests_s holds -1 s; each rest, which begins after the return, must last from 0",
         ),
         (
             {"protocol": {"blocks": [{"condition": "X"}]}},

@@ -149,7 +149,7 @@ def test_what_comes_before_an_epoch_is_stored_with_it(tmp_path):
 def test_progress_reaches_the_end(tmp_path):
     reached = []
     run(SpoiledRig(lambda r: r), tmp_path / "s", progress=reached.append)
-    assert reached == [1.0, 2.0, 3.0, 4.0]
+    assert reached == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
 
 
 def test_a_rig_without_power_does_not_move():

@@ -13,10 +13,12 @@ from rigidimeter.rig.acquisition import (
     Order,
     change_parameter,
     follow,
+    go_back,
     hold,
     perturb,
     ramp_to_rest,
     rest,
+    return_duration_s,
 )
 from rigidimeter.rig.guard import Cause
 
@@ -107,12 +109,28 @@ def test_an_imposed_motion_corrects_the_error_of_when_the_reading_was_taken(age_
     assert {s.epoch for s in samples} == {2}
 
 
-def test_a_rest_returns_from_where_the_arm_is_and_then_holds():
+@pytest.mark.parametrize(
+    ("angle_deg", "lasts_s"), [(0.0, 3.0), (32.0, 3.0), (-40.0, 3.75), (80.0, 7.5)]
+)
+def test_a_return_takes_its_time_or_as_long_as_its_peak_speed_needs(angle_deg, lasts_s):
+    """15/8 · 40 deg / 3.75 s is 20 deg/s."""
+    angle_rad, speed_rad_s = math.radians(angle_deg), math.radians(20.0)
+    assert return_duration_s(angle_rad, 3.0, speed_rad_s) == pytest.approx(lasts_s)
+    ticks = 4000
+    way = (minimum_jerk(angle_rad, lasts_s, k * lasts_s / ticks)[1] for k in range(ticks))
+    assert max(map(abs, way)) == pytest.approx(15 / 8 * abs(angle_rad) / lasts_s)
+
+
+FAST = 10.0
+"""In rad/s: faster than any way back here."""
+
+
+def test_a_return_goes_back_from_where_the_arm_is():
     loop, samples = made(STIFF)
     loop.angle_rad = loop.rig.angle_rad = 0.05
-    rest(loop, 0.6, 0.5)
+    go_back(loop, 0.5, FAST)
     targets, velocities = zip(
-        *(minimum_jerk(0.05, 0.5, k * INTERVAL_S) for k in range(600)), strict=True
+        *(minimum_jerk(0.05, 0.5, k * INTERVAL_S) for k in range(500)), strict=True
     )
     assert [s.target_angle_rad for s in samples] == list(targets)
     errors = [t - s.angle_rad for t, s in zip(targets, samples, strict=True)]
@@ -123,18 +141,38 @@ def test_a_rest_returns_from_where_the_arm_is_and_then_holds():
     assert not any(s.perturbation_nm for s in samples)
 
 
-def test_a_rest_before_any_reading_begins_where_the_rig_was_enabled():
+def test_a_rest_keeps_the_arm_where_epochs_begin():
+    loop, samples = made(STIFF)
+    loop.rig.angle_rad = 0.001
+    rest(loop, 0.6, FAST)
+    assert len(samples) == 600
+    assert {s.target_angle_rad for s in samples} == {0.0}
+    assert requests(samples) == pytest.approx([-GAIN_PER_S * s.angle_rad for s in samples])
+    assert {s.epoch for s in samples} == {REST}
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_no_reading_makes_a_return_or_a_rest_faster_than_its_limit(sign):
+    """An arm that was pushed away: the correction alone would ask for 0.1 · gain."""
+    for led in (lambda loop: go_back(loop, 0.5, 0.3), lambda loop: rest(loop, 0.5, 0.3)):
+        loop, samples = made(STIFF, change=lambda _, r: r._replace(angle_rad=sign * 0.1))
+        led(loop)
+        assert requests(samples)[-1] == -sign * 0.3
+        assert max(map(abs, requests(samples))) == 0.3
+
+
+def test_a_return_before_any_reading_begins_where_the_rig_was_enabled():
     loop, samples = made(SETTINGS)
-    rest(loop, 0.01, 0.5)
+    go_back(loop, 0.01, FAST)
     assert {s.target_angle_rad for s in samples} == {0.0}
 
 
-def test_a_rest_compares_an_old_reading_with_the_target_of_its_time():
+def test_a_return_compares_an_old_reading_with_the_target_of_its_time():
     loop, samples = made(
         SETTINGS, change=lambda k, r: r._replace(motion_time_s=r.motion_time_s - 0.004)
     )
     loop.angle_rad = loop.rig.angle_rad = 0.05
-    rest(loop, 0.1, 0.5)
+    go_back(loop, 0.5, FAST)
     gain = SETTINGS.controller.tracking_gain_per_s
     for k in (2, 50):
         (_, velocity), (then, _) = (

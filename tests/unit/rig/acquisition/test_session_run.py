@@ -11,6 +11,7 @@ from tests.unit.rig.acquisition.whole_session import (
     RATE_HZ,
     REST,
     RETURN,
+    STOP,
     VALUES,
     session,
 )
@@ -27,12 +28,17 @@ def test_a_session_runs_what_was_planned_tells_it_and_takes_the_power_away():
     ran = session(before_epoch=lambda planned: {"note": planned.number})
     assert ran.result == SessionResult("success", "", 2, 2, Cause.NONE)
     assert [event["event"] for event in ran.sink.events] == [
-        *("session_started", "epoch_started", "epoch_ended", "epoch_started", "epoch_ended")
+        "session_started",
+        *2 * ("epoch_started", "epoch_ended", "return_started"),
     ]
     assert ran.sink.events[0]["time_s"] == 0.0
     first, second = ran.sink.of("epoch_started")
     assert (first["time_s"], first["note"], first["label"]) == (0.0, 1, "1")
-    assert (second["time_s"], second["note"], second["label"]) == (1.6, 2, "2")
+    assert (second["time_s"], second["note"], second["label"]) == (
+        (EPOCH + STOP + RETURN + REST) / RATE_HZ,
+        2,
+        "2",
+    )
     assert (first["planned_s"], first["task"], first["epoch"]) == (1.0, "prbs", 1)
     ended = ran.sink.of("epoch_ended")[0]
     assert ended == {
@@ -44,8 +50,9 @@ def test_a_session_runs_what_was_planned_tells_it_and_takes_the_power_away():
     assert ran.rig.until_off[-2:] == [("write", 0.0), ("disable",)]
     assert ran.rig.of("disable") == [None]
     assert [run.state for run in ran.states] == [State.RUNNING, State.STOPPING]
-    epochs = [s.epoch for s in ran.sink.samples][: 2 * (EPOCH + REST)]
-    assert epochs == [1] * EPOCH + [-1] * REST + [2] * EPOCH + [-1] * REST
+    epochs = [s.epoch for s in ran.sink.samples][: 2 * (EPOCH + STOP + RETURN + REST)]
+    between = [-1] * (STOP + RETURN + REST)
+    assert epochs == [1] * EPOCH + between + [2] * EPOCH + between
     planned_nm = prbs_nm(parse_settings(VALUES).prbs, RATE_HZ).tolist()
     assert [s.perturbation_nm for s in ran.sink.samples[:EPOCH]] == planned_nm
     (time_s, outcome, reason) = ran.sink.closed[0]
@@ -123,25 +130,85 @@ def test_an_epoch_in_which_a_limit_held_is_a_fail_also_if_an_operator_ends_it():
     assert "position limit of ±1.5 deg" in ran.sink.of("epoch_ended")[0]["reason"]
 
 
-def test_a_pause_waits_for_the_epoch_and_goes_back_before_the_next():
+def test_a_pause_waits_for_the_epoch_and_goes_back_once_it_is_resumed():
     ran = session(Desk(orders={10: Command.PAUSE, 200: Command.RESUME}))
     assert ran.result.outcome == "success"
     assert ran.labels == ["1", "2"]
-    # Way back, looks of 0.1 s in the last of which it is resumed, the way back again.
+    # Looks of 0.1 s, in the last of which it is resumed, then the way back.
     second = ran.sink.of("epoch_started")[1]["time_s"] * RATE_HZ
     assert second == pytest.approx(200 + LOOK + RETURN)
     led = [math.isfinite(s.target_angle_rad) for s in ran.sink.samples[EPOCH : round(second)]]
-    assert led == [True] * RETURN + [False] * (len(led) - 2 * RETURN) + [True] * RETURN
+    assert led == [False] * (len(led) - RETURN) + [True] * RETURN
     assert [r.state for r in ran.states] == [
         *(State.RUNNING, State.RUNNING, State.PAUSED, State.RUNNING, State.STOPPING)
     ]
 
 
+BRAKED_RAD_S = math.radians(parse_settings(VALUES).guard.acceleration_limit_deg_s2) / RATE_HZ
+
+
+@pytest.mark.parametrize("order", [Command.PAUSE_NOW, Command.PAUSE, None])
+def test_a_pause_holds_the_arm_still_until_it_is_resumed(order):
+    """Ordered, or by the guard: zero within the ramp, and no motion before the order to go on."""
+    orders = {300: Command.RESUME} if order is None else {30: order, 300: Command.RESUME}
+    causes = {30: Cause.TORQUE_HIGH} if order is None else {}
+    ran = session(Desk(causes, orders))
+    ended = round(ran.sink.of("epoch_ended")[0]["time_s"] * RATE_HZ)
+    sent = [s.velocity_command_rad_s for s in ran.sink.samples]
+    before = sent[ended - 2]
+    assert before != 0.0
+    ramp = math.ceil(abs(before) / BRAKED_RAD_S)
+    assert not any(sent[ended + ramp : 301])
+    assert len({s.angle_rad for s in ran.sink.samples[ended + ramp + 1 : 301]}) == 1
+    assert abs(ran.sink.samples[300].angle_rad) > math.radians(0.02)
+    assert any(sent[301:])
+
+
+@pytest.mark.parametrize(("speed_deg_s", "lasts_s"), [(100.0, 0.5), (8.0, None)])
+def test_a_return_is_no_faster_than_its_limit(speed_deg_s, lasts_s):
+    """T = max(return_s, 15/8 θ₀ / v), whose peak is 15/8 θ₀ / T; here from about 6 deg."""
+    protocol = {**VALUES["protocol"], "return_speed_deg_s": speed_deg_s}
+    desk = Desk(orders={25: Command.PAUSE_NOW, 90: Command.RESUME})
+    ran = session(desk, values={"protocol": protocol})
+    told = ran.sink.of("return_started")[0]
+    from_rad = told["from_rad"]
+    lasts_s = lasts_s or 15.0 / 8.0 * abs(from_rad) / math.radians(speed_deg_s)
+    assert told["duration_s"] == pytest.approx(lasts_s)
+    begun = round(told["time_s"] * RATE_HZ)
+    assert ran.sink.samples[begun].angle_rad == pytest.approx(from_rad)
+    second = round(ran.sink.of("epoch_started")[1]["time_s"] * RATE_HZ)
+    way = ran.sink.samples[begun:second]
+    assert len(way) == math.ceil(lasts_s * RATE_HZ - 1e-9)
+    peak_rad_s = 15.0 / 8.0 * abs(from_rad) / (len(way) / RATE_HZ)
+    fastest = max(abs(s.velocity_command_rad_s) for s in way)
+    assert fastest <= math.radians(speed_deg_s)
+    assert fastest == pytest.approx(peak_rad_s, rel=0.02)
+    assert abs(way[-1].angle_rad) < math.radians(0.1)
+
+
+def test_a_pause_on_the_way_back_holds_there_and_the_next_way_back_begins_there():
+    pause = EPOCH + STOP + RETURN // 2
+    ran = session(Desk(orders={pause: Command.PAUSE_NOW, 200: Command.RESUME}))
+    assert ran.sink.samples[pause].velocity_command_rad_s != 0.0
+    assert not any(s.velocity_command_rad_s for s in ran.sink.samples[pause + 3 : 201])
+    first, second = ran.sink.of("return_started")[:2]
+    assert second["time_s"] > 200 / RATE_HZ
+    assert 0.0 < abs(second["from_rad"]) < abs(first["from_rad"])
+    assert (ran.result.outcome, ran.labels) == ("success", ["1", "2"])
+
+
+def test_a_stop_while_the_arm_comes_to_rest_leaves_return_and_rest_out():
+    ran = session(Desk(orders={EPOCH + 2: Command.STOP}))
+    assert ran.sink.of("return_started") == []
+    assert (ran.result.outcome, ran.labels) == ("success", ["1"])
+    assert len(ran.sink.samples) <= EPOCH + 2 * STOP
+
+
 def test_a_paused_run_looks_every_tenth_of_a_second_whether_it_may_go_on():
-    """At 1 kHz: 11 ticks, the way back of 500, a look of 100 in which it is resumed."""
-    desk = Desk(orders={10: Command.PAUSE_NOW, 520: Command.RESUME})
+    """At 1 kHz: 11 ticks, looks of 100 in the fifth of which it is resumed, the way back."""
+    desk = Desk(orders={10: Command.PAUSE_NOW, 500: Command.RESUME})
     ran = session(desk, values={"rig": {}})
-    assert ran.sink.of("epoch_started")[1]["time_s"] == pytest.approx(0.011 + 0.5 + 0.1 + 0.5)
+    assert ran.sink.of("epoch_started")[1]["time_s"] == pytest.approx(0.011 + 0.5 + 0.5)
 
 
 def test_a_pause_now_ends_the_epoch_which_comes_again_first_and_once():
@@ -189,15 +256,16 @@ def test_a_stop_and_an_abort(orders, ended, outcome, reason):
 
 
 def test_an_abort_on_the_way_back_of_a_pause_only_ramps():
-    ran = session(Desk(orders={10: Command.PAUSE, 60: Command.ABORT}))
-    assert ran.sink.samples[60].velocity_command_rad_s != 0.0
-    assert len(ran.sink.samples) <= 61 + 2
+    orders = {10: Command.PAUSE, 98: Command.RESUME, 112: Command.ABORT}
+    ran = session(Desk(orders=orders))
+    assert ran.sink.samples[112].velocity_command_rad_s != 0.0
+    assert len(ran.sink.samples) <= 113 + 2
     assert ran.result.outcome == "abort"
 
 
 def test_a_stop_in_a_rest_does_not_wait_for_its_end():
-    ran = session(Desk(orders={60: Command.STOP}))
-    assert len(ran.sink.samples) < 70
+    ran = session(Desk(orders={EPOCH + STOP + RETURN + 5: Command.STOP}))
+    assert len(ran.sink.samples) < EPOCH + STOP + RETURN + 10
 
 
 def test_a_halt_takes_the_power_away_in_its_tick():
@@ -268,7 +336,8 @@ def test_a_hold_is_a_pause_that_the_operator_ends():
     assert not any(s.velocity_command_rad_s for s in held)
     assert {s.cause for s in held} == {int(Cause.TORQUE_HIGH)}
     second = ran.sink.of("epoch_started")[1]["time_s"] * RATE_HZ
-    assert second == pytest.approx(91 + RETURN)
+    way_back = ran.sink.of("return_started")[0]["duration_s"] * RATE_HZ
+    assert second == pytest.approx(91 + math.ceil(way_back))
     epoch = [s for s in ran.sink.samples if s.epoch == 2]
     assert {s.cause for s in epoch} == {0}
     assert any(s.velocity_command_rad_s for s in epoch)
@@ -276,7 +345,7 @@ def test_a_hold_is_a_pause_that_the_operator_ends():
 
 @pytest.mark.parametrize(("resume", "hold"), [(20, 25), (51, 52)])
 def test_a_hold_that_comes_after_the_order_to_go_on_is_not_ended_by_it(resume, hold):
-    """On the way back of a pause, from 11 on; and standing still, looking every 5 ticks from 36."""
+    """While the arm comes to rest, looking every 5 ticks from 11 on."""
     orders = {10: Command.PAUSE_NOW, resume: Command.RESUME, 200: Command.RESUME}
     ran = session(Desk({hold: Cause.TORQUE_HIGH}, orders))
     assert ran.epochs[0] == (1, "abort")
@@ -297,7 +366,7 @@ def test_a_hold_without_an_operator_is_the_end():
     )
 
 
-@pytest.mark.parametrize("hold", [25, 45])  # on the way to the pause, and from it
+@pytest.mark.parametrize("hold", [23, 40])  # while the arm comes to rest, and on the way back
 def test_without_an_operator_no_epoch_begins_after_a_hold_on_the_way_back(hold):
     orders = {10: Command.PAUSE_NOW, 20: Command.RESUME}
     ran = session(Desk({hold: Cause.TORQUE_HIGH}, orders, attended=False))

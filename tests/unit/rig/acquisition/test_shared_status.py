@@ -7,7 +7,7 @@ import pytest
 
 from rigidimeter.core.session import Sample
 from rigidimeter.core.settings import Settings
-from rigidimeter.rig.acquisition import NOTHING, Command, Order, Run, State
+from rigidimeter.rig.acquisition import NOTHING, Command, Order, Phase, Run, State
 from rigidimeter.rig.acquisition.processes import (
     NOTE_BYTES,
     PAUSE_NEXT,
@@ -300,7 +300,7 @@ def test_the_sink_keeps_events_in_their_place(shared_status, rings):
 class Loop:
     """What the sink looks at of a loop."""
 
-    until_tick, rate_hz = 30, 10.0
+    until_tick, rate_hz, phase, still = 30, 10.0, Phase.REST, True
     guard = guard_state(guard_limits(Settings()))._replace(energy_j=0.7)
 
 
@@ -322,3 +322,23 @@ def test_the_sink_shows_what_comes_next(shared_status, rings):
         sink.sample(sample(k))
         shown = shared_status.loop()
         assert (shown.pending, shown.until_s, shown.energy_j) == (pending, 3.0, 0.7)
+
+
+@pytest.mark.parametrize(
+    ("state", "stands", "still"),
+    [
+        (State.PAUSED, True, 1),
+        (State.PAUSED, False, 0),  # it comes to rest, or was pushed away
+        (State.RUNNING, True, 0),  # zeroing: what follows moves it without an order
+    ],
+)
+def test_the_sink_says_that_the_arm_is_still_by_the_loop_and_not_by_the_state(
+    shared_status, rings, state, stands, still
+):
+    sink, loop = RingSink(SessionMemory(*rings, shared_status), 10.0), Loop()
+    loop.still = stands
+    sink.watch(loop)
+    sink.state_changed(Run(state))
+    sink.sample(sample(1))
+    shown = shared_status.loop()
+    assert (shown.still, shown.phase) == (still, Phase.REST)

@@ -22,6 +22,10 @@ VALUES = {
 EPOCH, REST, RETURN, LOOK = 50, 30, 25, 5
 """In ticks."""
 
+STOP = 2 * LOOK
+"""In ticks: the drive has settled 0.16 s after the last command, and it is looked after each 0.1 s.
+"""
+
 HAND_KG_M2 = 0.0045
 
 

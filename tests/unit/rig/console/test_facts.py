@@ -7,7 +7,7 @@ import pytest
 from tests.unit.rig.console.test_session_progress import EPOCHS, ended, started, told
 
 from rigidimeter.core.settings import Settings
-from rigidimeter.rig.acquisition import State
+from rigidimeter.rig.acquisition import Phase, State
 from rigidimeter.rig.acquisition.processes import (
     PAUSE_NEXT,
     ROW,
@@ -31,7 +31,10 @@ from rigidimeter.rig.guard import Cause
 
 SETTINGS = Settings()
 PLAN = SessionPlan(SETTINGS, EPOCHS)
-RUNNING = LoopStatus(State.RUNNING, 30_000, 1, time_s=30.0, angle_rad=0.1, until_s=45.0)
+RUNNING = LoopStatus(
+    State.RUNNING, 30_000, 1, time_s=30.0, angle_rad=0.1, until_s=45.0, phase=Phase.EPOCH
+)
+RETURN_S = SETTINGS.protocol.return_s
 QUIET = RecentSamples(
     1000, 0.5, math.radians(10), math.radians(50), 1.0, 0.8, 1e-4, 1e-3, 2e-3, 0, 0, False
 )
@@ -48,8 +51,8 @@ def test_epoch_countdown_counts_and_what_is_left():
     assert found.epoch.text == "epoch 1 of 3: OFF, prbs"
     assert found.next_epoch.text == "epoch 2 of 3: OFF, sinusoid"
     assert (found.countdown_words, found.countdown_s) == ("epoch", 15.0)
-    # 15 s of this epoch, its rest of 10 s, then 20 + 20 s and 20 + 10 s.
-    assert found.session_left_s == 15.0 + 10.0 + 40.0 + 30.0
+    # 15 s of this epoch, its rest of 10 s, then 20 + 20 s and 20 + 10 s; a return after each.
+    assert found.session_left_s == 15.0 + 10.0 + 40.0 + 30.0 + 3 * RETURN_S
     assert [(c.condition, c.good, c.bad, c.left) for c in found.counts] == [
         ("OFF", 0, 0, 2),
         ("DBS", 0, 0, 1),
@@ -59,12 +62,23 @@ def test_epoch_countdown_counts_and_what_is_left():
 
 
 def test_in_a_rest_the_rest_is_counted_down_and_the_next_epoch_named():
-    found = shown(told(started(1, "1"), ended(1)), RUNNING._replace(epoch=-1))
+    found = shown(told(started(1, "1"), ended(1)), RUNNING._replace(epoch=-1, phase=Phase.REST))
+    assert found.state_words == "rest"
     assert found.epoch is None
     assert found.next_epoch.place == 2
     assert (found.countdown_words, found.countdown_s) == ("rest", 15.0)
-    assert found.session_left_s == 15.0 + 40.0 + 30.0
+    assert found.session_left_s == 15.0 + 40.0 + 30.0 + 2 * RETURN_S
     assert (found.counts[0].good, found.counts[0].left) == (1, 1)
+
+
+def test_the_way_back_is_announced_and_its_rest_still_comes():
+    loop = RUNNING._replace(epoch=-1, phase=Phase.RETURN, until_s=32.0)
+    found = shown(told(started(1, "1"), ended(1)), loop)
+    assert found.state_words == "the arm moves back to its start"
+    assert (found.countdown_words, found.countdown_s) == ("return", 2.0)
+    assert found.session_left_s == 2.0 + 10.0 + 40.0 + 30.0 + 2 * RETURN_S
+    stopping = shown(told(started(1, "1"), ended(1)), loop._replace(phase=Phase.HOLD))
+    assert (stopping.state_words, stopping.countdown_words) == ("the arm comes to rest", "")
 
 
 def test_a_repetition_keeps_its_place_and_counts_as_left():
@@ -83,19 +97,20 @@ def test_a_session_that_is_continued_keeps_its_numbers():
 
 
 def test_before_the_first_epoch_the_sensor_is_zeroed():
-    loop = RUNNING._replace(epoch=-1, time_s=0.5, until_s=2.0)
+    loop = RUNNING._replace(epoch=-1, time_s=0.5, until_s=2.0, phase=Phase.ZEROING)
     assert shown(told(), loop).countdown_words == "zero of the torque sensor"
-    zeroed = told({"event": "sensor_zeroed", "refused": ""})
-    assert shown(zeroed, loop).countdown_words == "rest"
+    assert shown(told(), loop).state_words == "the torque sensor is zeroed"
 
 
 def test_in_a_pause_nothing_is_counted_down():
-    loop = RUNNING._replace(state=State.PAUSED, until_s=30.1)
+    loop = RUNNING._replace(state=State.PAUSED, until_s=30.1, phase=Phase.HOLD, still=1)
     found = shown(told(started(1, "1"), ended(1)), loop)
-    assert (found.countdown_words, found.state_words) == ("", "paused")
-    assert found.session_left_s == 70.0
+    assert (found.countdown_words, found.state_words) == ("", "paused, the arm is still")
+    assert found.session_left_s == 70.0 + 2 * RETURN_S
+    moving = shown(told(started(1, "1"), ended(1)), loop._replace(still=0))
+    assert moving.state_words == "paused, the arm comes to rest"
     held = loop._replace(cause=int(Cause.TORQUE_HIGH))
-    assert shown(told(), held).state_words == "held by the guard"
+    assert shown(told(), held).state_words == "held by the guard, the arm is still"
     assert shown(told(), held).stop_words == f"held: {Cause.TORQUE_HIGH.sentence}"
     why = told({"event": "guard_latched", "sentence": "the torque was 11 N·m"})
     assert shown(why, held).stop_words == "held: the torque was 11 N·m"

@@ -13,7 +13,7 @@ import pytest
 from tests.unit.rig.console.test_session_progress import EPOCHS, ended, started
 
 from rigidimeter.core.settings import Settings
-from rigidimeter.rig.acquisition import NOTHING, Command, Order, State
+from rigidimeter.rig.acquisition import NOTHING, Command, Order, Phase, State
 from rigidimeter.rig.acquisition.processes import (
     Flag,
     LoopStatus,
@@ -34,7 +34,9 @@ from rigidimeter.rig.console import (
 from rigidimeter.rig.guard import Cause
 
 PLAN = SessionPlan(Settings(), EPOCHS, virtual=True)
-RUNNING = LoopStatus(State.RUNNING, 30_000, 1, time_s=30.0, angle_rad=0.1, until_s=45.0)
+RUNNING = LoopStatus(
+    State.RUNNING, 30_000, 1, time_s=30.0, angle_rad=0.1, until_s=45.0, phase=Phase.EPOCH
+)
 
 
 class Person:

@@ -10,7 +10,7 @@ from tests.unit.rig.console.test_live_values import estimate
 from tests.unit.rig.console.test_session_progress import EPOCHS, started, told
 
 from rigidimeter.core.settings import Settings
-from rigidimeter.rig.acquisition import NOTHING, Command, Order, State
+from rigidimeter.rig.acquisition import NOTHING, Command, Order, Phase, State
 from rigidimeter.rig.acquisition.processes import (
     Flag,
     LiveEstimate,
@@ -69,7 +69,9 @@ def test_a_parameter_is_set_by_its_name():
 
 def test_the_status_says_where_the_run_is_and_why_it_stands():
     progress = told(started(1, "1"))
-    loop = LoopStatus(State.RUNNING, 5, 1, time_s=12.25, angle_rad=0.1, until_s=20.0)
+    loop = LoopStatus(
+        State.RUNNING, 5, 1, time_s=12.25, angle_rad=0.1, until_s=20.0, phase=Phase.EPOCH
+    )
     recent = RecentSamples(10, -1.5, torque_age_s=1e-3, motion_age_s=1e-3)
 
     def line(loop, history=()):

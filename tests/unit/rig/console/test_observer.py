@@ -52,15 +52,18 @@ def followed(shared, desk=None):
 
 def test_a_session_is_followed_to_its_end(shared):
     seen, last = followed(shared)
-    # Two epochs of 50 ticks, each with a rest of 30: tick 10 is the 11th of the first epoch.
+    # Two epochs of 50 ticks, each with 10 until the arm is still, 25 back and a rest of 30.
     assert seen[10].epoch.text == "epoch 1 of 2: OFF, prbs"
     assert seen[10].countdown_s == pytest.approx(1.0 - 10 / RATE_HZ)
-    assert seen[10].session_left_s == pytest.approx(160 / RATE_HZ - 10 / RATE_HZ)
-    assert (seen[60].epoch, seen[60].countdown_words) == (None, "rest")
-    assert seen[60].countdown_s == pytest.approx(80 / RATE_HZ - 60 / RATE_HZ)
-    assert seen[60].session_left_s == pytest.approx(100 / RATE_HZ)
-    assert seen[90].epoch.place == 2
-    assert [(c.good, c.bad, c.left) for c in seen[90].counts] == [(1, 0, 1)]
+    assert seen[10].session_left_s == pytest.approx(210 / RATE_HZ - 10 / RATE_HZ)
+    assert (seen[55].epoch, seen[55].state_words) == (None, "the arm comes to rest")
+    assert (seen[70].epoch, seen[70].countdown_words) == (None, "return")
+    assert seen[70].countdown_s == pytest.approx(85 / RATE_HZ - 70 / RATE_HZ)
+    assert (seen[90].epoch, seen[90].countdown_words) == (None, "rest")
+    assert seen[90].countdown_s == pytest.approx(115 / RATE_HZ - 90 / RATE_HZ)
+    assert seen[90].session_left_s == pytest.approx((25 + 105) / RATE_HZ)
+    assert seen[120].epoch.place == 2
+    assert [(c.good, c.bad, c.left) for c in seen[120].counts] == [(1, 0, 1)]
     assert [(c.good, c.bad, c.left) for c in last.counts] == [(2, 0, 0)]
     assert (last.state_words, last.session_left_s) == ("ended: success", 0.0)
 
@@ -68,7 +71,8 @@ def test_a_session_is_followed_to_its_end(shared):
 def test_a_pause_and_the_repetition_after_it(shared):
     desk = Desk(orders={10: Command.PAUSE_NOW, 60: Command.RESUME})
     seen, last = followed(shared, desk)
-    assert seen[50].state_words == "paused"
+    assert seen[50].state_words == "paused, the arm is still"
+    assert seen[12].state_words == "paused, the arm comes to rest"
     assert seen[50].countdown_words == ""
     assert seen[50].next_epoch.again
     again = next(one for tick, one in seen.items() if tick > 60 and one.epoch is not None)
@@ -176,6 +180,7 @@ def test_a_torque_that_was_wrong_through_an_epoch_is_named_at_its_end(wrong, wor
     assert [text for text in observer.cautions if words not in text] == []
     if words:
         (epoch,) = wrong
-        assert EPOCH_S * epoch < cautions[0][0] <= (EPOCH_S + 1.0) * epoch + 1.0
+        apart_s = EPOCH_S + 0.6 + 1.0  # with return and rest
+        assert EPOCH_S * epoch < cautions[0][0] <= apart_s * epoch + 1.0
         assert words in cautions[0][1]
         assert words in observer.cautions[0]

@@ -12,9 +12,9 @@ from rigidimeter.rig.acquisition import (
     ControlLoop,
     SimulatedClock,
     follow,
+    go_back,
     perturb,
     ramp_to_rest,
-    rest,
 )
 from rigidimeter.rig.devices import SimulatedRig
 from rigidimeter.rig.guard import (
@@ -66,7 +66,7 @@ def recorded(settings, spoil=None, clock=None):
     loop = ControlLoop(settings, rig, clock or SimulatedClock(), samples.append)
     rig.enable()
     perturb(loop, 1, prbs_nm(settings.prbs, settings.rig.tick_rate_hz).tolist())
-    rest(loop, 0.5, 0.4)
+    go_back(loop, 0.5, 0.35)
     follow(loop, 2, *(c.tolist() for c in sinusoid(settings.sinusoid, settings.rig.tick_rate_hz)))
     ramp_to_rest(loop)
     return {

@@ -79,6 +79,7 @@ class RingSink:
             self._begun = True
             self._status.set_condition(Role.LOOP, ProcessCondition.RUNNING)
         loop = self._loop
+        still = loop is not None and self._state is State.PAUSED and loop.still
         self._status.show_loop(
             LoopStatus(
                 state=self._state,
@@ -96,6 +97,8 @@ class RingSink:
                 velocity_command_rad_s=sample.velocity_command_rad_s,
                 until_s=math.nan if loop is None else loop.until_tick / loop.rate_hz,
                 energy_j=math.nan if loop is None else loop.guard.energy_j,
+                phase=0 if loop is None else loop.phase,
+                still=int(still),
             )
         )
 

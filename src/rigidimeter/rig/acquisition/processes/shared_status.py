@@ -116,7 +116,7 @@ class SharedStatus:
         self._bytes = memory.bytes
         self._now_ns = now_ns
         self._noted = 0
-        self._loop = _Block(memory, _STATUS, "@7q8d")
+        self._loop = _Block(memory, _STATUS, "@7q8d2q")
         self._live = _Block(memory, _LIVE, "@4q10d")
         note = f"@q{NOTE_BYTES}s"
         self._notes = [

@@ -50,10 +50,12 @@ PAUSE_NEXT, STOP_NEXT = 1, 2
 
 
 class LoopStatus(NamedTuple):
-    """What the loop shows of itself. `state` is a `states.State`, `cause` a `rig.guard.Cause`.
+    """What the loop shows of itself. `state` is a `State`, `cause` a `rig.guard.Cause`.
 
-    `pending` says what comes after this epoch. `until_s` is when the epoch, the rest or whatever
-    else runs ends as planned, `energy_j` what the guard counts as going to and fro.
+    `pending` says what comes after this epoch. `phase` is a `Phase`. `still` says whether the joint
+    stands still and goes on only by an order (1): the guard's own numbers say so, not the state
+    alone. `until_s` is when the epoch, the rest or whatever else runs ends as planned, `energy_j`
+    what the guard counts as going to and fro.
     """
 
     state: int = 0
@@ -71,6 +73,8 @@ class LoopStatus(NamedTuple):
     velocity_command_rad_s: float = math.nan
     until_s: float = math.nan
     energy_j: float = math.nan
+    phase: int = 0
+    still: int = 0
 
 
 class LiveEstimate(NamedTuple):

@@ -36,6 +36,7 @@ from rigidimeter.rig.console.page.rig_steps import RigStep, start_refusal
 from rigidimeter.rig.console.page.server import PageServer
 from rigidimeter.rig.console.page.server_state import (
     AWAY_S,
+    SETTLES_S,
     SILENT_S,
     Place,
     Presence,

@@ -9,8 +9,9 @@ or cut off is silent. The time of its last beat is the console's heartbeat in th
 which the loop looks at every tick: the server cannot beat for a page.
 
 There is one exception. A page that says that it goes away, because it is reloaded, closed or no
-longer in front, has its session paused: the arm is held still. As long as the loop shows that it is
-paused, and for `AWAY_S` at most, it may come back. Then its silence counts again, and the loop ends
+longer in front, has its session paused: the arm is held still. As long as the loop shows that the
+joint stands still, by its angle and by what was commanded, and that only an order sets it going,
+and for `AWAY_S` at most, the page may come back. Then its silence counts again, and the loop ends
 the session. Only the same tab may come back meanwhile; any other page can only look.
 """
 
@@ -25,7 +26,6 @@ from typing import Any
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings
-from rigidimeter.rig.acquisition import State
 from rigidimeter.rig.acquisition.processes import Flag, SessionMemory
 from rigidimeter.rig.console import SessionPlan
 
@@ -33,7 +33,7 @@ AWAY_S = 20.0
 """For so long a page that said that it goes may be away from a paused session."""
 
 SETTLES_S = 0.3
-"""So long after it said so the loop may take to show that it is paused."""
+"""So long after it said so the loop may take to show that the arm stands still."""
 
 SILENT_S = 0.45
 """A page that was silent for so long is lost: with the ramp to rest it is less than 0.5 s."""
@@ -101,7 +101,7 @@ class Presence:
         if self.has_control(page):
             self.page = ""
 
-    def seen_ns(self, now_ns: int, *, still: bool) -> int:
+    def seen_ns(self, now_ns: int, *, still: bool, began_ns: int = 0) -> int:
         """Return the heartbeat of the operator.
 
         Parameters
@@ -109,10 +109,12 @@ class Presence:
         now_ns : int
         still : bool
             Whether the loop shows that the arm is held still.
+        began_ns : int
+            When the loop showed its first tick, if it has: the arm may settle from then on.
         """
         if self.left_ns:
-            away_ns = now_ns - self.left_ns
-            if away_ns < SETTLES_S * _NS or (still and away_ns < AWAY_S * _NS):
+            settles = now_ns - max(self.left_ns, began_ns) < SETTLES_S * _NS
+            if now_ns - self.left_ns < AWAY_S * _NS and (still or settles):
                 return now_ns
         return self.beat_ns
 
@@ -210,7 +212,7 @@ class ServerState:
         self.ending = False
         self._now_ns = now_ns
         self._requests: queue.SimpleQueue[StartRequest] = queue.SimpleQueue()
-        self._still = True
+        self._still, self._began_ns = True, 0
         self._count = 0
 
     # For the server
@@ -275,13 +277,17 @@ class ServerState:
     def console(self, plan: SessionPlan, folder: Path) -> Callable[[SessionMemory], None]:
         """Return what `supervise` calls about 20 times a second."""
         self._count += 1
-        self._still = True
+        self._still, self._began_ns = True, 0
 
         def follow(shared: SessionMemory) -> None:
             if self.stop_pressed:
                 shared.status.raise_flag(Flag.EMERGENCY_STOP)
             loop = shared.status.loop()
-            self._still = loop is None or loop.tick < 0 or loop.state == State.PAUSED
+            begun = loop is not None and loop.tick >= 0
+            if begun and not self._began_ns:
+                self._began_ns = self._now_ns()
+            # Before its first tick the loop moves nothing.
+            self._still = loop is not None and (not begun or loop.still != 0)
             if self.running is None:
                 self.running = RunningSession(self._count, shared.names, plan, folder)
 
@@ -289,7 +295,7 @@ class ServerState:
 
     def operator_seen_ns(self) -> int:
         """Return the operator's heartbeat: when the page in control was last heard of."""
-        return self.presence.seen_ns(self._now_ns(), still=self._still)
+        return self.presence.seen_ns(self._now_ns(), still=self._still, began_ns=self._began_ns)
 
     def over(self, folder: Path, outcome: str, sentences: tuple[str, ...]) -> None:
         """Say how the session ended."""

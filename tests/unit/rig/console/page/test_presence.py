@@ -6,7 +6,7 @@ import pytest
 
 from rigidimeter.rig.acquisition import State
 from rigidimeter.rig.acquisition.processes import LoopStatus
-from rigidimeter.rig.console.page import AWAY_S, SILENT_S, Place, Presence, ServerState
+from rigidimeter.rig.console.page import AWAY_S, SETTLES_S, SILENT_S, Place, Presence, ServerState
 
 S = 1_000_000_000
 BEGAN = 1000 * S
@@ -78,15 +78,46 @@ def test_a_page_that_is_lost_without_a_word_gives_control_to_the_next(presence):
     assert presence.arrive("other", "other tab", BEGAN + round(SILENT_S * S) + 1, session=True)
 
 
-@pytest.mark.parametrize(("run", "may"), [(State.PAUSED, True), (State.RUNNING, False)])
-def test_a_page_may_be_away_from_a_session_that_shows_that_it_is_paused(tmp_path, run, may):
-    now_ns = BEGAN + 2 * S
-    state = ServerState(Place(tmp_path, None, ""), now_ns=lambda: now_ns)
-    state.presence.arrive("page", "tab", BEGAN, session=False)
-    assert state.operator_seen_ns() == BEGAN
-    state.presence.leave("page", BEGAN + S)
-    state.presence.gone("page")
-    loop = LoopStatus(tick=1, state=int(run))
+@pytest.mark.parametrize(
+    ("state", "still", "may"),
+    [
+        (State.PAUSED, 1, True),
+        (State.PAUSED, 0, False),  # on its way to rest, or pushed away
+        (State.RUNNING, 0, False),
+    ],
+)
+def test_a_page_may_be_away_from_a_session_that_shows_that_the_arm_is_still(
+    tmp_path, state, still, may
+):
+    now_ns = BEGAN
+    server = ServerState(Place(tmp_path, None, ""), now_ns=lambda: now_ns)
+    loop = LoopStatus(tick=1, state=int(state), still=still)
     status = SimpleNamespace(loop=lambda: loop)
-    state.console(None, tmp_path)(SimpleNamespace(status=status, names=()))
-    assert state.operator_seen_ns() == (now_ns if may else BEGAN)
+    look = server.console(None, tmp_path)
+    look(SimpleNamespace(status=status, names=()))
+    server.presence.arrive("page", "tab", BEGAN, session=False)
+    now_ns = BEGAN + 2 * S
+    assert server.operator_seen_ns() == BEGAN
+    server.presence.leave("page", BEGAN + S)
+    server.presence.gone("page")
+    look(SimpleNamespace(status=status, names=()))
+    assert server.operator_seen_ns() == (now_ns if may else BEGAN)
+
+
+def test_a_page_that_left_before_the_first_tick_has_the_time_in_which_the_arm_settles(tmp_path):
+    now_ns = BEGAN
+    server = ServerState(Place(tmp_path, None, ""), now_ns=lambda: now_ns)
+    shown = [LoopStatus()]
+    memory = SimpleNamespace(status=SimpleNamespace(loop=lambda: shown[0]), names=())
+    look = server.console(None, tmp_path)
+    server.presence.arrive("page", "tab", BEGAN, session=False)
+    server.presence.leave("page", BEGAN)
+    now_ns = BEGAN + 3 * S
+    look(memory)
+    assert server.operator_seen_ns() == now_ns
+    shown[0] = LoopStatus(tick=0)
+    look(memory)
+    now_ns += round(SETTLES_S * S) - 1
+    assert server.operator_seen_ns() == now_ns
+    now_ns += 1
+    assert server.operator_seen_ns() == BEGAN

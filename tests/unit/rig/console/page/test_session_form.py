@@ -41,7 +41,7 @@ def test_numbers_are_read_with_a_comma_and_refused_by_the_settings(form):
     errors = read_form(form | {"prbs_amplitude": "99"}, BASE).errors
     assert errors.keys() == {"prbs_amplitude"}
     assert "less than or equal to 50, in N·m" in errors["prbs_amplitude"]
-    assert read_form(form | {"rests": "1"}, BASE).errors.keys() == {"rests"}
+    assert read_form(form | {"rests": "-1"}, BASE).errors.keys() == {"rests"}
     assert read_form(form | {"prbs_clock": "fast"}, BASE).errors.keys() == {"prbs_clock"}
 
 
