@@ -23,8 +23,9 @@ PRBS, SINUSOID = PrbsSettings(duration_s=20.0), SinusoidSettings(duration_s=12.0
 
 
 def test_one_rest_to_choose_from_gives_the_total_in_closed_form() -> None:
-    fixed = BLOCKS.model_copy(update={"rests_s": [10.0]})
-    assert plan(fixed, PRBS, SINUSOID, 1).total_s == 4 * (20 + 10) + 1 * (12 + 10)
+    """A return of 3 s, and then the rest."""
+    fixed = BLOCKS.model_copy(update={"rests_s": [10.0], "return_s": 3.0})
+    assert plan(fixed, PRBS, SINUSOID, 1).total_s == 4 * (20 + 3 + 10) + 1 * (12 + 3 + 10)
 
 
 def test_blocks_in_order_and_labels_over_the_session() -> None:

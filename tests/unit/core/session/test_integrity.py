@@ -210,7 +210,7 @@ def test_a_damaged_line_of_events_is_named_and_the_others_count(recorded):
     assert "line 3 is damaged" in notices[0].text
     log = scan_events(events.read_bytes(), events)
     assert log.damaged == (3,)
-    assert len(log.events) == 5
+    assert len(log.events) == 7
 
 
 def test_a_damaged_manifest_is_refused(recorded):

@@ -99,7 +99,7 @@ def test_a_damaged_end_of_the_session_is_not_taken_for_none(recorded):
     content[-20] ^= 1
     events.write_bytes(bytes(content))
     before = contents(folder)
-    with pytest.raises(UserError, match=r"line 4 of events\.jsonl is damaged and may say how"):
+    with pytest.raises(UserError, match=r"line 5 of events\.jsonl is damaged and may say how"):
         recover(folder)
     assert contents(folder) == before
     assert not recover(folder, force=True).already_closed

@@ -49,8 +49,10 @@ def test_every_epoch_and_the_session_close_with_an_outcome(simulate):
         ("session_started", None),
         ("epoch_started", None),
         ("epoch_ended", "success"),
+        ("return_started", None),
         ("epoch_started", None),
         ("epoch_ended", "success"),
+        ("return_started", None),
         ("session_ended", "success"),
     ]
 

@@ -281,3 +281,39 @@ def test_each_reading_is_as_old_as_its_own_sensor_may_make_it(slow, cause):
     stamp = f"{slow}_time_s"
     loop, _ = made(settings, change=lambda k, r: r._replace(**{stamp: k // 20 * 20 * INTERVAL_S}))
     assert run_ticks(loop, 1, 1500, constant(0.0)).cause is cause
+
+
+def test_the_joint_is_still_once_zero_was_commanded_for_longer_than_ramp_and_settling():
+    """After twice the reaction time, 0.04 s; the ramp from 200 deg/s at 6000 deg/s² is 0.033 s."""
+    loop, _ = made(SETTINGS)
+    assert not loop.still
+    run_ticks(loop, 1, 20, constant(0.5))
+    still = []
+    for _ in range(60):
+        run_ticks(loop, 1, 1, constant(0.0))
+        still.append(loop.still)
+    ramp = math.ceil(0.5 / CHANGE_RAD_S)
+    first = still.index(True)
+    assert first == pytest.approx(ramp + 40, abs=1)
+    assert all(still[first:])
+    run_ticks(loop, 1, 1, constant(0.01))
+    assert not loop.still
+
+
+def test_the_ramp_counts_where_it_takes_longer_than_the_drive():
+    values = {"guard": {"acceleration_limit_deg_s2": 1000.0}}  # 0.2 s from 200 deg/s
+    loop, _ = made(parse_settings(values))
+    run_ticks(loop, 1, 150, constant(0.0))
+    assert not loop.still
+    run_ticks(loop, 1, 60, constant(0.0))
+    assert loop.still
+
+
+@pytest.mark.parametrize(("moved_deg", "still"), [(0.9, True), (-0.9, True), (1.1, False)])
+def test_a_joint_that_was_moved_away_while_zero_is_commanded_is_not_still(moved_deg, still):
+    moved = math.radians(moved_deg)
+    loop, _ = made(SETTINGS, change=lambda k, r: r._replace(angle_rad=moved if k >= 100 else 0.0))
+    run_ticks(loop, 1, 100, constant(0.0))
+    assert loop.still
+    run_ticks(loop, 1, 5, constant(0.0))
+    assert loop.still is still

@@ -24,7 +24,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import Sample, read_events, read_samples
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.planning import plan
-from rigidimeter.rig.acquisition import Command, Order, State
+from rigidimeter.rig.acquisition import Command, Order, Phase, State
 from rigidimeter.rig.acquisition.processes import (
     Flag,
     Patience,
@@ -343,8 +343,11 @@ def test_a_loop_that_is_paused_holds_the_arm_and_shows_that_it_is(
     (loop,) = shown
     assert loop is not None
     assert (loop.state, loop.velocity_command_rad_s) == (State.PAUSED, 0.0)
-    sent = shared.samples.rows(clock.acted, shared.samples.written)["velocity_command_rad_s"]
-    assert not sent[1 + round(SETTINGS.protocol.return_s * RATE_HZ) + 1 :].any()
+    assert (loop.still, loop.phase) == (1, Phase.HOLD)
+    rows = shared.samples.rows(clock.acted, shared.samples.written)
+    limit = math.radians(SETTINGS.guard.acceleration_limit_deg_s2) / RATE_HZ
+    ramp = math.ceil(abs(rows["velocity_command_rad_s"][0]) / limit)
+    assert not rows["velocity_command_rad_s"][1 + ramp :].any()
 
 
 # The recorder's process
