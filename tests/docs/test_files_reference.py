@@ -39,6 +39,7 @@ def test_the_manifest_and_event_keys_are_those_of_a_session(tmp_path: Path) -> N
     writer.event("epoch_started", epoch=1, **named, time_s=0.0, planned_s=20.0, true_joint={})
     ending = {"time_s": 20.0, "outcome": "success", "reason": "", "limited_ticks": 0}
     writer.event("epoch_ended", epoch=1, **ending)
+    writer.event("return_started", time_s=20.1, from_rad=0.1, duration_s=3.0)
     writer.close(20.0, "success", "")
     assert list(table(FILES, "manifest.json")) == list(read_manifest(tmp_path / "s"))
     events, _ = read_events(tmp_path / "s" / "events.jsonl")
