@@ -6,6 +6,7 @@ import itertools
 import os
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 
@@ -37,9 +38,10 @@ def free_port() -> int:
 class Wire:
     """An emulator and, on the same bus, as many drivers as a test wants."""
 
-    def __init__(self) -> None:
+    def __init__(self, **options: Any) -> None:
         self.channel = f"cia402-{next(_channels)}"
-        self.emulator = Cia402Emulator(emulated_arm(), interface="virtual", channel=self.channel)
+        where = {"interface": "virtual", "channel": self.channel}
+        self.emulator = Cia402Emulator(emulated_arm(), **where, **options)
         self.drives: list[Cia402Drive] = []
 
     def drive(self, **settings: object) -> Cia402Drive:
@@ -55,6 +57,11 @@ class Wire:
         drive.enable()
         return drive
 
+    def close(self) -> None:
+        for drive in self.drives:
+            drive.close()
+        self.emulator.close()
+
 
 @pytest.fixture
 def wire() -> Iterator[Wire]:
@@ -62,9 +69,7 @@ def wire() -> Iterator[Wire]:
     try:
         yield made
     finally:
-        for drive in made.drives:
-            drive.close()
-        made.emulator.close()
+        made.close()
 
 
 def run_loop(

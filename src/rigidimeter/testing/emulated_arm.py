@@ -76,6 +76,10 @@ class EmulatedArm:
         self._target_rad_s = 0.0
         self._command_rad_s = 0.0
         self._ramp_rad_s2 = np.inf
+        self.torque_limit_nm = np.inf
+        """The largest torque of the motor, by the drive's own scale."""
+        self.saturated = False
+        """Whether the drive wanted more than that in the last step."""
         self._lock = threading.RLock()
 
     def command(self, velocity_rad_s: float, ramp_rad_s2: float = np.inf) -> None:
@@ -93,6 +97,12 @@ class EmulatedArm:
         with self._lock:
             self._advance()
             return self._state.angle_rad, self._state.velocity_rad_s
+
+    def lag_rad_s(self) -> float:
+        """Return by how much the velocity is behind the command as it is after its ramp."""
+        with self._lock:
+            self._advance()
+            return self._command_rad_s - self._state.velocity_rad_s
 
     def torque_nm(self) -> float:
         """Return the present torque from the drive on the joint, plus sensor noise, in N·m."""
@@ -131,15 +141,53 @@ class EmulatedArm:
         # A ramp changes the command during the step, so it is divided into short steps.
         while elapsed_s > 1e-9:
             ramping = self._command_rad_s != self._target_rad_s
-            step_s = min(elapsed_s, 1e-3) if ramping else elapsed_s
+            fine = ramping or np.isfinite(self.torque_limit_nm)
+            step_s = min(elapsed_s, 1e-3) if fine else elapsed_s
             if ramping:
                 change = self._ramp_rad_s2 * step_s
                 missing = self._target_rad_s - self._command_rad_s
                 self._command_rad_s += max(-change, min(change, missing))
             coefficients = drive(self._bandwidth_hz, DAMPING_RATIO, step_s)
-            self._state = drive_step(coefficients, self._state, self._command_rad_s)
+            wanted = drive_step(coefficients, self._state, self._command_rad_s)
+            self._state = self._as_limited(wanted, step_s)
             elapsed_s -= step_s
         angle, _, acceleration = self._state
         self._side_state = drive_side_step(
             self._side, self._side_state, angle, acceleration, self._torque_nm()
         )
+
+    def _as_limited(self, wanted: DriveState, step_s: float) -> DriveState:
+        """Return the state after a step in which the motor gives its torque limit at most.
+
+        A drive that cannot give what its loop asks for gives its limit L, so the joint accelerates
+        by θ″ = (±L − F − (M − J θ″)) / (J + J_d), with the friction F against the motion.
+        """
+        limit_nm = self.drive_side.torque_scale * self.torque_limit_nm
+        self.saturated = False
+        if not np.isfinite(limit_nm):
+            return wanted
+        joint, before = self.joint, self._state
+        inertia = joint.inertia_kg_m2 + self.drive_side.reflected_inertia_kg_m2
+        velocity = before.velocity_rad_s
+        pull_nm = arm_torque_nm(
+            *(0.0, joint.damping_nm_s_rad, joint.stiffness_nm_rad),
+            *(before.angle_rad, velocity, 0.0, self.voluntary_nm(self._at_s - self._start_s)),
+        )
+        friction_nm = self.drive_side.friction_nm
+        change = wanted.velocity_rad_s - velocity
+        moving = velocity if velocity else change
+        drag_nm = np.copysign(friction_nm, moving) if moving else 0.0
+        asked_nm = inertia * change / step_s + pull_nm + drag_nm
+        if abs(asked_nm) <= limit_nm:
+            return wanted
+        self.saturated = True
+        given_nm = float(np.copysign(limit_nm, asked_nm))
+        if not velocity and abs(given_nm - pull_nm) <= friction_nm:
+            return DriveState(before.angle_rad)
+        left_nm = given_nm - pull_nm
+        drag_nm = np.copysign(friction_nm, velocity if velocity else left_nm)
+        after = velocity + float(left_nm - drag_nm) / inertia * step_s
+        if velocity * after < 0.0 and abs(left_nm) <= friction_nm:
+            after = 0.0  # friction stops a motion and does not turn it
+        angle = before.angle_rad + 0.5 * (velocity + after) * step_s
+        return DriveState(angle, after, (after - velocity) / step_s)

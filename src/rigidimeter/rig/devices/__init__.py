@@ -29,7 +29,21 @@ from rigidimeter.rig.devices.ati.rdt_packets import (
 )
 from rigidimeter.rig.devices.ati.rdt_setup import page_changes, parse_page
 from rigidimeter.rig.devices.ati.sample_clock import LONGEST_DELAY_S, SampleClock
+from rigidimeter.rig.devices.bounds import (
+    BOUND_FACT,
+    LOST,
+    MOTOR_SPEED,
+    POSITION,
+    SLIPPAGE,
+    SPEED,
+    TORQUE,
+    BoundFound,
+    DriveBounds,
+    Tight,
+    drive_bounds,
+)
 from rigidimeter.rig.devices.cia402.drive import Cia402Drive
+from rigidimeter.rig.devices.cia402.drive_bounds import DriveSays, bound_objects, wanted_bounds
 from rigidimeter.rig.devices.cia402.eds import compare_eds
 from rigidimeter.rig.devices.cia402.sdo_transfers import read_back, write_object
 from rigidimeter.rig.devices.cia402.setup import (
@@ -51,6 +65,7 @@ from rigidimeter.rig.devices.cia402.state_words import (
     fastest_tick_rate_hz,
     frame_bits,
     frames,
+    inputs_of,
     position_of,
     sdo_answer,
     sdo_read_bytes,

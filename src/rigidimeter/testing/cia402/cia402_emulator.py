@@ -15,7 +15,7 @@ from __future__ import annotations
 import importlib
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Any
 
 from rigidimeter.core.errors import UserError
@@ -27,6 +27,7 @@ from rigidimeter.testing.cia402.object_dictionary import (
     dictionary,
 )
 from rigidimeter.testing.cia402.servo import (
+    BOUNDS,
     CIA402_MISBEHAVIOURS,
     DEFAULTS,
     GENERIC_ERROR,
@@ -53,6 +54,8 @@ class Cia402Emulator:
     interface, channel : str
         Of python-can.
     node_id : int
+    without : collection of int
+        Objects that this drive does not have.
     options : Any
         Further arguments of python-can, such as `port`.
     """
@@ -64,6 +67,7 @@ class Cia402Emulator:
         interface: str,
         channel: str,
         node_id: int = 1,
+        without: Collection[int] = (),
         **options: Any,
     ) -> None:
         try:
@@ -77,6 +81,8 @@ class Cia402Emulator:
         self._arm, self._node_id = arm, node_id
         self._lock = threading.RLock()
         self._servo = Servo(arm, self)
+        self.inputs = 1
+        """The digital inputs; bit 0 is a contact that opens when a button is pressed."""
         self._later: list[tuple[float, bytes]] = []
         self.log: list[tuple[float, str]] = []
         """Events with their times."""
@@ -85,7 +91,7 @@ class Cia402Emulator:
         self._network = network = canopen.Network(self._bus)
         network.send_message = self._transmit
         rated_mnm = self._servo.rated_torque_mnm
-        objects = dictionary(canopen.objectdictionary, node_id, rated_mnm)
+        objects = dictionary(canopen.objectdictionary, node_id, rated_mnm, without)
         self._node = node = network.create_node(canopen.LocalNode(node_id, objects))
         network.unsubscribe(0x600 + node_id, node.sdo.on_request)
         network.subscribe(0x600 + node_id, self._on_sdo_request)
@@ -180,6 +186,10 @@ class Cia402Emulator:
 
     # Functions that the servo uses
 
+    def has(self, index: int) -> bool:
+        """Return whether there is such an object."""
+        return index in self._node.object_dictionary
+
     def value(self, index: int, subindex: int = 0) -> int:
         """Return an object's value."""
         kind = self._node.object_dictionary[index]
@@ -219,7 +229,11 @@ class Cia402Emulator:
 
     def _on_read(self, index: int, subindex: int, **_: Any) -> int | None:
         if index == 0x6041:
-            return statusword(self._servo.phase)
+            return statusword(self._servo.phase) | self._servo.bound_bits()
+        if index == 0x60FD:
+            return self.inputs
+        if index == 0x6072 and "wrong bound" in self._servo.wrong:
+            return int(self._servo.wrong["wrong bound"])
         if index == 0x6061:
             shown = self._servo.wrong.get("change mode")
             return self.value(0x6060) if shown is None else int(shown)
@@ -235,14 +249,14 @@ class Cia402Emulator:
             return int(self._servo.wrong["wrong watchdog"])
         return None
 
-    def _on_write(self, index: int, data: bytes, **_: Any) -> None:
+    def _on_write(self, index: int, subindex: int, data: bytes, **_: Any) -> None:
         if index == 0x6060 and data[0] not in (0, PROFILE_VELOCITY):
             raise self._abort(WRONG_VALUE)
         if index == 0x6040:
             self._servo.control(int.from_bytes(data, "little"))
-        if index in (0x6040, 0x60FF):
+        if index in (0x6040, 0x60FF, *BOUNDS):
             # canopen stores the value after this callback; the servo needs it now.
-            self._node.data_store.setdefault(index, {})[0] = bytes(data)
+            self._node.data_store.setdefault(index, {})[subindex] = bytes(data)
             self._servo.move()
 
     # Other frames
@@ -304,7 +318,9 @@ class Cia402Emulator:
 
     def _send_measurements(self, index: int) -> None:
         identifier = self.value(index, 1)
-        if identifier & INVALID or "stop measurements" in self._servo.wrong:
+        wrong = self._servo.wrong
+        silent = "stop measurements" in wrong or (index == 0x1802 and "stop inputs" in wrong)
+        if identifier & INVALID or silent:
             return
         parts = [
             self._node.get_data(entry, sub)[:size] for entry, sub, size in self._mapping(index)
@@ -328,6 +344,7 @@ class Cia402Emulator:
                 now_s = time.monotonic()
                 self._watch_connection(now_s)
                 self._servo.watch_rest(now_s)
+                self._servo.watch_bounds()
                 due = [data for at_s, data in self._later if at_s <= now_s]
                 self._later = [item for item in self._later if item[0] > now_s]
                 for data in due:

@@ -1,17 +1,18 @@
 """The object dictionary of the emulated servo.
 
-As in the predefined connection set, there is one command PDO (0x1400) and there are two measurement
-PDOs (0x1800, 0x1801), with mappings that the master may change.
+As in the predefined connection set, there is one command PDO (0x1400) and there are three
+measurement PDOs (0x1800 to 0x1802), with mappings that the master may change.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
 NAME = "emulated servo"
 COMMAND_MESSAGES = (0x1400,)
-MEASUREMENT_MESSAGES = (0x1800, 0x1801)
+MEASUREMENT_MESSAGES = (0x1800, 0x1801, 0x1802)
 I8, I16, I32, U8, U16, U32, TEXT = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x09
 INVALID = 1 << 31
 PROFILE_VELOCITY, PROFILE_VELOCITY_ONLY = 3, 0x04
@@ -56,6 +57,7 @@ def _entries(node_id: int, rated_torque_mnm: int | None) -> tuple[Entry, ...]:
         *_message(0x1400, 0x200 + node_id, (0x6040_0010,)),
         *_message(0x1800, 0x180 + node_id, (0x6041_0010,)),
         *_message(0x1801, INVALID | 0x280 + node_id, ()),
+        *_message(0x1802, INVALID | 0x380 + node_id, ()),
         Entry(0x6007, 0, "abort-connection option", I16, "rw", 1),
         Entry(0x603F, 0, "error code", U16, "ro"),
         Entry(0x6040, 0, "controlword", U16),
@@ -66,10 +68,19 @@ def _entries(node_id: int, rated_torque_mnm: int | None) -> tuple[Entry, ...]:
         Entry(0x6064, 0, "actual position", I32, "ro"),
         Entry(0x606C, 0, "actual velocity", I32, "ro"),
         *torque,
+        Entry(0x6072, 0, "max torque", U16, "rw", 0xFFFF),
+        Entry(0x6073, 0, "max current", U16, "rw", 0xFFFF),
+        Entry(0x607C, 0, "home offset", I32),
+        Entry(0x607D, 0, "number of position limits", U8, "const", 2),
+        Entry(0x607D, 1, "min position limit", I32),
+        Entry(0x607D, 2, "max position limit", I32),
         Entry(0x607F, 0, "max profile velocity", U32, "rw", 0xFFFF_FFFF),
+        Entry(0x6080, 0, "max motor speed", U32, "rw", 0xFFFF_FFFF),
         Entry(0x6083, 0, "profile acceleration", U32, "rw", 1_000_000),
         Entry(0x6084, 0, "profile deceleration", U32, "rw", 1_000_000),
         Entry(0x6085, 0, "quick-stop deceleration", U32, "rw", 1_000_000),
+        Entry(0x60F8, 0, "max slippage", I32, "rw", 2**31 - 1),
+        Entry(0x60FD, 0, "digital inputs", U32, "ro"),
         Entry(0x60FF, 0, "target velocity", I32),
         Entry(0x6502, 0, "supported modes", U32, "const", PROFILE_VELOCITY_ONLY),
     )
@@ -88,13 +99,20 @@ def _message(index: int, identifier: int, mapped: tuple[int, ...]) -> tuple[Entr
     )
 
 
-def dictionary(objectdictionary: Any, node_id: int, rated_torque_mnm: int | None) -> Any:
+def dictionary(
+    objectdictionary: Any,
+    node_id: int,
+    rated_torque_mnm: int | None,
+    without: Collection[int] = (),
+) -> Any:
     """Return the object dictionary, made with `canopen.objectdictionary`.
 
-    Without a rated torque the drive has no object of its torque.
+    Without a rated torque the drive has no object of its torque; `without` names further objects
+    that it does not have.
     """
     made = objectdictionary.ObjectDictionary()
-    entries = _entries(node_id, rated_torque_mnm)
+    every = _entries(node_id, rated_torque_mnm)
+    entries = [entry for entry in every if entry.index not in without]
     several = {entry.index for entry in entries if entry.subindex}
     for entry in entries:
         variable = objectdictionary.ODVariable(entry.name, entry.index, entry.subindex)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
+from collections.abc import Iterator
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
@@ -41,6 +42,9 @@ CIA402_MISBEHAVIOURS = {
     "slow answers": "answers SDO requests late (value: by how many s)",
     "wrong watchdog": "accepts the heartbeat watchdog but uses another (value: in ms)",
     "ignores quick stop": "keeps moving after a quick-stop command",
+    "wrong bound": "takes a bound of the torque but keeps another (value: in thousandths)",
+    "stop inputs": "stops sending its digital inputs",
+    "bound sleeps": "takes a bound and does not obey it (value: its object, 0 for all of them)",
 }
 """Misbehaviours by name."""
 
@@ -56,12 +60,31 @@ DEFAULTS = {
     "velocity gain": 0.0,
     "slow answers": 0.5,
     "wrong watchdog": 0,
+    "wrong bound": 500,
+    "bound sleeps": 0,
 }
 
 UNITS_PER_RAD = 819_200.0 / (2 * math.pi)
 """Drive units of position, velocity and acceleration: 819,200 counts in a turn of the joint."""
 
 GEAR_RATIO = 100.0
+RAD_S_OF_1_MIN = 2.0 * math.pi / 60.0 / GEAR_RATIO
+"""Of the joint, where the motor turns once a minute."""
+
+MAX_TORQUE, MAX_CURRENT, POSITION_LIMITS, MAX_PROFILE_SPEED, MAX_MOTOR_SPEED, MAX_SLIPPAGE = (
+    *(0x6072, 0x6073, 0x607D, 0x607F, 0x6080, 0x60F8),
+)
+BOUNDS = (
+    *(MAX_TORQUE, MAX_CURRENT, POSITION_LIMITS),
+    *(MAX_PROFILE_SPEED, MAX_MOTOR_SPEED, MAX_SLIPPAGE),
+)
+"""Objects that bound what the drive does. This one has them act in profile velocity mode."""
+
+NO_THOUSANDTHS = 0xFFFF
+INTERNAL_LIMIT, SLIPPED = 1 << 11, 1 << 13
+SLIPPAGE_ERROR = 0x8400
+ROUNDED = 1e-3
+"""Drive units that rounding may leave."""
 
 AT_REST_RAD_S = 0.01
 GENERIC_ERROR, COMMUNICATION_ERROR = 0x01, 0x11
@@ -127,6 +150,9 @@ class LastStop(NamedTuple):
 class Objects(Protocol):
     """The functions of the node that the servo uses."""
 
+    def has(self, index: int) -> bool:
+        """Return whether there is such an object."""
+
     def value(self, index: int, subindex: int = 0) -> int:
         """Return an object's value."""
 
@@ -155,6 +181,7 @@ class Servo:
         self.phase = Phase.SWITCH_ON_DISABLED
         self.wrong: dict[str, Any] = {}
         """Active misbehaviours and their values."""
+        self._limited = self._slipped = False
         self.last_stop = LastStop()
         side = arm.drive_side
         self.rated_torque_mnm = (
@@ -172,8 +199,60 @@ class Servo:
         """Return the present target velocity, in drive units."""
         if "stale target" in self.wrong:
             return float(self.wrong["stale target"]) * UNITS_PER_RAD
-        limit = self._node.value(0x607F)
-        return max(-limit, min(limit, self._node.value(0x60FF)))
+        wanted = float(self._node.value(0x60FF))
+        for limit in self._speed_limits():
+            wanted = max(-limit, min(limit, wanted))
+        return wanted
+
+    def _speed_limits(self) -> Iterator[float]:
+        """Yield the limits of the velocity in force, in drive units."""
+        if self._bound(MAX_PROFILE_SPEED):
+            yield self._node.value(MAX_PROFILE_SPEED)
+        if self._bound(MAX_MOTOR_SPEED):
+            yield self._node.value(MAX_MOTOR_SPEED) * RAD_S_OF_1_MIN * UNITS_PER_RAD
+
+    def _bound(self, index: int) -> bool:
+        """Return whether a bound is there and awake."""
+        asleep = self.wrong.get("bound sleeps")
+        return self._node.has(index) and (asleep is None or asleep not in (0, index))
+
+    def _torque_limit_nm(self) -> float:
+        """Return the largest torque of the motor at the joint."""
+        parts = [self._node.value(o) for o in (MAX_TORQUE, MAX_CURRENT) if self._bound(o)]
+        limited = [part for part in parts if part < NO_THOUSANDTHS]
+        return min(limited, default=math.inf) * 1e-3 * self._arm.drive_side.rated_torque_nm
+
+    def _position_limits(self) -> tuple[float, float]:
+        if self._bound(POSITION_LIMITS):
+            lowest, highest = (self._node.value(POSITION_LIMITS, k) for k in (1, 2))
+            if lowest < highest:  # both 0: none
+                return lowest, highest
+        return -math.inf, math.inf
+
+    def _inside(self, wanted_rad_s: float) -> float:
+        """Return a velocity from which the drive comes to rest at its position limits."""
+        lowest, highest = self._position_limits()
+        angle = self.measured()[0]
+        left_rad = (highest - angle if wanted_rad_s > 0.0 else angle - lowest) / UNITS_PER_RAD
+        ramp = self._node.value(0x6084) / UNITS_PER_RAD
+        fastest = math.sqrt(2.0 * ramp * left_rad) if left_rad > 0.0 else 0.0
+        return max(-fastest, min(fastest, wanted_rad_s))
+
+    def bound_bits(self) -> int:
+        """Return the bits of the statusword that tell of bounds."""
+        bits = SLIPPED if self._slipped else 0
+        return bits | (INTERNAL_LIMIT if self._limited or self._arm.saturated else 0)
+
+    def watch_bounds(self) -> None:
+        """Keep to the position limits, and fail where the joint does not follow."""
+        if self.phase not in POWERED:
+            return
+        if self.phase is Phase.OPERATION_ENABLED and self._position_limits()[1] < math.inf:
+            self.move()
+        most = self._node.value(MAX_SLIPPAGE) / UNITS_PER_RAD if self._bound(MAX_SLIPPAGE) else 0
+        if 0 < most < abs(self._arm.lag_rad_s()) and not self._slipped:
+            self._slipped = True
+            self.fault(SLIPPAGE_ERROR, "slippage")
 
     def measured(self) -> tuple[int, int]:
         """Return the reported position and velocity, in drive units."""
@@ -213,6 +292,7 @@ class Servo:
         if phase is self.phase:
             return
         before, self.phase = self.phase, phase
+        self._slipped = self._slipped and phase in (Phase.FAULT_REACTION, Phase.FAULT)
         self._node.note(f"{before.name} -> {phase.name}: {why}")
         if phase in (Phase.QUICK_STOP_ACTIVE, Phase.FAULT_REACTION):
             self.last_stop = LastStop(why, time.monotonic())
@@ -221,6 +301,8 @@ class Servo:
 
     def move(self) -> None:
         """Command the arm according to state and target."""
+        powered = self.phase in POWERED
+        self._arm.torque_limit_nm = self._torque_limit_nm() if powered else math.inf
         if self.phase not in POWERED:
             self._arm.release()
         elif "runs away" in self.wrong:
@@ -230,7 +312,9 @@ class Servo:
         elif "does not follow" in self.wrong:
             self._arm.command(0.0)
         else:
-            wanted_rad_s = self.target() / UNITS_PER_RAD
+            wanted_rad_s = self._inside(self.target() / UNITS_PER_RAD)
+            short = wanted_rad_s * UNITS_PER_RAD - self._node.value(0x60FF)
+            self._limited = abs(short) > ROUNDED
             speeds_up = abs(wanted_rad_s) > abs(self._arm.motion()[1])
             ramp = self._node.value(0x6083 if speeds_up else 0x6084) / UNITS_PER_RAD
             self._arm.command(wanted_rad_s + self.wrong.get("drifts", 0.0), ramp)

@@ -17,6 +17,7 @@ from rigidimeter.rig.devices import (
     fastest_tick_rate_hz,
     frame_bits,
     frames,
+    inputs_of,
     objects,
     position_of,
     scale,
@@ -98,10 +99,11 @@ def test_frames_are_little_endian_and_signed():
     assert position_of(bytes.fromhex("3706 03 00010000")) == (0x0637, 3, 256)
     assert position_of(bytes.fromhex("3706 FF FFFFFFFF")) == (0x0637, -1, -1)
     assert velocity_of(bytes.fromhex("00000080")) == -(2**31)
+    assert inputs_of(bytes.fromhex("01000080")) == 0x80000001
     assert emergency(bytes.fromhex("3081 11 0000000000")) == (0x8130, 0x11)
 
 
-@pytest.mark.parametrize("decode", [position_of, velocity_of])
+@pytest.mark.parametrize("decode", [position_of, velocity_of, inputs_of])
 @pytest.mark.parametrize("length", [0, 1, 3, 5, 6])
 def test_a_frame_of_the_wrong_length_is_none(decode, length):
     assert decode(bytes(length)) is None
@@ -137,7 +139,7 @@ def test_an_sdo_answer_is_read_as_cia_301_writes_it():
 
 
 def test_identifiers_are_those_of_the_predefined_connection_set():
-    assert frames(5) == (0x205, 0x185, 0x285, 0x085, 0x705, 0x605, 0x585)
+    assert frames(5) == (0x205, 0x185, 0x285, 0x085, 0x705, 0x605, 0x585, 0x385)
 
 
 def test_the_longest_frame_is_135_bit_times():

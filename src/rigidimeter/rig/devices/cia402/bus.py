@@ -38,6 +38,7 @@ from rigidimeter.rig.devices.cia402.state_words import (
     command_bytes,
     emergency,
     frames,
+    inputs_of,
     position_of,
     sdo_answer,
     sdo_read_bytes,
@@ -82,6 +83,12 @@ class NodeBus:
         self._velocity: int | None = None
         self._beaten_s = -math.inf
         self.statusword = 0
+        self.seen_bits = 0
+        """Every bit that a statusword had; reset by `enable`."""
+        self.inputs: int | None = None
+        """The digital inputs, None until their frame came."""
+        self.inputs_s = -math.inf
+        """When it came last."""
         self.mode = 0
         self.raw = (0, 0)
         """Position and velocity of the last complete measurement, in the drive's units."""
@@ -244,6 +251,7 @@ class NodeBus:
             if report is None:
                 return False
             self.statusword, self.mode, position = report
+            self.seen_bits |= self.statusword
             enabled = self.state is Cia402State.OPERATION_ENABLED
             if not (enabled and self.mode == PROFILE_VELOCITY):
                 self.left_operation = True
@@ -255,6 +263,11 @@ class NodeBus:
                 return False
             if self._expected(self._velocity is None):
                 self._velocity = velocity
+        elif identifier == ids.inputs and self._settings.button_bit >= 0:
+            levels = inputs_of(data)
+            if levels is None:
+                return False
+            self.inputs, self.inputs_s = levels, self._now()
         elif identifier == ids.sdo_answer:
             return self._take_sdo_answer(data)
         elif identifier == ids.heartbeat:

@@ -7,6 +7,11 @@ that keeps the drive enabled. If the loop hangs, the heartbeat ends with it, and
 itself: by its heartbeat watchdog (0x1016), and sooner by its command deadline (0x1400:05) if it has
 one.
 
+The drive gets bounds of its own, if `bound` was called (see `drive_bounds`): they are written by
+`configure` and again by `enable`, since the position limits are those about where the joint stands.
+A hand-held stop in the drive's inputs is in a frame of its own, which answers every SYNC too: one
+that is pressed, or whose frame stays away, is a cause like any other.
+
 A measurement is taken at the SYNC, so its time is that at which this SYNC was sent; see `bus` for
 how the two are matched. Where no measurement belongs to a SYNC for `lost_s`, or frames come that no
 SYNC of ours asked for, the drive counts as lost.
@@ -16,9 +21,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 from rigidimeter.rig.devices.base import DeviceError, DeviceFacts, MotionSample, Now
+from rigidimeter.rig.devices.bounds import (
+    BOUND_FACT,
+    SLIPPAGE,
+    BoundFound,
+    DriveBounds,
+    Tight,
+)
 from rigidimeter.rig.devices.cia402.bus import NodeBus
+from rigidimeter.rig.devices.cia402.drive_bounds import ask_drive, wanted_bounds, write_bounds
 from rigidimeter.rig.devices.cia402.power_up_sequence import FAULTS, power_up, reset_fault
 from rigidimeter.rig.devices.cia402.sdo_transfers import (
     read_back,
@@ -33,13 +47,19 @@ from rigidimeter.rig.devices.cia402.setup import (
     IDENTITY,
     TARGET,
     Cia402Settings,
+    Object,
     displayed_mode,
+    inputs,
+    is_pressed,
     objects,
     scale,
 )
 from rigidimeter.rig.devices.cia402.state_words import (
+    INPUTS_BYTES,
     OPERATIONAL,
     POWERED,
+    SLIPPED,
+    TICK_FRAMES,
     Cia402State,
     Control,
     Nmt,
@@ -75,6 +95,11 @@ class Cia402Drive:
         self._scale = scale(settings)
         self._objects = objects(settings)
         self._readable = (*self._objects, displayed_mode(settings))
+        self._bounds: DriveBounds | None = None
+        self._tight: Tight | None = None
+        self._slips = False  # the drive has a bound of the slippage
+        self.bounds: tuple[BoundFound, ...] = ()
+        """What came of each bound when it was written last."""
         self._stops_itself_s = settings.drive_watchdog_s - settings.heartbeat_s
         if settings.command_deadline_s > 0:
             self._stops_itself_s = min(self._stops_itself_s, settings.command_deadline_s)
@@ -98,6 +123,14 @@ class Cia402Drive:
         Between `enable` and `disable` it is, so after `disable` any other is news.
         """
         return self._wire.is_open and self._wire.state in POWERED
+
+    def bound(self, bounds: DriveBounds) -> None:
+        """Have these bounds written by the next `configure` and every `enable`."""
+        self._bounds = bounds
+
+    def tighten(self, tight: Tight | None) -> None:
+        """Have one bound so tight from the next `enable` on that a move must hit it; None: none."""
+        self._tight = tight
 
     def connect(self) -> None:
         """Open the bus and make the drive pre-operational; nothing is energised."""
@@ -124,7 +157,9 @@ class Cia402Drive:
             identity = {entry.name: read_object(sdo, entry, who) for entry in IDENTITY}
             firmware, name = read_text(sdo, 0x100A, who), read_text(sdo, 0x1008, who)
             absent = [entry for entry in self._objects if not write_object(sdo, entry, who)]
-            found = read_back(sdo, self._readable, who)
+            read_object(sdo, inputs(settings), who)
+            entries = self._write_bounds(sdo)
+            found = read_back(sdo, (*self._readable, *entries), who)
         self._wire.network(Nmt.START)
         self._configured = True
         watchdogs = [settings.drive_watchdog_s]
@@ -134,11 +169,14 @@ class Cia402Drive:
         values.update({entry.label: "absent" for entry in absent})
         values.update({k: value for k, value in identity.items() if value is not None})
         ramps = [found[entry.label] for entry in self._objects if entry.name in BRAKING]
+        values.update({f"{BOUND_FACT} {name}": words for name, _, words, _ in self.bounds})
+        if settings.button_bit >= 0:
+            values["button_bit"] = settings.button_bit
         values["braking_rad_s2"] = min(ramps) / self._scale.units_per_rad_s2
         return DeviceFacts(
             model=name or f"vendor {identity['vendor']}, product {identity['product']}",
             serial="" if identity["serial"] is None else str(identity["serial"]),
-            fastest_tick_rate_hz=fastest_tick_rate_hz(settings.bitrate),
+            fastest_tick_rate_hz=fastest_tick_rate_hz(settings.bitrate, self._tick_frames()),
             watchdog_s=min(watchdogs),
             values=values,
         )
@@ -174,7 +212,9 @@ class Cia402Drive:
                 for entry in self._objects:
                     if entry.name in (CONTROLWORD, TARGET):
                         write_object(sdo, entry, self._who)
-                read_back(sdo, self._readable, self._who)
+                self._refuse_pressed(read_object(sdo, inputs(self._settings), self._who))
+                entries = self._write_bounds(sdo)
+                read_back(sdo, (*self._readable, *entries), self._who)
             wire.network(Nmt.START)
             wire.drain()
             self._require_configured()
@@ -186,7 +226,8 @@ class Cia402Drive:
             raise
         self._control, self._halted = Control.ENABLE_OPERATION, False
         self._sent = 0
-        wire.emergency, wire.left_operation = 0, False
+        wire.emergency, wire.left_operation, wire.seen_bits = 0, False, 0
+        wire.inputs, wire.inputs_s = None, self._now()
         wire.heard_s, wire.network_state = self._now(), OPERATIONAL
 
     def read(self) -> MotionSample:
@@ -205,6 +246,8 @@ class Cia402Drive:
             # Repeating "enable operation" would restart a drive that stopped by itself, and a node
             # that is not operational does not hear the guard's ramp.
             self._halt(Control.QUICK_STOP)
+        if found is Cause.EMERGENCY_STOP:  # no weaker cause before it may keep the power on
+            self._cause = found
         self._cause = self._cause or found
         self._check_watchdog(now_s)
         if wire.sequence and wire.sequence != self._sample.sequence:
@@ -233,6 +276,8 @@ class Cia402Drive:
     def _find_cause(self, now_s: float) -> Cause:
         """Return why the drive is not in the commanded state, NONE if it is."""
         wire, settings = self._wire, self._settings
+        if wire.inputs is not None and is_pressed(settings, wire.inputs):
+            return Cause.EMERGENCY_STOP
         if wire.booted:
             self._halt(Control.DISABLE_VOLTAGE)
         unheard = wire.unheard and self._control is Control.ENABLE_OPERATION
@@ -241,6 +286,10 @@ class Cia402Drive:
         if self._control is Control.ENABLE_OPERATION:
             if wire.left_operation or wire.network_state != OPERATIONAL:
                 return Cause.DRIVE_STATE
+            if self._slips and wire.seen_bits & SLIPPED:
+                return Cause.DRIVE_FAULT
+            if settings.button_bit >= 0 and now_s - wire.inputs_s > settings.lost_s:
+                return Cause.DRIVE_LOST
             if wire.unplaced or now_s - wire.heard_s > settings.heartbeat_s + settings.lost_s:
                 return Cause.DRIVE_LOST
         elif wire.state is Cia402State.OPERATION_ENABLED and now_s > self._settled_s:
@@ -301,6 +350,28 @@ class Cia402Drive:
     def _send_halt(self) -> None:
         self._wire.send_both_ways(self._control)
         self._halted = False
+
+    def _write_bounds(self, sdo: Any) -> tuple[Object, ...]:
+        """Write the bounds about where the joint stands; return the objects that hold them."""
+        if self._bounds is None:
+            return ()
+        settings, who = self._settings, self._who
+        says = ask_drive(sdo, settings, who)
+        wanted = wanted_bounds(settings, self._bounds, says, self._tight)
+        self.bounds, written = write_bounds(sdo, wanted, who)
+        self._slips = any(found.name == SLIPPAGE and found.where for found in self.bounds)
+        return written
+
+    def _refuse_pressed(self, levels: int | None) -> None:
+        if levels is not None and is_pressed(self._settings, levels):
+            raise DeviceError(
+                f"{self._who}: the hand-held stop (bit {self._settings.button_bit} of 0x60FD) is "
+                "pressed, or its wire is broken; release it, or check the wire and "
+                "button_pressed_level"
+            )
+
+    def _tick_frames(self) -> tuple[int, ...]:
+        return (*TICK_FRAMES, INPUTS_BYTES) if self._settings.button_bit >= 0 else TICK_FRAMES
 
     def _require_configured(self) -> None:
         self._configured = self._configured and not self._wire.booted

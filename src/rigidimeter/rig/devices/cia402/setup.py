@@ -22,6 +22,7 @@ from typing import Any, Literal, NamedTuple, Self
 from pydantic import Field, field_validator, model_validator
 
 from rigidimeter.core.settings import Section, quantity
+from rigidimeter.rig.devices.bounds import LOST, SPEED
 from rigidimeter.rig.devices.cia402.state_words import PROFILE_VELOCITY, Frames, frames
 
 INVALID = 1 << 31
@@ -39,6 +40,13 @@ class Cia402Settings(Section):
 
     The default decelerations are above the default `guard.acceleration_limit_deg_s2`, since the
     guard relies on a drive that brakes at least that fast; commissioning compares the two.
+
+    `reflected_inertia_kg_m2` and `friction_nm` are of motor and gear, seen at the joint; where
+    the first is 0, it is not known, and the drive's torque is not bounded. `torque_bound_nm`
+    replaces the bound that is computed (see `devices.bounds`), 0 keeps that. `button_bit` is that
+    of a hand-held stop in the drive's digital inputs (0x60FD), -1 for none, and
+    `button_pressed_level` what that bit is while it is pressed: 0 for a contact that opens, so
+    that a broken wire is a stop too.
     """
 
     interface: str = Field("socketcan", min_length=1)
@@ -60,6 +68,12 @@ class Cia402Settings(Section):
     deceleration_rad_s2: float = quantity(120.0, "rad/s²", 0.0, 1e4, above=True)
     quick_stop_rad_s2: float = quantity(120.0, "rad/s²", 0.0, 1e4, above=True)
     quick_stop_option: Literal[2, 6] = 2
+    reflected_inertia_kg_m2: float = quantity(0.0, "kg·m²", 0.0, 100.0)
+    friction_nm: float = quantity(0.0, "N·m", 0.0, 200.0)
+    torque_bound_nm: float = quantity(0.0, "N·m", 0.0, 2000.0)
+    motor_speed_units_per_rev_s: float = quantity(60.0, "unit/(rev/s)", 1e-3, 2.0**31)
+    button_bit: int = quantity(-1, "1", -1, 31)
+    button_pressed_level: Literal[0, 1] = 0
     abort_option: Literal[1, 2, 3] = 3
     heartbeat_s: float = quantity(0.02, "s", 0.001, 1.0)
     drive_watchdog_s: float = quantity(0.1, "s", 0.002, 5.0)
@@ -135,7 +149,8 @@ class Object:
     """One entry of the drive's object dictionary, and the value it must have.
 
     `optional` entries are skipped if the drive does not have them; `fixed` ones may refuse to be
-    written if they read back as they must be; bits outside `mask` belong to the drive.
+    written if they read back as they must be; bits outside `mask` belong to the drive. `lost` says
+    what is lost without an optional one.
     """
 
     name: str
@@ -147,6 +162,7 @@ class Object:
     optional: bool = False
     fixed: bool = False
     mask: int = -1
+    lost: str = ""
 
     @property
     def label(self) -> str:
@@ -156,9 +172,11 @@ class Object:
 
 CONTROLWORD, TARGET = "controlword", "target velocity"
 BRAKING = ("profile deceleration", "quick-stop deceleration")
+MAX_PROFILE_VELOCITY = "max profile velocity"
 
+_IDENTITY_LOST = "a drive that was exchanged is not noticed"
 IDENTITY = tuple(
-    Object(name, 0x1018, k, 4, 0, optional=k > 1)
+    Object(name, 0x1018, k, 4, 0, optional=k > 1, lost=_IDENTITY_LOST if k > 1 else "")
     for k, name in enumerate(("vendor", "product", "revision", "serial"), 1)
 )
 """Read, never written."""
@@ -173,7 +191,7 @@ def objects(settings: Cia402Settings) -> tuple[Object, ...]:
     def acceleration(rad_s2: float) -> int:
         return max(1, round(rad_s2 * units.units_per_rad_s2))
 
-    def of_axis(name: str, index: int, size: int, value: int, **more: bool) -> Object:
+    def of_axis(name: str, index: int, size: int, value: int, **more: Any) -> Object:
         return Object(name, *settings.axis(index), size, value, **more)
 
     max_units = math.ceil(settings.max_velocity_rad_s * abs(units.units_per_rad_s))
@@ -182,7 +200,7 @@ def objects(settings: Cia402Settings) -> tuple[Object, ...]:
         of_axis("mode of operation", 0x6060, 1, PROFILE_VELOCITY, signed=True),
         of_axis(TARGET, 0x60FF, 4, 0, signed=True),
         # The drive's own limit is a second one: `write` sends nothing above it.
-        of_axis("max profile velocity", 0x607F, 4, max_units, optional=True),
+        of_axis(MAX_PROFILE_VELOCITY, 0x607F, 4, max_units, optional=True, lost=LOST[SPEED]),
         of_axis("profile acceleration", 0x6083, 4, acceleration(settings.acceleration_rad_s2)),
         of_axis(BRAKING[0], 0x6084, 4, acceleration(settings.deceleration_rad_s2)),
         of_axis(BRAKING[1], 0x6085, 4, acceleration(settings.quick_stop_rad_s2)),
@@ -200,6 +218,19 @@ def displayed_mode(settings: Cia402Settings) -> Object:
     return Object("mode of operation display", *address, 1, PROFILE_VELOCITY, signed=True)
 
 
+def inputs(settings: Cia402Settings) -> Object:
+    """Return the digital inputs, of which one may be a button; read, never written."""
+    lost = "a hand-held stop in the drive's inputs; there are none where `button_bit` is -1"
+    address = settings.axis(0x60FD)
+    return Object("digital inputs", *address, 4, 0, optional=settings.button_bit < 0, lost=lost)
+
+
+def is_pressed(settings: Cia402Settings, levels: int) -> bool:
+    """Return whether the hand-held stop is pressed, by the digital inputs."""
+    bit = settings.button_bit
+    return bit >= 0 and levels >> bit & 1 == settings.button_pressed_level
+
+
 def _messages(settings: Cia402Settings, ids: Frames, deadline_ms: int) -> tuple[Object, ...]:
     """Return the PDO mapping: one command frame, two answers to every SYNC, and no others."""
 
@@ -213,12 +244,18 @@ def _messages(settings: Cia402Settings, ids: Frames, deadline_ms: int) -> tuple[
     command = mapped((0x6040, 16), (0x60FF, 32))
     position = mapped((0x6041, 16), (0x6061, 8), (0x6064, 32))
     velocity = mapped((0x606C, 32))
-    deadline = Object("command deadline in ms", 0x1400, 5, 2, deadline_ms, optional=True)
+    deadline = Object(
+        *("command deadline in ms", 0x1400, 5, 2, deadline_ms),
+        optional=True,
+        lost="a loop that hangs is noticed later, by the heartbeat watchdog (0x1016) alone",
+    )
+    button = _message("button frame", 0x1802, ids.inputs, 1, mapped((0x60FD, 32)))
     return (
         # A command takes effect when it arrives (255), a measurement is taken at every SYNC (1).
         *_message("command frame", 0x1400, ids.command, 255, command, (deadline,)),
         *_message("position frame", 0x1800, ids.position, 1, position),
         *_message("velocity frame", 0x1801, ids.velocity, 1, velocity),
+        *(button if settings.button_bit >= 0 else ()),
         *(
             Object(
                 "unused frame",
@@ -229,12 +266,13 @@ def _messages(settings: Cia402Settings, ids: Frames, deadline_ms: int) -> tuple[
                 optional=True,
                 fixed=True,
                 mask=~NO_REMOTE_REQUEST,
+                lost="nothing: then there is no such frame",
             )
             for index, id_ in (
                 (0x1401, ids.command + 0x100),
                 (0x1402, ids.command + 0x200),
                 (0x1403, ids.command + 0x300),
-                (0x1802, ids.position + 0x200),
+                *([(0x1802, ids.inputs)] if settings.button_bit < 0 else []),
                 (0x1803, ids.position + 0x300),
             )
         ),

@@ -33,7 +33,13 @@ BOOTED, STOPPED, OPERATIONAL, PRE_OPERATIONAL = 0x00, 0x04, 0x05, 0x7F
 TICK_FRAMES = (6, 0, 7, 4)
 """Data bytes of the frames of one tick: command, SYNC, position, velocity."""
 
+INPUTS_BYTES = 4
+"""Data bytes of the frame of a hand-held stop, one more a tick."""
+
 HIGHEST_LOAD = 0.7
+
+INTERNAL_LIMIT, SLIPPED = 1 << 11, 1 << 13
+"""Bits of the statusword: a bound of the drive acts; the slippage is above its maximum."""
 
 
 class Cia402State(IntEnum):
@@ -144,6 +150,7 @@ class Frames(NamedTuple):
     heartbeat: int
     sdo_request: int
     sdo_answer: int
+    inputs: int
 
 
 def frames(node_id: int) -> Frames:
@@ -156,6 +163,7 @@ def frames(node_id: int) -> Frames:
         heartbeat=0x700 + node_id,
         sdo_request=0x600 + node_id,
         sdo_answer=0x580 + node_id,
+        inputs=0x380 + node_id,
     )
 
 
@@ -164,6 +172,7 @@ _POSITION = struct.Struct("<Hbi")
 _VELOCITY = struct.Struct("<i")
 _EMERGENCY = struct.Struct("<HB")
 _SDO = struct.Struct("<BHBI")
+_INPUTS = struct.Struct("<I")
 
 
 def command_bytes(control: int, target: int) -> bytes:
@@ -179,6 +188,11 @@ def position_of(data: bytes | bytearray) -> tuple[int, int, int] | None:
 def velocity_of(data: bytes | bytearray) -> int | None:
     """Return the velocity of a velocity frame, None if it is damaged."""
     return int(_VELOCITY.unpack(data)[0]) if len(data) == _VELOCITY.size else None
+
+
+def inputs_of(data: bytes | bytearray) -> int | None:
+    """Return the digital inputs of their frame, None if it is damaged."""
+    return int(_INPUTS.unpack(data)[0]) if len(data) == _INPUTS.size else None
 
 
 class Emergency(NamedTuple):
