@@ -37,7 +37,14 @@ from rigidimeter.core.settings import load_settings
 from rigidimeter.rig.acquisition import Command, Order
 from rigidimeter.rig.acquisition.processes import Realtime, SessionMemory
 from rigidimeter.rig.console import SessionPlan
-from rigidimeter.rig.console.page import Jobs, PageServer, Place, RunningSession, ServerState
+from rigidimeter.rig.console.page import (
+    Jobs,
+    PageServer,
+    Place,
+    RunningSession,
+    ServerState,
+    new_token,
+)
 
 SETTLES_S = 1.0
 """So much of the beginning of a window does not count: the page draws what it has missed."""
@@ -132,7 +139,7 @@ def _serve_page(names: tuple[str, str, str], plan: SessionPlan, folder: Path, dr
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     state = ServerState(Place(folder.parent, plan.settings, "the protocol"))
     state.running = RunningSession(1, names, plan, folder)
-    server = PageServer(state, Jobs(), "127.0.0.1", 0)
+    server = PageServer(state, Jobs(), "127.0.0.1", 0, new_token())
     server.start()
     parent = os.getppid()
     with open_browser() as opened:

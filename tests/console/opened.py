@@ -28,10 +28,14 @@ class Console:
     sessions : Path
         The folder of its sessions.
     address : str
-        Of its page.
+        The link to its page, with the token.
+    origin : str
+        Where it serves, such as ``http://127.0.0.1:8765``.
     """
 
-    def __init__(self, folder: Path, *options: str, protocol: str = "") -> None:
+    def __init__(
+        self, folder: Path, *options: str, protocol: str = "", stdin: int = subprocess.DEVNULL
+    ) -> None:
         self.place, self.sessions = folder, folder / "sessions"
         arguments = [sys.executable, "-m", "rigidimeter", "console"]
         if protocol:
@@ -39,6 +43,7 @@ class Console:
             arguments.append(str(folder / "protocol.toml"))
         self.process = subprocess.Popen(
             [*arguments, "--out", str(self.sessions), "--port", "0", *options],
+            stdin=stdin,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -57,6 +62,7 @@ class Console:
         self._listener = threading.Thread(target=lambda: self.said.extend(lines), daemon=True)
         self._listener.start()
         assert self.address, "".join(self.said)
+        self.origin = self.address.partition("/?")[0]
 
     def close(self) -> None:
         """End it in order."""

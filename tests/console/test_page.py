@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import os
+import pty
 import shutil
 import signal
+import termios
 import time
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
 
 import numpy as np
 import pytest
-from tests.console.opened import assert_reached_by_tab, fill, open_page, start, wait_for
+from tests.console.conftest import PROTOCOL
+from tests.console.opened import Console, assert_reached_by_tab, fill, open_page, start, wait_for
 
 from rigidimeter.core.session import SessionWriter, read_manifest, read_samples
 from rigidimeter.core.settings import Settings
+from rigidimeter.rig.console import BELL, KEYS_HERE
+from rigidimeter.rig.guard import Cause
 
 MARKUP = "<img src=x onerror=alert(1)>"
 RUNS = "document.getElementById('state').textContent === 'epoch runs'"
@@ -55,11 +60,11 @@ ATTACK = """(address) => Promise.all([
     const one = document.createElement(name);
     one.onload = () => done("loaded");
     one.onerror = () => done("refused");
-    one.src = name === "script" ? address + "assets/page.js" : address;
+    one.src = name === "script" ? address + "/assets/page.js" : address;
     document.body.append(one);
   })),
   new Promise((done) => {
-    const socket = new WebSocket(address.replace("http", "ws") + "live");
+    const socket = new WebSocket(address.replace("http", "ws") + "/live");
     socket.onopen = () => done("open");
     socket.onerror = () => done("refused");
   }),
@@ -70,9 +75,10 @@ ATTACK = """(address) => Promise.all([
 def test_a_page_of_somebody_else_gets_nothing_from_the_browser_of_the_operator(
     console, chromium, stranger
 ):
-    page = chromium.new_context().new_page()
+    desk = console()
+    page = open_page(chromium, desk).context.new_page()  # the browser has the cookie
     page.goto(stranger)
-    framed, *others = page.evaluate(ATTACK, console().address)
+    framed, *others = page.evaluate(ATTACK, desk.origin)
     assert others == ["refused"] * 4
     assert framed == "loaded"  # the browser's own page, which says why not
     assert page.frames[1].locator("#emergency").count() == 0
@@ -133,8 +139,9 @@ def test_a_session_from_the_form_to_its_end(console, chromium):
     page.get_by_text("may be 1.500 or 1500").wait_for()
     fill(page, "prbs_amplitude", "1,1")
     start(page, operator=MARKUP)
-    other.get_by_text("this page is read-only").wait_for()
-    assert other.locator("#emergency").is_disabled()
+    other.get_by_text("this page watches: it can stop and nothing else").wait_for()
+    other.locator("#emergency:enabled").wait_for()
+    assert other.locator("[data-order=abort]").is_disabled()
     other.close()
     page.wait_for_function(RUNS)
     page.evaluate(WATCH)
@@ -214,6 +221,114 @@ def test_the_emergency_stop_stops(console, chromium, lateness):
     assert read_samples(desk.folder() / "samples.arrows")["velocity_command_rad_s"][-1] == 0.0
     page.wait_for_function("document.getElementById('state').textContent === 'ended: fail'")
     page.wait_for_function("document.activeElement.matches('.tab')")  # for the next Tab
+
+
+NOTE_CLICK = """addEventListener("pointerdown", (event) => {
+  window.clickedS = (performance.timeOrigin + event.timeStamp) / 1000; }, true)"""
+
+
+def zero_s(console):
+    """Return when the command was zero after the stop, on CLOCK_MONOTONIC."""
+    samples = read_samples(console.folder() / "samples.arrows")
+    assert np.any(samples["velocity_command_rad_s"])
+    stopped = samples["cause"] == int(Cause.EMERGENCY_STOP)
+    assert not np.any(samples["velocity_command_rad_s"][stopped][1:])
+    at_rest = stopped & (samples["velocity_command_rad_s"] == 0.0)
+    return monotonic_origin_s(console) + samples["time_s"][at_rest][0]
+
+
+@pytest.mark.parametrize("frozen", [False, True])
+def test_a_page_that_watches_stops_the_arm_also_while_that_in_control_is_frozen(
+    console, chromium, lateness, frozen
+):
+    desk = console()
+    page, other = open_page(chromium, desk), open_page(chromium, desk)
+    start(page)
+    page.wait_for_function(RUNS)
+    other.get_by_text("this page watches").wait_for()
+    other.evaluate(NOTE_CLICK)
+    if frozen:  # for a time in which its silence does not stop the arm yet
+        page.evaluate("setTimeout(() => { for (const t = Date.now() + 300; Date.now() < t;); }, 0)")
+    other.locator("#emergency").click()
+    wall_s = time.monotonic() - time.time()
+    assert "emergency stop" in desk.ended()["reason"]
+    clicked_s = other.evaluate("window.clickedS") + wall_s
+    took_s = zero_s(desk) - clicked_s
+    print(f"zero velocity {took_s:.3f} s after the click of a page that watches")
+    assert took_s < 0.1 + lateness.worst_s(clicked_s)
+    for one in (page, other):
+        one.wait_for_function("document.getElementById('state').textContent === 'ended: fail'")
+
+
+def test_a_page_that_watches_stops_a_check_of_the_rig(console, chromium):
+    desk = console()
+    page, other = open_page(chromium, desk), open_page(chromium, desk)
+    fill(page, "subject", "S01")
+    fill(page, "operator", "Op")
+    page.get_by_role("button", name="Check the rig").click()
+    page.get_by_text("Nobody's arm may be in the rig").wait_for()
+    other.locator("#emergency:enabled").click()
+    page.get_by_text("✗ not good:").wait_for()
+    other.wait_for_function("document.getElementById('emergency').disabled")
+
+
+@pytest.mark.parametrize("key", [b" ", b"e"])
+def test_the_terminal_that_serves_the_page_stops_the_arm(chromium, lateness, tmp_path, key):
+    far, near = pty.openpty()
+    before = termios.tcgetattr(near)
+    desk = Console(tmp_path, protocol=PROTOCOL, stdin=near)
+    try:
+        wait_for(lambda: any(KEYS_HERE in line for line in desk.said))
+        page = open_page(chromium, desk)
+        start(page)
+        page.wait_for_function(RUNS)
+        os.write(far, b"p")  # no order here
+        assert not text(page, "state").startswith("ended")
+        pressed_s = time.monotonic()
+        os.write(far, key)
+        assert "emergency stop" in desk.ended()["reason"]
+        took_s = zero_s(desk) - pressed_s
+        print(f"zero velocity {took_s:.3f} s after the key at the terminal")
+        assert took_s < 0.15 + lateness.worst_s(pressed_s)
+        page.wait_for_function("document.body.dataset.view === 'after'")
+        page.get_by_role("button", name="Before").click()
+        page.get_by_role("button", name="Check the rig").click()
+        page.get_by_text("Nobody's arm may be in the rig").wait_for()
+        os.write(far, key)
+        page.get_by_text("✗ not good:").wait_for()
+    finally:
+        desk.close()
+    assert termios.tcgetattr(near) == before
+    seen = os.read(far, 1 << 16)
+    assert b"emergency stop" in seen
+    assert BELL.encode() in seen
+    os.close(far)
+    os.close(near)
+
+
+LOUDEST = """async () => {
+  const { context, out } = window.rigTones, ear = context.createAnalyser();
+  ear.fftSize = 8192;
+  out.connect(ear);
+  const found = new Set(), heights = new Float32Array(ear.frequencyBinCount);
+  for (const end = performance.now() + 3000; performance.now() < end;) {
+    await new Promise((done) => setTimeout(done, 20));
+    ear.getFloatFrequencyData(heights);
+    const most = heights.indexOf(Math.max(...heights));
+    if (heights[most] > -30) found.add(Math.round(most * context.sampleRate / 8192 / 100) * 100);
+  }
+  return [context.state, [...found]];
+}"""
+
+
+def test_the_button_of_the_form_plays_both_tones_and_allows_them(console, chromium):
+    page = open_page(chromium, console())
+    page.get_by_text("no tones: click anywhere").wait_for()
+    page.get_by_role("button", name="Test the tones").click()
+    state, heard = page.evaluate(LOUDEST)
+    assert state == "running"
+    assert heard == [400, 1000]  # first the caution, then the stop
+    page.wait_for_function("document.getElementById('tones').textContent === ''")
 
 
 def test_a_frozen_page_stops_the_arm(console, chromium, lateness):

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rigidimeter.cli.help_pages import OPTIONS, PAGE, argument
 from rigidimeter.cli.options import CPU, PRIORITY, RIG
 from rigidimeter.cli.output import echo
 
-if TYPE_CHECKING:
-    pass
-
-SHOWN_S = 3.0
-
 HOST = PAGE.option(
     "--host ADDRESS",
-    "Address of the page. Any but this computer's own loopback needs a token, which is printed.",
+    "Address of the page. By any but the loopback a network reaches it, unencrypted.",
     "127.0.0.1",
 )
 PORT = PAGE.option("--port N", "Port; 0 for a free one.", 8765, min=0, max=65535)
-TOKEN = PAGE.option("--token TEXT", "Token of the page. Default: a random one.", "")
+TOKEN_FILE = PAGE.option(
+    "--token-file FILE",
+    "File that keeps the token of the page. It is made with mode 0600; without it each start has a "
+    "new token.",
+)
+NO_TOKEN = PAGE.flag(
+    "--no-token",
+    "No token, on a computer of one user. Every program and user of it can then lead the rig.",
+)
 
 
 def console(
@@ -31,28 +33,31 @@ def console(
     out: Path = OPTIONS.option("--out DIR", "Folder of the sessions.", Path("sessions")),
     host: str = HOST,
     port: int = PORT,
-    token: str = TOKEN,
+    token_file: Path | None = TOKEN_FILE,
+    no_token: bool = NO_TOKEN,
     priority: int = PRIORITY,
     cpu: int | None = CPU,
 ) -> None:
     """Run sessions from a page in a browser: plan, run, look, repeat.
 
     The page's heartbeat is a dead-man's switch: a page that is closed, frozen or cut off stops the
-    arm. Needs the extra `console`. Ctrl-C ends the program.
+    arm. The printed link holds a token, without which nobody looks or acts. SPACE and e in this
+    terminal are the emergency stop. Needs the extra `console`. Ctrl-C ends the program.
 
     \b
     For example:
       rigidimeter console
       rigidimeter console protocol.toml --rig rig.toml --out study
     """
-    from rigidimeter.cli.page_session import serve_page
+    from rigidimeter.cli.page_session import PageAddress, serve_page
     from rigidimeter.core.settings import load_settings
     from rigidimeter.rig.acquisition.processes import Realtime, complete_left
     from rigidimeter.rig.console.page import Place
 
+    address = PageAddress(host, port, token_file, no_token)
     for line in complete_left():
         echo(line, err=True)
     settings = load_settings(protocol)
     name = protocol.name if protocol is not None else "the defaults"
     place = Place(out.absolute(), settings, name, rig, settings_path=protocol)
-    serve_page(place, Realtime(priority=priority, cpu=cpu), (host, port, token))
+    serve_page(place, Realtime(priority=priority, cpu=cpu), address)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import importlib.util
+import sys
 import time
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.planned_session import (
@@ -20,7 +23,8 @@ from rigidimeter.cli.planned_session import (
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import count_epochs, rest_of
 from rigidimeter.core.settings import changed_settings
-from rigidimeter.rig.acquisition.processes import Ended, Realtime
+from rigidimeter.rig.acquisition.processes import Ended, Realtime, SessionMemory
+from rigidimeter.rig.console import StopKeys, stop_keys
 from rigidimeter.rig.console.page import (
     SILENT_S,
     Jobs,
@@ -30,21 +34,61 @@ from rigidimeter.rig.console.page import (
     StartRequest,
     extended,
     in_buttons,
+    new_token,
     next_buttons,
+    token_in,
 )
 
 SHOWN_S = 3.0
 
 
-def serve_page(place: Place, realtime: Realtime, address: tuple[str, int, str]) -> Ended | None:
-    """Serve the page at a host and a port, with a token, until the program is stopped.
+NOBODY_ELSE = (
+    "Without a token every program and user of this computer can lead the rig: only for a computer "
+    "of one user, and close the browser's other pages"
+)
+
+
+@dataclass(frozen=True)
+class PageAddress:
+    """Where the page is served, and to whom: the options of `console` and `run --console`.
+
+    Raises
+    ------
+    UserError
+        If a file and no token are asked for.
+    """
+
+    host: str
+    port: int
+    token_file: Path | None = None
+    no_token: bool = False
+
+    def __post_init__(self) -> None:
+        if self.no_token and self.token_file is not None:
+            raise UserError("--no-token: there is no token for --token-file; leave one of them out")
+
+    def token(self) -> str:
+        """Return the token, of the file or a new one; empty for none.
+
+        Raises
+        ------
+        UserError
+            If the file cannot be used.
+        """
+        if self.no_token:
+            return ""
+        return new_token() if self.token_file is None else token_in(self.token_file)
+
+
+def serve_page(place: Place, realtime: Realtime, address: PageAddress) -> Ended | None:
+    """Serve the page until the program is stopped.
 
     Where the place is for one session, until that has ended; it is returned.
 
     Raises
     ------
     UserError
-        If the packages of the page are missing.
+        If the packages of the page are missing, or it cannot be served there.
     """
     if importlib.util.find_spec("nicegui") is None:
         raise UserError(
@@ -53,35 +97,61 @@ def serve_page(place: Place, realtime: Realtime, address: tuple[str, int, str]) 
         )
     from rigidimeter.cli.rig_steps import rig_steps
 
+    token = address.token()
     place.root.mkdir(parents=True, exist_ok=True)
     state = ServerState(place)
     if not place.one_session:
         for line in extended(place):
             echo(line)
-    server = PageServer(state, Jobs(partial(rig_steps, place.rig)), *address)
+    jobs = Jobs(partial(rig_steps, place.rig))
+    server = PageServer(state, jobs, address.host, address.port, token)
     server.start()
     echo(f"Open {server.address} in a browser; Ctrl-C ends the program")
+    if not token:
+        echo(NOBODY_ELSE)
     try:
-        while not state.ending:
-            ended = lead_session(state, state.next_request(), realtime)
-            if place.one_session and ended is not None:
-                time.sleep(SHOWN_S)  # for the page to say how it ended
-                return ended
+        with stop_keys(sys.stdin) as keys:
+            echo(keys.help)
+            listen = partial(_listen, keys, state)
+            while not state.ending:
+                ended = lead_session(state, state.next_request(listen), realtime, listen)
+                if ended is None or ended.outcome != "success":
+                    keys.ring()
+                if place.one_session and ended is not None:
+                    time.sleep(SHOWN_S)  # for the page to say how it ended
+                    return ended
     finally:
         server.stop()
     return None
 
 
-def lead_session(state: ServerState, request: StartRequest, realtime: Realtime) -> Ended | None:
-    """Run what the page asked for, and say on the page how it ended; None if it did not begin."""
+def _listen(keys: StopKeys, state: ServerState) -> None:
+    """Obey the emergency stop of the terminal."""
+    if keys.pressed():
+        keys.say("emergency stop" if state.press_stop() else "nothing runs that could be stopped")
+
+
+def lead_session(
+    state: ServerState, request: StartRequest, realtime: Realtime, listen: Callable[[], None]
+) -> Ended | None:
+    """Run what the page asked for, and say on the page how it ended; None if it did not begin.
+
+    `listen` is called often.
+    """
     folder, rig = state.place.root / request.folder, state.place.rig
     try:
         planned = checked_rig(_planned(state, request), rig)
         require_packages(planned.settings)
         planned = planned.blinded() if planned.about.get("blinded") else planned
         look = state.console(planned.shown(virtual=rig is None), folder)
+
+        def follow(shared: SessionMemory) -> None:
+            listen()
+            look(shared)
+
+        listen()
         state.refuse_stopped()
-        ended = run_planned(planned, folder, rig, realtime, look, state.operator_seen_ns)
+        ended = run_planned(planned, folder, rig, realtime, follow, state.operator_seen_ns)
         state.ending = bool(ended.signals)
         good, of = count_epochs(ended.folder)
         left = len(rest_of(ended.folder).epochs)

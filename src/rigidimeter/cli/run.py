@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from rigidimeter.cli.console import HOST, PORT, TOKEN
+from rigidimeter.cli.console import HOST, NO_TOKEN, PORT, TOKEN_FILE
 from rigidimeter.cli.help_pages import OPTIONS, RUN, argument
 from rigidimeter.cli.options import CPU, NEW_SESSION, PRIORITY, RIG, SEED
 from rigidimeter.cli.output import echo
@@ -35,7 +35,8 @@ def run(
     ),
     host: str = HOST,
     port: int = PORT,
-    token: str = TOKEN,
+    token_file: Path | None = TOKEN_FILE,
+    no_token: bool = NO_TOKEN,
 ) -> None:
     """Run a protocol in real time, on a rig or the virtual rig.
 
@@ -74,13 +75,14 @@ def run(
                 "--console goes with neither --unattended nor --resume; continue a session under "
                 "After on the page of `rigidimeter console`"
             )
-        from rigidimeter.cli.page_session import serve_page
+        from rigidimeter.cli.page_session import PageAddress, serve_page
         from rigidimeter.rig.console.page import Place
 
         folder, source = out.absolute(), planned.source
         name = source.name if source is not None else "the defaults"
         place = Place(folder.parent, planned.settings, name, rig, folder.name, source)
-        led = serve_page(place, Realtime(priority=priority, cpu=cpu), (host, port, token))
+        address = PageAddress(host, port, token_file, no_token)
+        led = serve_page(place, Realtime(priority=priority, cpu=cpu), address)
         if led is None:
             raise UserError("the program was stopped before a session was run")
         conclude(led, out, rig, nwb=False)

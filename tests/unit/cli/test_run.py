@@ -196,6 +196,6 @@ def test_a_session_on_the_page_runs_only_while_the_page_is_there(tmp_path, monke
     monkeypatch.setattr("rigidimeter.cli.planned_session.supervise", supervise)
     settings = parse_settings({})
     state = ServerState(Place(tmp_path, settings, "the defaults"))
-    assert lead_session(state, StartRequest("s", settings), Realtime()) is None
+    assert lead_session(state, StartRequest("s", settings), Realtime(), lambda: None) is None
     assert told["operator_seen_ns"] == state.operator_seen_ns
     assert state.finished.sentences == ("that is enough",)

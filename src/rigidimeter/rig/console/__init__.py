@@ -1,6 +1,7 @@
 """What the operator sees and says while the rig runs."""
 
 from rigidimeter.rig.console.after_session import new_folder, next_steps, resume_command
+from rigidimeter.rig.console.alarms import Alarm, Alarms
 from rigidimeter.rig.console.indicators import (
     Level,
     RecentSamples,
@@ -9,7 +10,7 @@ from rigidimeter.rig.console.indicators import (
     limit_distances,
     recent_samples,
 )
-from rigidimeter.rig.console.line_view import LineView, status_line
+from rigidimeter.rig.console.line_view import BELL, LineView, status_line
 from rigidimeter.rig.console.live_parameters import LiveValue, caution, live_values, settling_s
 from rigidimeter.rig.console.observer import Observer
 from rigidimeter.rig.console.orders import KEYS, order_of, save_to
@@ -20,6 +21,7 @@ from rigidimeter.rig.console.session_progress import (
     progress_after,
     progress_at_start,
 )
+from rigidimeter.rig.console.stop_keys import KEYS_HERE, NO_KEYS, StopKeys, stop_keys
 from rigidimeter.rig.console.terminal import (
     LEAVE,
     QUESTION,

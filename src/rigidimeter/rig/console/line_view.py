@@ -21,6 +21,7 @@ from rigidimeter.rig.acquisition.processes import (
     SessionMemory,
     SharedStatus,
 )
+from rigidimeter.rig.console.alarms import Alarm, Alarms
 from rigidimeter.rig.console.indicators import Level
 from rigidimeter.rig.console.observer import Observer
 from rigidimeter.rig.console.orders import order_of, save_to
@@ -29,9 +30,12 @@ from rigidimeter.rig.console.session_progress import SessionPlan
 
 HELP = (
     "p pause after this epoch, n pause now, r resume, s stop after this epoch, a abort, "
-    "h halt (power off), e emergency stop, set NAME VALUE, save to FOLDER (if the disk is full); "
-    "each with Enter"
+    "h halt (power off), e emergency stop, c silence cautions, set NAME VALUE, save to FOLDER (if "
+    "the disk is full); each with Enter"
 )
+BELL = "\a"
+SILENCE = "c"
+"""What is typed to have no bell for cautions in this session, and again to have it."""
 
 
 def status_line(facts: Facts) -> str:
@@ -89,6 +93,7 @@ class LineView:
         self._shown_s = -math.inf
         self._typed = b""
         self._announced: tuple[str, ...] = ()
+        self._alarms, self._silent = Alarms(now), False
         if keyboard is not None:
             self._say(HELP)
 
@@ -109,6 +114,9 @@ class LineView:
             if text not in self._announced:
                 self._say(text)
         self._announced = texts
+        alarm = self._alarms.heard(facts, self._observer.progress.outcome, self._observer.cautions)
+        if alarm is Alarm.STOP or (alarm is Alarm.CAUTION and not self._silent):
+            self._ring()
         if self._now() - self._shown_s >= self.every_s and self._show(facts):
             self._shown_s = self._now()
 
@@ -132,6 +140,9 @@ class LineView:
         if text[:1].lower() == "e":
             self._stop(status)
             return
+        if text.lower() == SILENCE:
+            self._silence()
+            return
         if text.lower().startswith("save to "):
             self._say(save_to(text[len("save to ") :].strip(), status))
             return
@@ -149,6 +160,11 @@ class LineView:
         status.raise_flag(Flag.EMERGENCY_STOP)
         self._say("emergency stop")
 
+    def _silence(self) -> None:
+        """Let cautions be heard no more, or again; stops always are."""
+        self._silent = not self._silent
+        self._say("cautions are silent in this session" if self._silent else "cautions are heard")
+
     def _post(self, order: Order, status: SharedStatus) -> None:
         try:
             status.post(order)
@@ -157,13 +173,24 @@ class LineView:
             return
         self._say(f"ordered: {order.command.name.lower().replace('_', ' ')}")
 
+    def _line(self, facts: Facts) -> str:
+        return f"cautions silent | {status_line(facts)}" if self._silent else status_line(facts)
+
     def _show(self, facts: Facts) -> bool:
         """Show the status; return whether there is one."""
         if math.isfinite(facts.angle_deg):
-            self._say(status_line(facts))
+            self._say(self._line(facts))
         return math.isfinite(facts.angle_deg)
 
+    def _ring(self) -> None:
+        """Ring the bell of a terminal; a file has none."""
+        if self._screen is not None and self._screen.isatty():
+            self._write(BELL)
+
     def _say(self, text: str) -> None:
+        self._write(f"{text}\n")
+
+    def _write(self, text: str) -> None:
         if self._screen is not None and select.select([], [self._screen.fileno()], [], 0.0)[1]:
-            self._screen.write(text + "\n")
+            self._screen.write(text)
             self._screen.flush()

@@ -108,6 +108,8 @@ class Facts:
         For which the guard holds or has stopped the rig.
     stop_words : str
         The same as a sentence, or how the session ended; empty while all is well.
+    held : bool
+        Whether the guard only holds it: the operator may resume.
     """
 
     time_s: float
@@ -127,6 +129,7 @@ class Facts:
     indicators: tuple[Indicator, ...]
     cause: Cause
     stop_words: str
+    held: bool
 
 
 def facts(
@@ -178,6 +181,7 @@ def facts(
         ),
         cause=Cause(loop.cause),
         stop_words=_stop_words(progress, loop),
+        held=not progress.outcome and _held(loop),
     )
 
 
@@ -272,5 +276,9 @@ def _stop_words(progress: Progress, loop: LoopStatus) -> str:
     cause = Cause(loop.cause)
     if cause is Cause.NONE:
         return ""
-    held = cause.reaction is Reaction.HOLD and State(loop.state) is not State.FAULTED
-    return f"{'held' if held else 'stopped'}: {progress.stop or cause.sentence}"
+    return f"{'held' if _held(loop) else 'stopped'}: {progress.stop or cause.sentence}"
+
+
+def _held(loop: LoopStatus) -> bool:
+    """Whether the guard holds the rig, and the operator may resume."""
+    return Cause(loop.cause).reaction is Reaction.HOLD and State(loop.state) is not State.FAULTED

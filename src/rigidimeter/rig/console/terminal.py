@@ -28,7 +28,7 @@ from rich.cells import cell_len, set_cell_size
 
 from rigidimeter.rig.acquisition import Command, Order, State
 from rigidimeter.rig.acquisition.processes import Flag, SharedStatus
-from rigidimeter.rig.console.line_view import LineView, status_line
+from rigidimeter.rig.console.line_view import BELL, SILENCE, LineView
 from rigidimeter.rig.console.orders import KEYS, post_typed
 from rigidimeter.rig.console.session_facts import Facts
 from rigidimeter.rig.console.session_progress import SessionPlan
@@ -42,7 +42,8 @@ LEAVE_S = 0.5
 
 KEYS_HELP = (
     "SPACE or e: EMERGENCY STOP, h: halt (power off), other keys: pause now; p pause after this "
-    "epoch, n pause now, r resume, s stop after this epoch, a abort, : set, note, save to"
+    "epoch, n pause now, r resume, s stop after this epoch, a abort, c silence cautions, : set, "
+    "note, save to"
 )
 AGAIN_S = 5.0
 """For so long a key that asks for itself again waits."""
@@ -96,14 +97,14 @@ class Tty:
     """
 
     def __init__(self, keys: int, screen: int) -> None:
-        self._keys = keys
+        self.keys = keys
         self._screen = os.open(os.ttyname(screen), os.O_RDWR | os.O_NONBLOCK | os.O_NOCTTY)
         self._before = termios.tcgetattr(keys)
         self._pending = b""
 
     def __enter__(self) -> Tty:
         """Take keys one by one, unseen; Ctrl-C stays a signal."""
-        tty.setcbreak(self._keys, termios.TCSANOW)
+        tty.setcbreak(self.keys, termios.TCSANOW)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -117,8 +118,8 @@ class Tty:
             with suppress(termios.error):
                 if self._pending:  # what nobody takes would hold up who writes next
                     termios.tcflush(self._screen, termios.TCOFLUSH)
-                termios.tcsetattr(self._keys, termios.TCSANOW, self._before)
-                termios.tcflush(self._keys, termios.TCIFLUSH)
+                termios.tcsetattr(self.keys, termios.TCSANOW, self._before)
+                termios.tcflush(self.keys, termios.TCIFLUSH)
         finally:
             os.close(self._screen)
 
@@ -128,18 +129,20 @@ class Tty:
             return os.get_terminal_size(self._screen).columns or 80
         return 80
 
-    def show(self, frame: bytes) -> None:
-        """Show a frame; it is dropped while the one before is not out."""
-        if self._flush():
-            self._pending = frame
-            self._flush()
+    def show(self, frame: bytes) -> bool:
+        """Show a frame; it is dropped, and False returned, while the one before is not out."""
+        if not self._flush():
+            return False
+        self._pending = frame
+        self._flush()
+        return True
 
     def typed(self) -> bytes | None:
         """Return the bytes that were typed since the last call, None if nobody can type more."""
         read = b""
-        while select.select([self._keys], [], [], 0.0)[0]:
+        while select.select([self.keys], [], [], 0.0)[0]:
             try:
-                part = os.read(self._keys, 1024)
+                part = os.read(self.keys, 1024)
             except OSError:
                 return None
             if not part:
@@ -180,7 +183,7 @@ class KeyView(LineView):
         self._state: State | None = None
         self._prompt: str | None = None
         self._key_s = self._asked_s = -1e9
-        self._there = True
+        self._there, self._bell_due = True, False
         self._say(KEYS_HELP)
 
     def _listen(self, status: SharedStatus) -> None:
@@ -194,7 +197,7 @@ class KeyView(LineView):
             status.raise_flag(Flag.END_ASKED)
             self._say("the keyboard is gone: the rig stops")
             return
-        text = _SEQUENCE.sub("", typed.decode(errors="replace"))
+        text = without_sequences(typed.decode(errors="replace"))
         if text:
             self._key_s = self._now()
             self._shown_s = -1e9  # what is typed is shown at once
@@ -232,6 +235,9 @@ class KeyView(LineView):
             return
         if key in "\r\n":  # who is used to Enter after a letter
             return
+        if key == SILENCE:
+            self._silence()
+            return
         if key not in KEYS:
             self._say(f"{key!r} is no order: pausing now")
         command = KEYS.get(key, Command.PAUSE_NOW)
@@ -251,18 +257,29 @@ class KeyView(LineView):
     def _show(self, facts: Facts) -> bool:
         self._state = facts.state
         begun = math.isfinite(facts.angle_deg)
-        line = status_line(facts).strip() if begun else facts.state_words
+        line = self._line(facts).strip() if begun else facts.state_words
         if self._prompt is not None:
             line = f": {self._prompt}_   Enter does it, Esc leaves, SPACE SPACE: EMERGENCY STOP"
         line, cells = clean(line), max(self._tty.width() - 1, 1)  # the last column may wrap
         if cell_len(line) > cells:
             line = set_cell_size(line, cells - 1) + "…"
-        self._tty.show(f"\r\x1b[K{line}".encode())
+        bell = BELL if self._bell_due else ""
+        if self._tty.show(f"{bell}\r\x1b[K{line}".encode()):
+            self._bell_due = False
         return True
+
+    def _ring(self) -> None:
+        self._bell_due = True
+        self._shown_s = -1e9
 
     def _say(self, text: str) -> None:
         self._tty.show(f"\r\x1b[K{clean(text)}\n".encode())
         self._shown_s = -1e9  # the line of status follows at once
+
+
+def without_sequences(text: str) -> str:
+    """Return what was typed without arrows, function keys and the like."""
+    return _SEQUENCE.sub("", text)
 
 
 def clean(text: str) -> str:

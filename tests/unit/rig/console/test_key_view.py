@@ -8,6 +8,7 @@ import select
 import struct
 import termios
 import time
+from contextlib import suppress
 
 import pytest
 from tests.unit.rig.console.test_session_progress import EPOCHS, ended, started
@@ -22,6 +23,7 @@ from rigidimeter.rig.acquisition.processes import (
     SessionMemory,
 )
 from rigidimeter.rig.console import (
+    BELL,
     LEAVE,
     KeyView,
     LineView,
@@ -135,6 +137,59 @@ def test_why_it_stands_stays_above_the_line_once_and_in_full(person):
     lines = person.reads()
     assert [line for line in lines if line == f"held: {Cause.TORQUE_HIGH.sentence}"] == lines[:-1]
     assert "held by the guard" in lines[-1]
+
+
+def bells(person):
+    person.look()
+    person.look()
+    return person.sees().count(BELL.encode())
+
+
+def test_stops_and_cautions_ring_once_and_cautions_can_be_silenced(person, monkeypatch):
+    cautions = []
+    monkeypatch.setattr(Observer, "cautions", property(lambda _: tuple(cautions)))
+    bells(person)  # those of a session without a recorder
+    cautions.append("epoch 1: J is too small")
+    assert bells(person) == 1
+    person.press(b"c")
+    assert person.orders() == []
+    assert person.reads()[-1].startswith("cautions silent | ")
+    cautions.append("epoch 2: J is too small")
+    assert bells(person) == 0
+    person.status.show_loop(RUNNING._replace(state=State.PAUSED, cause=int(Cause.TORQUE_HIGH)))
+    assert bells(person) == 1  # a stop is always heard
+    person.press(b"c")
+    assert not person.reads()[-1].startswith("cautions silent")
+    cautions.append("epoch 3: J is too small")
+    person.status.show_loop(RUNNING)
+    assert bells(person) == 1
+
+
+def test_a_bell_is_rung_when_the_terminal_takes_output_again(person):
+    person.sees()
+    screen = os.open(os.ttyname(person.near), os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY)
+    for size in (1000, 1, 1):  # the system moves what was written on, which makes room again
+        with suppress(BlockingIOError):
+            while True:
+                os.write(screen, b"x" * size)
+        time.sleep(0.05)
+    os.close(screen)
+    person.look()  # a frame that waits
+    person.status.show_loop(RUNNING._replace(state=State.FAULTED, cause=int(Cause.TORQUE_TOO_HIGH)))
+    person.look()
+    seen = person.sees()
+    assert BELL.encode() not in seen
+    for _ in range(3):
+        person.look()
+        seen += person.sees()
+    assert seen.count(BELL.encode()) == 1
+
+
+def test_the_next_session_is_heard(person):
+    person.press(b"c")
+    again = KeyView(person.tty, PLAN, lambda: person.now_s)
+    again(person.shared)
+    assert "cautions silent" not in person.sees().decode().rpartition("EMERGENCY")[2]
 
 
 def test_a_torque_that_does_not_fit_is_printed_once_and_stays(person, monkeypatch):

@@ -5,7 +5,7 @@ from rigidimeter.rig.console.page.access import (
     MAX_MESSAGES,
     AccessCheck,
     cookie_name,
-    host_allowed,
+    in_url,
     is_loopback,
     same_origin,
     slow_enough,
@@ -30,6 +30,7 @@ from rigidimeter.rig.console.page.page_messages import (
     points,
     session_state,
 )
+from rigidimeter.rig.console.page.page_token import new_token, require_token, token_in
 from rigidimeter.rig.console.page.prediction import dry_run_lines, prediction_lines
 from rigidimeter.rig.console.page.recorded_traces import amplitude_densities, as_json, epoch_panes
 from rigidimeter.rig.console.page.rig_steps import RigStep, start_refusal

@@ -2,10 +2,11 @@
 
 A browser on the operator's computer also shows pages of strangers. Such a page can send requests to
 127.0.0.1, and a name of its own can be made to point there (DNS rebinding). So a request must name
-this computer by an address or one of its own names, and one that acts, or opens a socket, must come
-from a page of this server. What a browser loads for a page of a stranger, a frame or an image, is
-refused too: a page in a frame could be clicked on unseen, and to make many pages takes time from
-the beats. On any other address than the loopback there is a token beside that.
+this computer, once, by one of its names or the address that the connection came to, and one that
+acts, or opens a socket, must come from a page of this server. What a browser loads for a page of a
+stranger, a frame or an image, is refused too: a page in a frame could be clicked on unseen, and to
+make many pages takes time from the beats. Other programs and users of this computer are kept out by
+the token.
 
 Sockets that say too much are closed: what they say is heard in the thread that hears the beats.
 
@@ -30,6 +31,7 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 import uvicorn
+from starlette.middleware.trustedhost import TrustedHostMiddleware
 
 COOKIE = "rigidimeter_token"
 LONGEST_BODY = 200_000
@@ -76,33 +78,23 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-def host_allowed(header: str, names: Iterable[str]) -> bool:
-    """Whether a Host header names this computer: by an address, or one of `names`.
-
-    A name of a stranger that was made to point here is none of them. Starlette's
-    `TrustedHostMiddleware` knows listed names alone, and which addresses this computer has, behind
-    a forwarded port too, cannot be listed.
+def in_url(address: str) -> str:
+    """Return an address as it stands in a URL.
 
     Examples
     --------
-    >>> host_allowed("127.0.0.1:8080", ["localhost"]), host_allowed("evil.example:8080", [])
-    (True, False)
+    >>> in_url("127.0.0.1"), in_url("::1"), in_url("::ffff:192.168.0.7"), in_url("lab")
+    ('127.0.0.1', '[::1]', '192.168.0.7', 'lab')
     """
     try:
-        name = urlsplit(f"//{header}").hostname or ""
+        found = ipaddress.IPv6Address(address)
     except ValueError:
-        return False
-    if name in {one.lower() for one in names}:
-        return True
-    try:
-        ipaddress.ip_address(name)
-    except ValueError:
-        return False
-    return True
+        return address
+    return str(found.ipv4_mapped or f"[{found}]")
 
 
 def same_origin(origin: str, host: str) -> bool:
-    """Whether an Origin header is that of a page that this server sent.
+    """Whether an Origin header is that of a page that this server sent, which is over http.
 
     Examples
     --------
@@ -111,8 +103,7 @@ def same_origin(origin: str, host: str) -> bool:
     >>> same_origin("http://127.0.0.1:9999", "127.0.0.1:8080"), same_origin("null", "null")
     (False, False)
     """
-    scheme, _, rest = origin.partition("://")
-    return scheme in ("http", "https") and bool(host) and rest.lower() == host.lower()
+    return bool(host) and origin.lower() == f"http://{host}".lower()
 
 
 def for_another_page(headers: Mapping[str, str]) -> bool:
@@ -160,7 +151,7 @@ class AccessCheck:
     token : str
         Empty for none.
     names : iterable of str
-        Names of this computer.
+        Names and addresses of this computer, as they stand in a URL.
     """
 
     def __init__(self, app: App, token: str, names: Iterable[str]) -> None:
@@ -172,11 +163,23 @@ class AccessCheck:
             await self._app(scope, receive, send)
             return
         send = _with_headers(send)
+        # The middleware looks at one header, and at no address in the first line of a request.
+        if sum(name == b"host" for name, _ in scope["headers"]) != 1:
+            await _refuse(scope, receive, send, "a request must have one Host header")
+        elif not scope["path"].startswith("/"):
+            await _refuse(scope, receive, send, "a request must name a path of this server")
+        else:
+            reached = in_url(scope["server"][0])
+            known = TrustedHostMiddleware(self._enter, (*self._names, reached), www_redirect=False)
+            await known(scope, receive, send)
+
+    async def _enter(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request to this computer on, or refuse it."""
         headers = {
             name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]
         }
         if scope["type"] == "http" and self._token and _token_in_query(scope):
-            await self._admit(scope, headers.get("host", ""), send)
+            await self._admit(scope, headers["host"], send)
             return
         why = self._refusal(scope, headers)
         if why:
@@ -188,9 +191,7 @@ class AccessCheck:
 
     def _refusal(self, scope: Scope, headers: Mapping[str, str]) -> str:
         """Return why a request may not pass, nothing if it may."""
-        host, origin = headers.get("host", ""), headers.get("origin", "")
-        if not host_allowed(host, self._names):
-            return "this server is not known by that name; open the address that it printed"
+        host, origin = headers["host"], headers.get("origin", "")
         acts = scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
         if ((acts or origin) and not same_origin(origin, host)) or for_another_page(headers):
             return "requests of other pages are refused"

@@ -108,6 +108,9 @@ class BeforeView:
             self._start.props("size=lg")
             ui.button("Predict precision, margin, days needed", on_click=self._predict)
             ui.button("Dry run on the virtual rig", on_click=self._dry_run)
+            tested = ui.button("Test the tones").mark("tones")
+            tested.on("click", js_handler="() => window.rigTones.test()")
+            tested.tooltip("Two short low tones, a caution, then a long high one, a stop")
         self._answer = ui.html("", sanitize=False).classes("answer")
         self._check()
         ui.timer(5.0, self._show_steps)
@@ -225,7 +228,7 @@ class BeforeView:
 
     def _may_act(self) -> bool:
         if not self._in_control():
-            ui.notify("this page is read-only: another one has control")
+            ui.notify("this page watches: another one has control")
         elif self._state.busy:
             ui.notify("not while a session runs or the rig is checked")
         else:

@@ -20,7 +20,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from rigidimeter.core.files import json_line
 from rigidimeter.rig.acquisition import Command, Order
 from rigidimeter.rig.acquisition.processes import Flag, ProcessCondition, Role, SessionMemory
-from rigidimeter.rig.console import BandTorque, Observer, TraceReader, save_to
+from rigidimeter.rig.console import Alarm, Alarms, BandTorque, Observer, TraceReader, save_to
 from rigidimeter.rig.console.page.page_messages import (
     PageMessage,
     RefusedMessage,
@@ -83,6 +83,8 @@ class _Attached:
         self._traces = TraceReader(self.memory.samples, rate_hz, POINTS_PER_S, band=self._band)
         self._known_since_s = math.nan
         self._observer = Observer(running.plan, self.memory)
+        self._alarms = Alarms()
+        self.heard, self.stopped = Alarm.NONE, False
         self.notes: deque[str] = deque()
 
     def samples(self) -> bytes:
@@ -94,8 +96,11 @@ class _Attached:
         facts = self._observer.facts_now()
         # Of the epoch in which J, B and K are known, and of no other.
         self._known_since_s = live.since_s if live is not None and is_known(facts) else math.nan
+        progress = self._observer.progress
+        self.heard = self._alarms.heard(facts, progress.outcome, self._observer.cautions)
+        self.stopped = self._alarms.stopped
         full = self.memory.status.condition(Role.RECORDER) is ProcessCondition.TROUBLE
-        state = session_state(facts, self._observer.progress)
+        state = session_state(facts, progress)
         return state | {"number": self.running.number, "save": full}
 
     def post_notes(self) -> None:
@@ -116,6 +121,9 @@ class LiveSockets:
         self._pages: set[OpenPage] = set()
         self._attached: _Attached | None = None
         self._known: deque[str] = deque(maxlen=MAX_KNOWN)
+        self._alarms = {"stop": 0, "caution": 0}
+        self._end_heard = False
+        self._ended = state.finished
 
     def admit(self, secret: str) -> None:
         """Let a page come that was just sent; the secret is its own."""
@@ -155,7 +163,7 @@ class LiveSockets:
             page.send(_refused(str(error)) if is_note else json.dumps({"say": str(error)}))
 
     def _obey(self, page: OpenPage, message: PageMessage) -> None:
-        """Do what a page in control says; a page that looks is told so."""
+        """Do what a page in control says; a page that watches may press the emergency stop."""
         presence, now_ns = self._state.presence, time.monotonic_ns()
         if message.kind == "beat":
             presence.beat(page.secret, now_ns)
@@ -165,23 +173,23 @@ class LiveSockets:
             return
         if message.kind == "hello":
             return
+        attached = self._attached
+        if message.kind == "emergency":  # of any page: a stop must work for all who see it
+            self._state.press_stop()
+            if attached is not None:
+                attached.memory.status.raise_flag(Flag.EMERGENCY_STOP)
+            return
         if not presence.has_control(page.secret):
-            why = "this page is read-only: another one has control"
+            why = "this page watches: another one has control"
             page.send(_refused(why) if message.kind == "note" else json.dumps({"say": why}))
             return
         if message.kind == "leave":
             presence.leave(page.secret, now_ns)
-        if message.kind in ("emergency", "leave"):
             self._state.stop_check()
-        attached = self._attached
         if attached is None:
-            if message.kind == "emergency":
-                self._state.press_stop()
             return
         status = attached.memory.status
-        if message.kind == "emergency":
-            status.raise_flag(Flag.EMERGENCY_STOP)
-        elif message.kind == "leave":
+        if message.kind == "leave":
             status.post(Order(Command.PAUSE_NOW))
         elif message.kind == "order":
             status.post(Order(message.command))
@@ -232,9 +240,12 @@ class LiveSockets:
             "checking": state.checking,
             "session": None,
             "finished": None,
+            "alarms": self._alarms,
         }
         if attached is not None:
             shown["session"] = attached.state()
+            self._count(attached.heard)
+            self._end_heard = attached.stopped
         elif state.finished is not None and not state.in_session:
             finished = state.finished
             shown["finished"] = {
@@ -243,9 +254,19 @@ class LiveSockets:
                 "outcome": finished.outcome,
                 "sentences": list(finished.sentences),
             }
+            if finished is not self._ended:
+                self._ended = finished
+                if finished.outcome != "success" and not self._end_heard:
+                    self._count(Alarm.STOP)
+                self._end_heard = False
         for page in self._pages:
             control = state.presence.has_control(page.secret)
             page.send(json.dumps({"state": shown, "control": control}))
+
+    def _count(self, heard: Alarm) -> None:
+        """Count what a page is to have heard."""
+        self._alarms["stop"] += heard is Alarm.STOP
+        self._alarms["caution"] += heard is Alarm.CAUTION
 
 
 def _refused(why: str) -> str:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import re
 import secrets
 import socket
 import threading
@@ -24,19 +23,18 @@ from starlette.staticfiles import StaticFiles
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.version import __version__
-from rigidimeter.rig.console.page.access import AccessCheck, bound_connections, is_loopback
+from rigidimeter.rig.console.page.access import AccessCheck, bound_connections, in_url
 from rigidimeter.rig.console.page.after_view import AfterView
 from rigidimeter.rig.console.page.before_view import BeforeView
 from rigidimeter.rig.console.page.jobs import Jobs
 from rigidimeter.rig.console.page.live_socket import LiveSockets
+from rigidimeter.rig.console.page.page_token import require_token
 from rigidimeter.rig.console.page.server_state import ServerState
 from rigidimeter.rig.console.page.sessions_found import POLICY, report_file
 
 ASSETS = Path(__file__).parent / "assets"
 LARGEST_MESSAGE = 65_536
 START_S = 30.0
-
-_TOKEN = re.compile(r"[A-Za-z0-9_-]{16,200}")
 
 
 class PageServer:
@@ -51,29 +49,26 @@ class PageServer:
     port : int
         0 for any that is free.
     token : str
-        Of an address that is not the loopback; made if empty and needed.
+        Empty for none: then every program and user of this computer can lead the rig.
 
     Raises
     ------
     UserError
-        If the token is too short, or the address cannot be served.
+        If the token is too short, is missing where a network reaches the page, or the address
+        cannot be served.
     """
 
-    def __init__(
-        self, state: ServerState, jobs: Jobs, host: str, port: int, token: str = ""
-    ) -> None:
-        if token and _TOKEN.fullmatch(token) is None:
-            raise UserError(
-                f"--token: {len(token)} characters, which can be guessed or do not fit into an "
-                "address; use 16 or more of A-Z, a-z, digits, - and _"
-            )
-        self._token = token or ("" if is_loopback(host) else secrets.token_urlsafe(24))
+    def __init__(self, state: ServerState, jobs: Jobs, host: str, port: int, token: str) -> None:
+        require_token(token, host)
+        self._token = token
         self._state, self._jobs = state, jobs
         self._socket = _listening(host, port)
         self._host, self._port = host, self._socket.getsockname()[1]
-        names = ("localhost", socket.gethostname(), host)
+        names = ("localhost", "127.0.0.1", "[::1]", socket.gethostname(), in_url(host))
         config = uvicorn.Config(
             AccessCheck(self._app(), self._token, names),
+            http="h11",  # which keeps the address of a request as it came
+            proxy_headers=False,
             ws_max_size=LARGEST_MESSAGE,
             log_level="warning",
             lifespan="on",
@@ -89,7 +84,7 @@ class PageServer:
         """What the operator opens in a browser."""
         host = socket.gethostname() if self._host in ("0.0.0.0", "::") else self._host
         token = f"?token={self._token}" if self._token else ""
-        return f"http://{f'[{host}]' if ':' in host else host}:{self._port}/{token}"
+        return f"http://{in_url(host)}:{self._port}/{token}"
 
     def start(self) -> None:
         """Start to serve; return once pages can be opened.
@@ -201,6 +196,7 @@ def show_page(state: ServerState, jobs: Jobs, secret: str) -> None:
         f'<link rel="stylesheet" href="/assets/page.css?{__version__}">'
         f'<script src="/vendored/uPlot.iife.min.js?{__version__}"></script>'
         f'<script src="/assets/traces.js?{__version__}" defer></script>'
+        f'<script src="/assets/tones.js?{__version__}" defer></script>'
         f'<script src="/assets/page.js?{__version__}" defer></script>'
     )
     ui.html(_during(), sanitize=False).classes("rig")

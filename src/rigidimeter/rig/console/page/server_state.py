@@ -238,9 +238,14 @@ class ServerState:
         """Stop the check of the rig, if one runs."""
         self.check_stopped = True
 
-    def press_stop(self) -> None:
-        """Keep the emergency stop for a session that starts and is not in shared memory yet."""
+    def press_stop(self) -> bool:
+        """Take the emergency stop, whoever presses it; return whether there is what it stops.
+
+        It ends a check of the rig. A session sees it as its process looks next, or as it starts.
+        """
+        self.stop_check()
         self.stop_pressed = self.in_session
+        return self.busy
 
     def end_check(self) -> None:
         """Give the rig back."""
@@ -256,11 +261,12 @@ class ServerState:
 
     # For the session's thread
 
-    def next_request(self) -> StartRequest:
-        """Wait for the operator; a signal ends the wait."""
+    def next_request(self, listen: Callable[[], None]) -> StartRequest:
+        """Wait for the operator, and listen meanwhile; a signal ends the wait."""
         while True:
+            listen()
             try:
-                return self._requests.get(timeout=0.2)
+                return self._requests.get(timeout=0.05)
             except queue.Empty:
                 continue
 

@@ -9,7 +9,7 @@ from rigidimeter.rig.console.page import (
     LONGEST_BODY,
     AccessCheck,
     cookie_name,
-    host_allowed,
+    in_url,
     is_loopback,
     same_origin,
     slow_enough,
@@ -19,7 +19,7 @@ OWN = {"host": "127.0.0.1:8765", "origin": "http://127.0.0.1:8765"}
 COOKIE = cookie_name(OWN["host"])
 
 
-def ask(token="", kind="http", method="GET", query="", **headers):
+def ask(token="", kind="http", method="GET", query="", path="/", reached="127.0.0.1", **headers):
     """Return status (or "passed") and headers of the answer to one request."""
     sent = []
 
@@ -34,8 +34,14 @@ def ask(token="", kind="http", method="GET", query="", **headers):
 
     scope = {
         "type": kind,
+        "path": path,
+        "server": (reached, 8765),
         "query_string": query.encode(),
-        "headers": [(k.replace("_", "-").encode(), v.encode()) for k, v in headers.items()],
+        "headers": [
+            (name.replace("_", "-").encode(), value.encode())
+            for name, values in headers.items()
+            for value in ([values] if isinstance(values, str) else values)
+        ],
     }
     if kind == "http":
         scope["method"] = method
@@ -46,24 +52,64 @@ def ask(token="", kind="http", method="GET", query="", **headers):
     return first.get("status") or first["type"], dict(first.get("headers", []))
 
 
+HERE = "192.168.0.7"
+
+
 @pytest.mark.parametrize(
     ("host", "allowed"),
     [
-        ("127.0.0.1:8765", True),
+        (f"{HERE}:8765", True),
+        (HERE, True),
         ("localhost:1", True),
         ("LOCALHOST", True),
-        ("[::1]:8765", True),
-        ("192.168.0.7", True),
         ("evil.example:8765", False),
-        ("127.0.0.1.evil.example", False),
+        (f"{HERE}.evil.example", False),
         ("localhost.evil.example", False),
+        ("192.168.0.8:8765", False),
         ("", False),
         ("[::1", False),
+        (f"user@{HERE}:8765", False),
+        (f"evil.example@{HERE}", False),
+        (f"{HERE}:8765, evil.example", False),
+        (f"{HERE}/x", False),
+        (f"{HERE}:8765:1", False),
+        (f"http://{HERE}", False),
+        ([], False),
+        ([HERE, HERE], False),
+        (["evil.example", HERE], False),
+        ([HERE, "evil.example"], False),
     ],
 )
-def test_only_addresses_and_own_names_are_asked_for(host, allowed):
+def test_one_host_header_names_this_computer(host, allowed):
     """The name of a stranger that was made to point here is what DNS rebinding needs."""
-    assert host_allowed(host, ["localhost"]) == allowed
+    assert (ask(host=host, reached=HERE)[0] == "passed") == allowed
+    # With the token in its address too: the cookie would be that of another name.
+    assert (ask("t", query="token=t", host=host, reached=HERE)[0] == 303) == allowed
+    named = host if isinstance(host, str) else HERE
+    opened = ask(kind="websocket", host=host, origin=f"http://{named}", reached=HERE)
+    assert (opened[0] == "passed") == allowed
+
+
+@pytest.mark.parametrize(
+    ("reached", "host"),
+    [
+        ("::1", "[::1]:8765"),
+        ("::ffff:192.168.0.7", f"{HERE}:8765"),
+        ("2001:db8::7", "[2001:db8::7]"),
+    ],
+)
+def test_an_address_of_either_version_is_the_one_that_was_reached(reached, host):
+    assert ask(host=host, reached=reached)[0] == "passed"
+    assert in_url(reached) in host
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["http://evil.example/", "http://127.0.0.1:8765/", "https://127.0.0.1/", "ftp://a/", "*", ""],
+)
+def test_the_first_line_of_a_request_names_a_path_alone(path):
+    for kind in ("http", "websocket"):
+        assert ask(kind=kind, path=path, **OWN)[0] in (403, "websocket.close")
 
 
 @pytest.mark.parametrize(
@@ -71,6 +117,10 @@ def test_only_addresses_and_own_names_are_asked_for(host, allowed):
     [
         ("http://127.0.0.1:8765", True),
         ("http://127.0.0.1:8766", False),
+        ("https://127.0.0.1:8765", False),
+        ("ftp://127.0.0.1:8765", False),
+        ("chrome-extension://127.0.0.1:8765", False),
+        ("http://user@127.0.0.1:8765", False),
         ("http://127.0.0.1", False),
         ("http://evil.example", False),
         ("http://127.0.0.1:8765.evil.example", False),
@@ -89,7 +139,7 @@ def test_what_acts_must_say_where_it_comes_from():
     assert ask(method="POST", host=OWN["host"])[0] == 403
     assert ask(method="POST", **OWN)[0] == "passed"
     assert ask(kind="websocket", host=OWN["host"])[0] == "websocket.close"
-    assert ask(host="evil.example", origin="http://evil.example")[0] == 403
+    assert ask(host="evil.example", origin="http://evil.example")[0] == 400
 
 
 def test_without_the_token_nobody_looks_or_acts():
@@ -133,7 +183,7 @@ def test_large_requests_are_refused():
     ("host", "loopback"),
     [("127.0.0.1", True), ("::1", True), ("localhost", True), ("0.0.0.0", False), ("lab", False)],
 )
-def test_any_address_but_the_loopback_needs_a_token(host, loopback):
+def test_the_loopback_is_told_from_other_addresses(host, loopback):
     assert is_loopback(host) == loopback
 
 

@@ -68,7 +68,7 @@ def test_a_note_has_one_answer_that_says_whether_it_was_taken(said):
         assert answer["noted"] is False
         assert why in answer["say"]
     (answer,) = say(note, "another")
-    assert (answer["noted"], "read-only" in answer["say"]) == (False, True)
+    assert (answer["noted"], "this page watches" in answer["say"]) == (False, True)
 
 
 def test_a_rating_outside_the_scale_of_the_study_is_noted_and_said(said, tmp_path):
@@ -90,18 +90,19 @@ def test_another_folder_is_taken_when_the_disk_takes_nothing(said, tmp_path):
     assert "the recorder can write" in say(order)
     assert status.asked_folder() is None
     status.set_condition(Role.RECORDER, ProcessCondition.TROUBLE, "the disk is full")
-    assert "is read-only" in say(order, "another")
+    assert "this page watches" in say(order, "another")
     assert "full path" in say(order | {"folder": "disk"})
     assert status.asked_folder() is None
     assert say(order) == f"ordered: save to {tmp_path / 'disk'}"
     assert status.asked_folder() == tmp_path / "disk"
 
 
-def test_the_emergency_stop_counts_while_a_session_starts(tmp_path, monkeypatch):
+@pytest.mark.parametrize("presses", ["page", "a page that watches"])
+def test_the_emergency_stop_counts_while_a_session_starts(tmp_path, monkeypatch, presses):
     monkeypatch.setattr(shared_memory, "WHERE", tmp_path)
     state = ServerState(Place(tmp_path, Settings(), "defaults"))
     state.presence.arrive("page", "tab", 1, session=False)
-    sockets, page = LiveSockets(state), OpenPage(None, "page")
+    sockets, page = LiveSockets(state), OpenPage(None, presses)
     press = json.dumps({"kind": "emergency"})
     sockets._hear(page, press)
     assert state.ask(StartRequest("first"))
@@ -171,8 +172,9 @@ def commands(ran):
     return [sample.velocity_command_rad_s for sample in ran.sink.samples]
 
 
-def test_the_emergency_stop_takes_the_power_and_nothing_is_commanded_after_it(operator):
-    ran = operator.session({SENT: [{"kind": "emergency"}]})
+@pytest.mark.parametrize("page", ["page", "a page that watches"])
+def test_the_emergency_stop_takes_the_power_and_nothing_is_commanded_after_it(operator, page):
+    ran = operator.session({SENT: [{"kind": "emergency", "page": page}]})
     assert ran.error is None
     assert commands(ran)[SENT - 1] != 0.0  # it had to be stopped
     assert set(commands(ran)[SENT:]) == {0.0}
@@ -205,12 +207,17 @@ def test_a_page_that_is_left_has_the_arm_held_until_it_says_to_go_on(operator):
 
 
 def test_the_stop_and_a_page_that_leaves_also_end_a_check_of_the_rig(operator):
-    for kind in ("emergency", "leave"):
+    for kind, page, stops in (
+        ("emergency", "page", True),
+        ("emergency", "another", True),
+        ("leave", "page", True),
+        ("leave", "another", False),
+    ):
         assert operator.state.begin_check("daily check")
         operator.sends("beat")
         assert not operator.state.check_stopped
-        operator.sends(kind)
-        assert operator.state.check_stopped, kind
+        operator.sends(kind, page)
+        assert operator.state.check_stopped == stops, (kind, page)
         operator.state.end_check()
 
 
@@ -228,14 +235,17 @@ def test_each_message_does_what_it_says_and_nothing_else(operator):
     assert operator.told == []
 
 
-def test_a_page_that_only_looks_orders_nothing_and_its_beat_is_nobodys(operator):
-    for kind in ("beat", "leave", "emergency"):
+def test_a_page_that_watches_can_stop_and_nothing_else_and_its_beat_is_nobodys(operator):
+    for kind in ("beat", "leave"):
         operator.sends(kind, "another")
     operator.sends("order", "another", command="abort")
     assert operator.orders() == []
     assert not any(operator.status.flag(flag) for flag in Flag)
     assert operator.status.age_s(Role.CONSOLE) == math.inf
-    assert ["read-only" in said for said in operator.told] == [True] * 3
+    assert ["this page watches" in said for said in operator.told] == [True] * 2
+    operator.sends("emergency", "another")
+    assert [flag for flag in Flag if operator.status.flag(flag)] == [Flag.EMERGENCY_STOP]
+    assert len(operator.told) == 2
     operator.sends("beat")
     assert operator.status.age_s(Role.CONSOLE) < math.inf
 
@@ -280,8 +290,8 @@ def test_nobody_is_there_once_the_connection_is_closed(operator):
     assert operator.orders() == [Command.PAUSE_NOW]
     assert operator.status.age_s(Role.CONSOLE) < math.inf
     assert not presence.has_control("page")
-    operator.sends("emergency")
-    assert not operator.status.flag(Flag.EMERGENCY_STOP)
+    operator.sends("order", command="abort")
+    assert operator.orders() == []
 
 
 def test_a_page_that_was_not_sent_from_here_is_turned_away(operator):

@@ -9,21 +9,38 @@ from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page
+from tests.unit.rig.console.test_facts import shown
+from tests.unit.rig.console.test_session_progress import started, told
 
 import rigidimeter.rig.console.page as package
-from rigidimeter.rig.console.page import ORDERS, parse_message
+from rigidimeter.rig.console.page import ORDERS, parse_message, session_state
 
 ASSETS = Path(package.__file__).parent / "assets"
 ADDRESS = "http://127.0.0.1/"
 FAKES = """
 window.sent = [];
 window.rigTraces = new Proxy({}, { get: () => () => {} });
+window.sounds = [];
+window.rigTones = {
+  allowed: true,
+  stop: () => window.sounds.push("stop"),
+  caution: () => window.sounds.push("caution"),
+};
 window.WebSocket = class {
   constructor() { this.readyState = 1; window.socket = this; setTimeout(() => this.onopen(), 1); }
   send(text) { window.sent.push(text); }
 };
 """
-CHECKING = {"starting": "", "checking": "daily check", "session": None, "finished": None}
+QUIET = {"stop": 0, "caution": 0}
+CHECKING = {
+    "starting": "",
+    "checking": "daily check",
+    "session": None,
+    "finished": None,
+    "alarms": QUIET,
+}
+NOTHING_RUNS = CHECKING | {"checking": ""}
+STARTING = NOTHING_RUNS | {"starting": "S01-20260101"}
 
 
 class Operator:
@@ -48,10 +65,15 @@ class Operator:
         assert (hello["kind"], hello["page"]) == ("hello", "secret")
         self.told()
 
-    def told(self, *, control: bool = True) -> None:
+    def told(self, state: dict[str, Any] = CHECKING, *, control: bool = True, **more: Any) -> None:
         """Let the server tell what is going on."""
-        message = json.dumps({"state": CHECKING, "control": control})
+        message = json.dumps({"state": state | more, "control": control})
         self.page.evaluate("(data) => window.socket.onmessage({ data })", message)
+
+    def sounds(self) -> list[str]:
+        """Return what was heard since the last call."""
+        found: list[str] = self.page.evaluate("window.sounds.splice(0)")
+        return found
 
     def after(self, ms: int) -> None:
         self.page.clock.run_for(ms)
@@ -80,6 +102,10 @@ def operator(browser: Browser) -> Iterator[Operator]:
 
 
 EMERGENCY = [{"kind": "emergency"}]
+SESSION = session_state(shown(told(started(1, "1", 25.0))), told(started(1, "1", 25.0))) | {
+    "number": 1,
+    "save": False,
+}
 
 
 def in_a_note(page: Page) -> None:
@@ -93,16 +119,16 @@ def by_the_keyboard(page: Page) -> None:
     page.keyboard.press("Enter")
 
 
-@pytest.mark.parametrize(
-    "press",
-    [
-        lambda page: page.keyboard.press("Escape"),
-        lambda page: page.locator("#emergency").click(),
-        lambda page: page.locator("#emergency").dispatch_event("pointerdown"),
-        by_the_keyboard,
-        in_a_note,
-    ],
-)
+PRESSES = [
+    lambda page: page.keyboard.press("Escape"),
+    lambda page: page.locator("#emergency").click(),
+    lambda page: page.locator("#emergency").dispatch_event("pointerdown"),
+    by_the_keyboard,
+    in_a_note,
+]
+
+
+@pytest.mark.parametrize("press", PRESSES)
 def test_the_emergency_stop_is_sent_once_however_it_is_pressed(
     operator: Operator, press: Callable[[Page], object]
 ) -> None:
@@ -110,12 +136,85 @@ def test_the_emergency_stop_is_sent_once_however_it_is_pressed(
     assert operator.sent() == EMERGENCY
 
 
-def test_escape_is_sent_also_where_the_button_cannot_be_pressed(operator: Operator) -> None:
-    """The server decides who may stop; a page that has just lost control does not know."""
-    operator.told(control=False)
-    assert operator.page.locator("#emergency").is_disabled()
-    operator.page.keyboard.press("Escape")
+@pytest.mark.parametrize("state", [CHECKING, STARTING, NOTHING_RUNS | {"session": SESSION}])
+@pytest.mark.parametrize("press", [PRESSES[1], PRESSES[0]])
+def test_a_page_that_watches_offers_the_stop_and_sends_it(
+    operator: Operator, state: dict[str, Any], press: Callable[[Page], object]
+) -> None:
+    operator.told(state, control=False)
+    assert "this page watches" in operator.page.locator("#role").inner_text()
+    assert operator.page.locator("#emergency").is_enabled()
+    press(operator.page)
     assert operator.sent() == EMERGENCY
+
+
+@pytest.mark.parametrize("control", [True, False])
+def test_the_stop_is_not_offered_where_nothing_runs_or_nobody_hears(
+    operator: Operator, control: bool
+) -> None:
+    operator.told(NOTHING_RUNS, control=control)
+    assert operator.page.locator("#emergency").is_disabled()
+    operator.told(control=control)
+    assert operator.page.locator("#emergency").is_enabled()
+    operator.after(1600)  # and no word of the server
+    assert operator.page.locator("#emergency").is_disabled()
+    said = operator.page.locator("#banner").inner_text()
+    assert "The connection to the program is lost" in said
+    assert ("The arm is stopped" in said, "cannot stop the arm" in said) == (control, not control)
+    operator.page.keyboard.press("Escape")  # the server may hear it all the same
+    assert operator.sent() == EMERGENCY
+
+
+def test_a_stop_and_a_caution_are_heard_once_and_not_what_was_before(operator: Operator) -> None:
+    operator.told(alarms={"stop": 7, "caution": 9})  # as the page opened, it was told of none
+    operator.sounds()
+    operator.told(alarms={"stop": 7, "caution": 9})
+    assert operator.sounds() == []
+    operator.told(alarms={"stop": 7, "caution": 10})
+    operator.told(alarms={"stop": 8, "caution": 11})
+    assert operator.sounds() == ["caution", "stop"]
+    operator.told(alarms={"stop": 8, "caution": 11})
+    operator.page.evaluate("window.socket.onclose()")
+    operator.told(alarms={"stop": 0, "caution": 0})  # the program was started anew
+    operator.told(alarms={"stop": 1, "caution": 0})
+    assert operator.sounds() == ["stop"]
+
+
+def test_cautions_are_silenced_for_one_session_and_stops_never(operator: Operator) -> None:
+    silence, heard = operator.page.locator("#silence"), operator.page.locator("#tones")
+    operator.told(NOTHING_RUNS)
+    assert silence.is_hidden()
+    running = NOTHING_RUNS | {"session": SESSION}
+    operator.told(running)
+    silence.click()
+    operator.told(running, alarms={"stop": 0, "caution": 1})
+    assert operator.sounds() == []
+    assert heard.inner_text() == "cautions are silent"
+    assert silence.get_attribute("aria-pressed") == "true"
+    operator.told(running, alarms={"stop": 1, "caution": 1})
+    assert operator.sounds() == ["stop"]
+    operator.told(running | {"session": SESSION | {"number": 2}}, alarms={"stop": 1, "caution": 2})
+    operator.told(running | {"session": SESSION | {"number": 2}}, alarms={"stop": 1, "caution": 3})
+    assert operator.sounds() == ["caution"]
+    assert heard.inner_text() == ""
+    silence.click()
+    operator.told(NOTHING_RUNS, alarms={"stop": 1, "caution": 3})
+    operator.told(running, alarms={"stop": 1, "caution": 4})
+    assert operator.sounds() == ["caution"]
+
+
+def test_a_page_without_tones_says_so(operator: Operator) -> None:
+    operator.page.evaluate("window.rigTones.allowed = false")
+    operator.told()
+    assert operator.page.locator("#tones").inner_text().startswith("no tones: click")
+
+
+def test_a_lost_connection_is_heard_once_while_something_runs(operator: Operator) -> None:
+    operator.after(3000)
+    assert operator.sounds() == ["stop"]
+    operator.told(NOTHING_RUNS)
+    operator.after(3000)
+    assert operator.sounds() == []
 
 
 @pytest.mark.parametrize("gone", ["pagehide", "hidden"])

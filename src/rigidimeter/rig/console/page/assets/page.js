@@ -2,12 +2,13 @@
 // The server takes no beat from anybody else, so a page that is closed, frozen or cut off is silent.
 "use strict";
 (() => {
-  const BEAT_MS = 50, STATE_OLD_MS = 1500, traces = window.rigTraces;
+  const BEAT_MS = 50, STATE_OLD_MS = 1500, traces = window.rigTraces, tones = window.rigTones;
   const $ = (id) => document.getElementById(id);
   const random = () => Array.from(crypto.getRandomValues(new Uint8Array(18)), (b) => b.toString(16).padStart(2, "0")).join("");
   const tab = sessionStorage.getItem("rig-tab") || random();
   sessionStorage.setItem("rig-tab", tab);
   let page = "", socket = null, control = false, away = false, heard = 0, rated = null, seen = null, asked = null;
+  let led = false, runs = false, silent = false, alarmed = null;
 
   const say = (message) => { if (socket && socket.readyState === 1) socket.send(JSON.stringify(message)); };
   const node = (name, className, text) => { const made = document.createElement(name); made.className = className; if (text) made.textContent = text; return made; };
@@ -22,12 +23,12 @@
   const connected = () => socket && socket.readyState === 1 && performance.now() - heard < STATE_OLD_MS;
 
   function connect() {
-    const at = location.protocol === "https:" ? "wss://" : "ws://";
+    const at = "ws://";
     socket = new WebSocket(at + location.host + "/live");
     socket.binaryType = "arraybuffer";
     socket.onopen = () => { heard = performance.now(); say({ kind: "hello", page, tab }); };
     socket.onmessage = (event) => typeof event.data === "string" ? told(JSON.parse(event.data)) : traces.samples(event.data);
-    socket.onclose = () => { control = false; noted(false); setTimeout(connect, 200); };
+    socket.onclose = () => { control = false; alarmed = null; noted(false); setTimeout(connect, 200); };
   }
 
   function view(name) {
@@ -50,11 +51,15 @@
     if (message.noted !== undefined) noted(message.noted);
     if (message.say) return remark(message.say);
     if (!message.state) return;
-    control = message.control;
-    const { session, finished, starting, checking } = message.state;
+    control = led = message.control;
+    const { session, finished, starting, checking, alarms } = message.state;
+    runs = !!(session || checking || starting);
     $("take").hidden = control;
-    show("role", control ? "" : "this page is read-only");
-    $("emergency").disabled = !(control && (session || checking || starting));
+    show("role", control ? "" : "this page watches: it can stop and nothing else");
+    $("emergency").disabled = !runs;
+    hear(alarms);
+    if (!session) hush(false);
+    $("silence").hidden = !session;
     $("save-form").hidden = !(control && session && session.save);
     const can = session ? session.orders : [];
     for (const one of document.querySelectorAll("[data-order]")) one.disabled = !control || !can.includes(one.dataset.order);
@@ -72,7 +77,7 @@
   }
 
   function during(session) {
-    if (seen !== `runs ${session.number}`) { seen = `runs ${session.number}`; clear(); come("during"); }
+    if (seen !== `runs ${session.number}`) { seen = `runs ${session.number}`; clear(); hush(false); come("during"); }
     show("state", session.state);
     show("condition", session.condition);
     show("epoch", session.epoch);
@@ -109,6 +114,29 @@
   function remark(text) { const at = $("said"); at.prepend(node("div", "", text)); while (at.children.length > 4) at.lastChild.remove(); }
   function clear() { traces.clear(); rated = null; show("rated", "–"); $("said").replaceChildren(); $("limits").replaceChildren(); }
 
+  // What began since the last message; of a page that was just opened, nothing.
+  function hear(alarms) {
+    if (alarmed && alarms.stop > alarmed.stop) tones.stop();
+    else if (alarmed && alarms.caution > alarmed.caution && !silent) tones.caution();
+    alarmed = alarms;
+    show("tones", !tones.allowed ? "no tones: click anywhere, or press a key" : silent ? "cautions are silent" : "");
+  }
+  function hush(on) {
+    silent = on;
+    $("silence").setAttribute("aria-pressed", on);
+    write($("silence"), on ? "Hear cautions" : "Silence cautions");
+  }
+  // A page that cannot reach the program offers no stop.
+  function lost() {
+    if (runs && performance.now() - heard > STATE_OLD_MS) {
+      tones.stop();
+      runs = false;
+    }
+    $("emergency").disabled = true;
+    banner(led ? "The connection to the program is lost. The arm is stopped without it; check the arm, then reload this page."
+      : "The connection to the program is lost. This page shows nothing new and cannot stop the arm: use the stop of the rig, or the page in control.");
+  }
+
   function leave() { away = true; say({ kind: "leave" }); }
   // What the server took is shown as noted, and only then is its field emptied.
   function note(said, text, field) {
@@ -139,6 +167,7 @@
     $("emergency").onpointerdown = emergency;
     $("emergency").onclick = (event) => { if (event.detail === 0) emergency(); };
     addEventListener("keydown", (event) => { if (event.key === "Escape") emergency(); }, true);
+    $("silence").onclick = () => hush(!silent);
     $("take").onclick = () => socket.close();
     $("note-form").onsubmit = (event) => { event.preventDefault(); const text = $("note").value; if (text.trim()) note({ what: "note", text, by: "" }, `note: ${text}`, $("note")); };
     $("save-form").onsubmit = (event) => { event.preventDefault(); say({ kind: "save", folder: $("save-folder").value }); };
@@ -157,7 +186,7 @@
     setInterval(() => {
       const fine = connected();
       if (fine && !away) say({ kind: "beat" });
-      if (!fine) banner("The connection to the program is lost. The arm is stopped without it; check the arm, then reload this page.");
+      if (!fine) lost();
     }, BEAT_MS);
     traces.begin();
     view("before");
