@@ -495,6 +495,13 @@ HAND_MADE = tuple(
         (PAGE, "if not presence.has_control(page.secret):", "if False:", "anybody may order"),
         (
             PAGE,
+            'if message.kind == "emergency":',
+            'if message.kind == "emergency" and presence.has_control(page.secret):',
+            "a page that watches cannot stop",
+        ),
+        (PAGE, "            self._state.press_stop()\n", "", "a session that starts goes on"),
+        (
+            PAGE,
             "self._attached is not None and presence.has_control(page.secret)",
             "self._attached is not None",
             "a page that only looks keeps the arm moving",
