@@ -53,11 +53,14 @@ def simulated_sessions(tmp_path_factory: pytest.TempPathFactory) -> Callable[...
     def run(values: dict[str, Any], name: str) -> Path:
         key = json.dumps([values, name])
         # Not before: the process that starts the others would wait for it, and never use it.
+        from tests.replayed import assert_folder_replayed
+
         from rigidimeter.virtual import run_virtual_session
 
         if key not in done:
             done[key] = folder / str(len(done))
             run_virtual_session(parse_settings(values), done[key])
+            assert_folder_replayed(done[key])
         return done[key]
 
     return run

@@ -13,6 +13,7 @@ import numpy as np
 import scipy.io
 from numpy.typing import ArrayLike
 from tests.fuzz_files import FILES
+from tests.replayed import assert_folder_replayed
 from tests.version_1 import as_version_1
 
 from rigidimeter.core.session import rest_of
@@ -178,6 +179,7 @@ def made_session() -> Path:
             "return_s": 1.0,
         }
         run_virtual_session(parse_settings({"seed": 1, "protocol": protocol}), _MADE[0])
+        assert_folder_replayed(_MADE[0])
     return _MADE[0]
 
 

@@ -76,9 +76,12 @@ def tiny(condition: str, seed: int, *, task: str = "prbs", epochs: int = 2, **ta
 
 def record(folder: Path, condition: str, seed: int, **changes) -> Path:
     """Record a session of a few seconds."""
+    from tests.replayed import assert_folder_replayed
+
     from rigidimeter.virtual import run_virtual_session
 
     run_virtual_session(tiny(condition, seed, **changes), folder)
+    assert_folder_replayed(folder)
     return folder
 
 

@@ -9,6 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.replayed import sessions_replayed
+
+__all__ = ["sessions_replayed"]
 
 OUT = "RIGIDIMETER_MEASURED"
 """Where the measurements go, one line of JSON each, if anywhere."""

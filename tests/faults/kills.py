@@ -44,6 +44,7 @@ from tests.faults.written_ring import Ring
 from tests.wire.rig_process import RigProcess
 
 from rigidimeter.core.session import read_events, read_samples
+from rigidimeter.rig.acquisition import replay_session
 from rigidimeter.rig.guard import Cause
 
 ROOT = Path(__file__).parents[2]
@@ -227,6 +228,9 @@ def _look_at_record(found: Killed, folder: Path, ring: Ring) -> None:
     found.brought_in = ticks.size - before
     if np.unique(ticks).size != ticks.size:
         found.wrong = "samples are there twice"
+    again = replay_session(folder)
+    if again.differences or again.left_out:
+        found.wrong = f"replayed: {again.left_out}{'; '.join(map(str, again.differences))}"
     if _closings(folder) != 1:
         found.wrong = f"the record has {_closings(folder)} ends"
 

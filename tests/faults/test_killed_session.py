@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 import pytest
+from tests.replayed import assert_folder_replayed
 
 from rigidimeter.core.session import read_samples
 
@@ -79,6 +80,7 @@ def test_a_killed_session_comes_back_and_is_analysed(tmp_path, rigidimeter):
     ]
     assert closing[-1]["event"] == "session_ended"
     assert closing[-1]["reason"] == "the plug was pulled"
+    assert assert_folder_replayed(folder).ticks == last_written + 1
 
     out = tmp_path / "out.json"
     analysed = rigidimeter("estimate", folder, "--json", out)
@@ -108,6 +110,7 @@ def test_in_real_time_at_most_a_tenth_of_a_second_is_lost(tmp_path, lateness):
     samples = read_samples(folder / "samples.arrows")
     # The epoch's event is polled every 20 ms, so the loop had run at least as long as we waited.
     assert samples["time_s"][-1] >= ran_s - 0.1 - 0.02 - lateness.worst_s(started)
+    assert_folder_replayed(folder)
 
 
 @pytest.mark.parametrize(
@@ -132,3 +135,4 @@ def test_an_interrupted_session_closes_in_order(tmp_path, number):
     assert events[-1]["reason"] == "interrupted by the operator"
     # The velocity was ramped to zero before the end.
     assert read_samples(folder / "samples.arrows")["velocity_command_rad_s"][-1] == 0.0
+    assert_folder_replayed(folder)

@@ -12,6 +12,8 @@ import termios
 import time
 from pathlib import Path
 
+from tests.replayed import assert_folder_replayed
+
 from rigidimeter.rig.console import LEAVE
 
 SETTINGS = """
@@ -74,6 +76,7 @@ def test_a_key_stops_the_arm_and_the_terminal_is_given_back(tmp_path: Path) -> N
         process.kill()
     operator.watch(0.2)
     events = [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]
+    assert_folder_replayed(folder)
     (latched,) = (event for event in events if event["event"] == "guard_latched")
     assert latched["cause"] == "emergency_stop"
     after = operator.seen.rpartition(LEAVE.rstrip())[2].decode()

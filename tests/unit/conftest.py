@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.replayed import assert_folder_replayed
 
 from rigidimeter.core.session import Sample
 from rigidimeter.core.settings import Settings, parse_settings
@@ -66,6 +67,7 @@ def _kept(tmp_path_factory) -> Callable[[int, int], Path]:
                 {"seed": seed, "protocol": protocol, "prbs": {"duration_s": 8.0}}
             )
             run_virtual_session(settings, made[epochs, seed])
+            assert_folder_replayed(made[epochs, seed])
         return made[epochs, seed]
 
     return folder

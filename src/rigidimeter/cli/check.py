@@ -47,6 +47,10 @@ def check(
         "Show what the sensors read, until Ctrl-C. Without power, on the drive's own scale, while "
         "you wire, turn the joint or hang a weight; nothing is asked or recorded.",
     ),
+    replay: Path | None = OPTIONS.option(
+        "--replay SESSION",
+        "Only run the guard over a recorded session. As fast as it goes; no rig is needed.",
+    ),
     yes: bool = OPTIONS.flag("--yes", "Consent in advance, for an emulated rig only."),
     piped: bool = OPTIONS.flag(
         "--piped", "A program asks somebody and pipes the answer.", hidden=True
@@ -60,6 +64,9 @@ def check(
     of the torque sensor. The first check since the rig was commissioned keeps their inertia as the
     reference for the next ones.
 
+    With `--replay` the guard of this version reads a recorded session: it must stop or hold for the
+    same causes at the same ticks. The exit status is 1 if it does not.
+
     \b
     For example:
       rigidimeter check RIG.toml --settings study.toml
@@ -67,6 +74,7 @@ def check(
       rigidimeter check RIG.toml --zero
       rigidimeter check RIG.toml --live
     """
+    from rigidimeter.cli.replay_text import say_replayed
     from rigidimeter.cli.rig_checks import claimed, operator, require_answers
     from rigidimeter.cli.virtual_check import virtual_check, virtual_setup
     from rigidimeter.core.settings import load_settings
@@ -82,6 +90,20 @@ def check(
     )
     from rigidimeter.rig.devices import load_rig
 
+    if replay is not None:
+        if (
+            rig is not None
+            or settings is not None
+            or zero
+            or live
+            or new_reference
+            or known_inertia
+        ):
+            raise UserError(
+                "--replay SESSION goes alone: settings and limits are those of the session"
+            )
+        say_replayed(replay)
+        return
     rigfile, chosen = None if rig is None else load_rig(rig), load_settings(settings)
     if known_inertia is not None and not (math.isfinite(known_inertia) and known_inertia > 0):
         raise UserError(

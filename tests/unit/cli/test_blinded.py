@@ -8,6 +8,7 @@ import shutil
 import tomllib
 
 import pytest
+from tests.replayed import assert_folder_replayed
 
 from rigidimeter.analysis.reading import read
 from rigidimeter.cli.planned_session import PlannedSession, write_nwb_beside
@@ -37,6 +38,7 @@ def session(tmp_path_factory):
     """A session of two conditions, recorded blinded: Zebra is code-B."""
     folder = tmp_path_factory.mktemp("blinded")
     run_virtual_session(parse_settings(tomllib.loads(PROTOCOL)), folder / "session")
+    assert_folder_replayed(folder / "session")
     path = folder / "session" / "manifest.json"
     manifest = json.loads(path.read_text())
     manifest["about"] = {"blinded": True, "codes": {"Zebra": "code-B", "Quagga": "code-A"}}

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from rigidimeter.rig.acquisition import replay_session
+from rigidimeter.rig.guard import guard_limits
+
 HARDWARE = """
 [torque_sensor]
 driver = "ati-rdt"
@@ -65,3 +68,31 @@ def test_live_readings_need_a_rig(rigidimeter):
     ran = rigidimeter("check", "--live")
     assert ran.status == 1
     assert "--live need a RIG.toml" in ran.err
+
+
+def test_a_session_is_replayed_and_what_came_of_it_is_shown(recorded, rigidimeter):
+    ran = rigidimeter("check", "--replay", recorded())
+    assert ran.status == 0
+    assert "times real time" in ran.out
+    assert "The guard stopped or held for: nothing." in ran.out
+    assert "Commands: the same to the bit." in ran.out
+    assert "Same causes and limits at the same ticks as in the record." in ran.out
+
+
+def test_another_guard_is_a_failure_that_says_where(recorded, rigidimeter, monkeypatch):
+    def slow(settings):
+        return guard_limits(settings)._replace(speed_rad_s=0.1)
+
+    monkeypatch.setitem(replay_session.__globals__, "guard_limits", slow)
+    ran = rigidimeter("check", "--replay", recorded())
+    assert ran.status == 1
+    assert "First differences:" in ran.out
+    assert "limit NOT in the record, SPEED in the replay" in ran.out
+    assert "the guard of this version differs from the record in" in ran.err
+
+
+@pytest.mark.parametrize("also", [["RIG.toml"], ["--zero"], ["--settings", "other.toml"]])
+def test_a_replay_goes_alone(recorded, rigidimeter, also):
+    ran = rigidimeter("check", *also, "--replay", recorded())
+    assert ran.status == 1
+    assert "--replay SESSION goes alone" in ran.err

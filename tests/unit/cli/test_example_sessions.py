@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.replayed import assert_folder_replayed
 
 from rigidimeter.cli.realtime_rig import virtual_rig
 from rigidimeter.core.session import SessionWriter, read_events
@@ -36,7 +37,7 @@ def run(settings: Settings, folder: Path) -> SessionResult:
         virtual=True,
         repeatable=True,
     )
-    return run_session(
+    result = run_session(
         protocol,
         settings,
         rig,
@@ -45,6 +46,8 @@ def run(settings: Settings, folder: Path) -> SessionResult:
         before_epoch=new_joint,
         zero_first=True,
     )
+    assert_folder_replayed(folder)
+    return result
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=[path.stem for path in EXAMPLES])

@@ -14,6 +14,13 @@ from rigidimeter.rig.acquisition.control_modes import (
     skip_passed_ticks,
 )
 from rigidimeter.rig.acquisition.controller_run import ControllerRun
+from rigidimeter.rig.acquisition.replay import (
+    Difference,
+    NamedCause,
+    Replay,
+    replay,
+    replay_session,
+)
 from rigidimeter.rig.acquisition.run_states import (
     NOTHING,
     Command,

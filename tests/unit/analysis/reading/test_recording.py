@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.replayed import assert_folder_replayed
 
 from rigidimeter.analysis.reading import read
 from rigidimeter.analysis.study import provenance
@@ -25,6 +26,7 @@ def session(tmp_path):
         {"protocol": {"blocks": [{"task": "prbs", "condition": "DBS", "epochs": 1}]}}
     )
     run_virtual_session(settings, tmp_path / "session")
+    assert_folder_replayed(tmp_path / "session")
     return tmp_path / "session"
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_equal
+from tests.replayed import assert_folder_replayed
 from tests.small_study import DAYS, record, tiny
 
 from rigidimeter.analysis.statistics import difference, fit_mixed, holm, ranksum
@@ -191,6 +192,7 @@ def test_one_recording_of_both_conditions_has_a_row_for_each(study: Path) -> Non
         "return_s": 0.5,
     })  # fmt: skip
     run_virtual_session(settings, study / "sessions/both")
+    assert_folder_replayed(study / "sessions/both")
     before = analysed(study)
     table = study / "sessions.csv"
     rows = table.read_text() + "sessions/both,M1,9,OFF\n"
@@ -238,6 +240,7 @@ def test_a_session_of_two_conditions_has_one_vote_on_the_protocol(study: Path, r
     sinusoid = tiny("OFF", 1).sinusoid.model_dump() | {"amplitude_deg": 6.0}
     settings = tiny("OFF", 55, task="sinusoid", protocol=protocol, sinusoid=sinusoid)
     run_virtual_session(settings, study / "sessions/both")
+    assert_folder_replayed(study / "sessions/both")
     rows = ["sessions/both,M1,9,OFF", "sessions/both,M1,9,DBS"]
     rows += ["sessions/1-OFF,M1,1,OFF", "sessions/2-DBS,M1,2,DBS"]
     (study / "sessions.csv").write_text("\n".join(["path,subject,day,condition", *rows]))

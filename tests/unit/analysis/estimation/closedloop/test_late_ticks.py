@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.replayed import assert_folder_replayed
 from tests.unit.rig.acquisition.exact_rig import LateClock
 
 from rigidimeter.analysis.estimation.diagnostics import checked
@@ -40,6 +41,7 @@ def recorded(tmp_path_factory):
         folder = tmp_path_factory.mktemp("late") / "session"
         writer = SessionWriter(folder, settings, [], {}, virtual=True)
         ended = run_session(protocol, settings, rig, LateClock(late), writer)
+        assert_folder_replayed(folder)
         assert ended.outcome == "success", ended.reason
         (epoch,) = read(folder).epochs
         joint = rig.joint
