@@ -188,7 +188,6 @@ LABORATORY: Mapping[str, Dialect] = {
     "an angle that drops to 0": Dialect(
         "r.csv",
         csv("t [s],M [Nm],phi [deg]", T, M, np.where(np.arange(T.size) % 50, D + 340.0, 0.0)),
-        refused="is too fast for a limb",
     ),
     "decimated after the rate of the head": Dialect(
         "r.csv",

@@ -54,6 +54,11 @@ class Recordings:
         "--table NAME",
         "The sheet, or the variable of a MATLAB file, that is read, of a file with several.",
     )
+    missing: str | None = HOW_TO_READ.further(
+        "--missing A,B,...",
+        "Numbers that stand for lost samples of torque and motion, such as 0,-999; none: no number "
+        "does. Default: found, where one recurs alone and far from the samples beside it.",
+    )
     mapping: Path | None = HOW_TO_READ.further(
         "--mapping FILE",
         "A mapping file, which says columns, units and the like for the files of one laboratory; "
@@ -164,6 +169,7 @@ class Recordings:
             "skip_rows": self.skip_rows,
             "names": [name.strip() for name in self.names.split(",")] if self.names else (),
             "table": self.table or "",
+            "missing": self.missing or "",
             "mapping": self.mapping,
         }
 

@@ -48,4 +48,5 @@ def arguments_named(message: str) -> str:
     "joint.csv has no column time_s; say rate_hz or column={'time_s': 't'}"
     """
     text = _PAIR.sub(r"\1={'\2\4': '\3\5'}", message).replace("--reaction", "reaction=True")
+    text = text.replace("--missing none", "missing='none'")
     return _OPTION.sub(lambda found: found[1].replace("-", "_"), text)

@@ -111,7 +111,7 @@ def test_files_that_belong_together_are_inspected_together(tmp_path, rigidimeter
 
 
 def test_a_calibration_in_a_comment_is_shown(rigidimeter, tmp_path):
-    """And not used: only a person knows of which column it is, and whether it still holds."""
+    """And proposed, not used: only a person knows whether it still holds."""
     path = tmp_path / "r.csv"
     rows = "".join(f"{k / 100},{k % 7},{k % 11 / 10}\n" for k in range(700))
     head = "# recorded by A\n# gain 0.0024 Nm/count\n# elbow\ntime_s,torque_counts,angle_deg\n"
@@ -120,7 +120,7 @@ def test_a_calibration_in_a_comment_is_shown(rigidimeter, tmp_path):
     assert ran.status == 1
     said = " ".join(ran.out.split())
     assert "the file says 'gain 0.0024 Nm/count'" in said
-    assert "is in counts, and torque is needed in Nm: say --scale 'torque=2.5 Nm/counts'" in said
+    assert "is in counts, and torque is needed in Nm: say --scale 'torque=0.0024 Nm/count'" in said
 
 
 def _written(path, head, *columns):

@@ -159,6 +159,7 @@ def read(
     skip_rows: int = 0,
     names: Sequence[str] = (),
     table: str = "",
+    missing: str | Sequence[float] = "",
     mapping: str | Path | None = None,
     join: bool = False,
     clock_offset: float | str | None = None,
@@ -203,6 +204,10 @@ def read(
         Of the columns of a text file that does not name them.
     table : str
         The sheet that is read, of a file with several.
+    missing : str or sequence of float
+        The numbers that stand for lost samples of torque and motion, as in ``(0, -999)``;
+        ``"none"`` where no number does. Default: found, where one recurs alone and far from the
+        samples beside it.
     mapping : path, optional
         A mapping file, which says all of this but the conditions; an argument comes before it.
     join : bool
@@ -239,6 +244,7 @@ def read(
         skip_rows=skip_rows,
         names=names,
         table=table,
+        missing=missing if isinstance(missing, str) else ",".join(f"{one:g}" for one in missing),
         mapping=mapping,
     )
     chosen = None if settings is None else settings_from(settings)

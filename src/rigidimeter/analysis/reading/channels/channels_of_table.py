@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.analysis.reading.channels.choice import MOTION, Choice, Taken, choose
+from rigidimeter.analysis.reading.channels.headers import read_header
 from rigidimeter.analysis.reading.channels.held_values import (
     SLOWEST_S,
     held_rows,
@@ -20,6 +21,7 @@ from rigidimeter.analysis.reading.channels.held_values import (
     sample_numbers,
     slower_text,
 )
+from rigidimeter.analysis.reading.channels.missing_codes import Code, missing_codes
 from rigidimeter.analysis.reading.channels.quantities import BY_STANDARD
 from rigidimeter.analysis.reading.channels.readings import (
     confusions,
@@ -99,6 +101,7 @@ def channels_of_table(table: Table, options: ReadOptions) -> TableChannels:
             raw[standard] = numbers(table, standard, names[standard], None if exact else strays)
         except UserError as error:
             faults.append(str(error))
+    lost = _without_codes(table, names, raw, options.missing_values)
     time_s, rate_hz = np.empty(0), options.rate_hz
     if rate_hz is not None and numbers_rows(choice.taken, raw):
         del names["time_s"], raw["time_s"], choice.taken["time_s"]
@@ -115,9 +118,10 @@ def channels_of_table(table: Table, options: ReadOptions) -> TableChannels:
     )
     if choice.unstated:
         faults += _unstated(table, choice, raw, rate_hz, usable=usable)
-    notices = [Notice("warning", text) for text in choice.unused]
-    if "epoch" not in names:
-        notices += unused_labels(table, names.values(), table.columns[names["torque_nm"]].size)
+    notices = [Notice("warning", text) for text in (*choice.unused, *lost)]
+    lacking = [label for label in ("epoch", "condition") if label not in names]
+    n_rows = table.columns[names["torque_nm"]].size
+    notices += unused_labels(table, names.values(), n_rows, lacking)
     if not faults and usable:
         found, warned = _doubtful(table, choice.taken, raw, options, rate_hz)
         faults += found
@@ -150,6 +154,37 @@ def channels_of_table(table: Table, options: ReadOptions) -> TableChannels:
         values["torque_nm"] = -values["torque_nm"]
     notices += [Notice("error", text) for text in strays]
     return TableChannels(names, time_s, values, tuple(notices))
+
+
+def _without_codes(
+    table: Table,
+    names: Mapping[str, str],
+    raw: dict[str, Array],
+    stated: tuple[float, ...] | None,
+) -> list[str]:
+    """Replace codes of lost samples by NaN, those that the user stated or else that are found."""
+    texts = []
+    for standard in (name for name in ("torque_nm", *MOTION) if name in raw):
+        values = raw[standard]
+        if stated is None:
+            found = missing_codes(values)
+        else:
+            found = [Code(one, np.flatnonzero(values == one)) for one in stated]
+        for code in found:
+            if code.rows.size:
+                raw[standard] = raw[standard].copy()
+                raw[standard][code.rows] = np.nan
+                text = (
+                    f"{table.source}: column {names[standard]!r} holds {code.value:.6g} in "
+                    f"{code.rows.size} of {values.size} rows, which are taken for lost samples"
+                )
+                if stated is None:
+                    text += (
+                        ": it recurs alone and far from the values beside it; if they are samples, "
+                        "say --missing none"
+                    )
+                texts.append(text)
+    return texts
 
 
 def numbers_rows(taken: Mapping[str, Taken], raw: Mapping[str, Array]) -> bool:
@@ -222,6 +257,9 @@ def _unstated(
         f"{table.source}: the unit of {columns} is stated nowhere, so nothing is estimated; say "
         f"{options_text(vary)}"
     )
+    for taken in choice.unstated:
+        if unknown := read_header(taken.column, table.units.get(taken.column, "")).in_brackets:
+            text += f" ({unknown!r} in {taken.column!r} is no unit that is known)"
     if "torque_nm" in vary:
         text += "; or --scale 'torque=0.001 Nm', if its values are counts of that size"
     if numbers_rows(choice.taken, raw):

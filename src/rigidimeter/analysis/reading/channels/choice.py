@@ -7,6 +7,7 @@ one quantity, or a unit is stated nowhere, nothing is taken.
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from rigidimeter.analysis.reading.channels.conversion import EXAMPLE_ARM, Conver
 from rigidimeter.analysis.reading.channels.headers import Header, fits, read_header
 from rigidimeter.analysis.reading.channels.lever_arm import lever_arm
 from rigidimeter.analysis.reading.channels.quantities import BY_STANDARD, QUANTITIES
+from rigidimeter.analysis.reading.channels.stated_scale import stated_scale
 from rigidimeter.analysis.reading.channels.unit_text import expression, ratio
 from rigidimeter.analysis.reading.formats.table import Table, alike, nearest
 from rigidimeter.core.errors import UserError
@@ -26,7 +28,11 @@ OF_THE_DRIVE = ("drive_torque_nm", "drive_torque_time_s")
 """Columns of an exported session that are neither the joint's torque nor a time of samples."""
 _LEAST_LIKE = 0.4
 """Of a column that is named as the nearest, where its unit does not tell."""
-_UNCALIBRATED = ("volt", "millivolt", "microvolt", "count")
+_UNCALIBRATED = (
+    *("volt", "millivolt", "microvolt", "millivolt/(volt)", "ampere", "milliampere", "count"),
+    *("percent", "permille", "bar", "pascal", "kilopascal", "hertz"),
+)
+"""What sensors and drives give before a calibration."""
 
 
 @dataclass(frozen=True)
@@ -146,8 +152,9 @@ def _may_be(standard: str, header: Header, said: Said) -> bool:
     try:
         conversion(standard, "", header.unit, "", "")
     except UserError:
-        # In V or N: a scale is what lacks.
-        return standard == "torque_nm" and ratio(expression(header.unit), "second") is None
+        unit = expression(header.unit)
+        may_be_scaled = unit in _UNCALIBRATED or ratio(unit, "newton") is not None
+        return standard == "torque_nm" and may_be_scaled  # a scale is what lacks
     return True
 
 
@@ -180,6 +187,8 @@ def _take(
         text = f"{table.source}: {error}"
         if not scale and (arm := lever_arm(table.scalars)):
             text = text.replace(EXAMPLE_ARM, arm) + " (as the file states)"
+        elif not scale and (stated := stated_scale(table.scalars, standard, unit)):
+            text = re.sub(r"NUMBER [^']*", stated, text) + " (as the file states)"
         choice.faults.append(text)
         return
     choice.taken[standard] = Taken(standard, column, unit, to_si, of_user)

@@ -8,10 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.analysis.reading.channels.quantities import BY_STANDARD
-from rigidimeter.analysis.reading.channels.unit_text import expression, factor, ratio, split_number
+from rigidimeter.analysis.reading.channels.unit_text import (
+    divided_by,
+    expression,
+    factor,
+    ratio,
+    split_number,
+)
 from rigidimeter.core.errors import UserError
 
-EXAMPLE_ARM = "0.25 m"
+EXAMPLE_ARM = "NUMBER m"
 
 
 @dataclass(frozen=True)
@@ -54,11 +60,12 @@ def conversion(standard: str, column: str, unit: str, scale: str, offset: str) -
         If the units do not make the channel's.
     """
     name = BY_STANDARD[standard].name
-    if scale and not unit and "/" in scale:
-        _, _, below = scale.partition("/")  # "2.5 Nm/V": the column holds V
-        if expression(below):
-            unit = below.strip()
-    found = factor(unit, standard, scale)
+    below = "" if unit else divided_by(scale)  # "2.5 Nm/V": the column holds V
+    found = factor(below, standard, scale) if below else None
+    if found is not None:
+        unit = below
+    else:  # "0.25 rad/s" divides by the second of its own unit
+        found = factor(unit, standard, scale)
     if found is None:
         raise UserError(_no_factor(standard, column, unit, scale))
     if found == 0.0:
@@ -81,7 +88,8 @@ def conversion(standard: str, column: str, unit: str, scale: str, offset: str) -
 def _no_factor(standard: str, column: str, unit: str, scale: str) -> str:
     quantity = BY_STANDARD[standard]
     usual = " or ".join(quantity.usual)
-    example = f"--scale '{quantity.name}=2.5 {quantity.usual[0]}/{unit or 'V'}'"
+    divisor = f"({unit})" if "/" in unit else unit or "V"
+    example = f"--scale '{quantity.name}=NUMBER {quantity.usual[0]}/{divisor}'"
     if expression(unit) and ratio(expression(unit), "newton") is not None:
         example = f"the lever arm, as in --scale '{quantity.name}={EXAMPLE_ARM}'"
     if scale:

@@ -42,11 +42,14 @@ class Header:
         As stated; nothing where no unit is.
     stated_twice : str
         A second unit, of another size, where the name and the file state two.
+    in_brackets : str
+        What brackets hold that is no unit that is known.
     """
 
     kind: str
     unit: str
     stated_twice: str = ""
+    in_brackets: str = ""
 
 
 def read_header(name: str, unit: str = "") -> Header:
@@ -91,7 +94,8 @@ def _own(name: str) -> Header:
                 return Header(kind, unit)
     if len(name.strip()) > 1 and expression(name) in _TIMES:
         return Header("time", name.strip())
-    return Header(_kind(name), "")
+    in_brackets = "" if bracketed is None else bracketed[2].strip()
+    return Header(_kind(name), "", in_brackets="" if expression(in_brackets) else in_brackets)
 
 
 def _is_whole(unit: str) -> bool:

@@ -137,6 +137,8 @@ def option_words(found: Inspection) -> list[str]:
         words += ["--table", options.table]
     if options.names:
         words += ["--names", ",".join(options.names)]
+    if options.missing:
+        words += ["--missing", options.missing]
     if options.rate_hz is not None:
         words += ["--rate-hz", f"{options.rate_hz:g}"]
     if options.reaction:

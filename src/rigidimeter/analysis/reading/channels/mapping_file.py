@@ -41,6 +41,7 @@ class MappingToml(Section):
     skip_rows: int = Field(0, ge=0, le=1_000_000)
     names: list[str] = Field(default_factory=list, max_length=2000)
     table: str = Field("", max_length=200)
+    missing: str = Field("", max_length=200)
     time: ColumnTable = ColumnTable()
     torque: ColumnTable = ColumnTable()
     angle: ColumnTable = ColumnTable()
@@ -77,6 +78,7 @@ def read_mapping(path: Path) -> ReadOptions:
             skip_rows=said.skip_rows,
             names=tuple(said.names),
             table=said.table,
+            missing=said.missing,
             units={name: table.unit for name, table in tables.items() if table.unit},
             scales={name: table.scale for name, table in tables.items() if table.scale},
             offsets={name: table.offset for name, table in tables.items() if table.offset},
@@ -97,6 +99,7 @@ def mapping_text(options: ReadOptions) -> str:
         "skip_rows": options.skip_rows or None,
         "names": options.names or None,
         "table": options.table or None,
+        "missing": options.missing or None,
         **{f"{label}_column": said.columns.get(label) for label in LABELS},
     }
     for one in QUANTITIES:

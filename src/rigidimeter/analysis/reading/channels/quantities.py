@@ -68,7 +68,7 @@ _WORDS: Mapping[str, str] = {
     "epoch": "trial trials block bloc bloque blocco blok run lauf segment sweep epoch epoche "
     "repetition rep wiederholung durchgang versuch essai prova ensayo poging",
     "no sample": "error err std sd sem quality status sequence flag limit request requested "
-    "acceleration beschleunigung",
+    "acceleration beschleunigung constant konstante",
 }
 _WORD: Mapping[str, str] = {word: kind for kind, text in _WORDS.items() for word in text.split()}
 _GREEK = str.maketrans({"θ": " theta ", "φ": " phi ", "ϕ": " phi ", "α": " alpha ",

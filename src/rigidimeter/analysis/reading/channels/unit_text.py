@@ -47,7 +47,17 @@ _SPELLED: Mapping[str, str] = {
     "volt": "V Volt volt volts",
     "millivolt": "mV",
     "microvolt": "uV µV",
-    "count": "count counts cts digits LSB",
+    "ampere": "A amp amps ampere amperes Ampere",
+    "milliampere": "mA",
+    "percent": "% percent",
+    "permille": "‰ permille",
+    "bar": "bar",
+    "pascal": "Pa",
+    "kilopascal": "kPa",
+    "hertz": "Hz",
+    "arcminute": "arcmin",
+    "arcsecond": "arcsec",
+    "count": "count counts cts digits LSB bit bits tick ticks raw",
 }
 _UNIT: Mapping[str, str] = {one: unit for unit, text in _SPELLED.items() for one in text.split()}
 _NEWTON_METER = re.compile(r"([munkcdM]?)N(m|cm|mm)", re.ASCII)
@@ -63,8 +73,10 @@ _WHOLE: Mapping[str, str] = {
     "FT-LBS": "foot*force_pound",
     "FT-LB": "foot*force_pound",
 }
+_RATIO_BELOW = re.compile(r"([^/()]+)/\s*\(([^/()]+)/([^/()]+)\)")
 _LONGEST = 40
-_ANGLES = ("radian", "degree", "turn", "grade", "revolutions_per_minute")
+_ANGLES = ("radian", "degree", "turn", "grade", "gon", "arcminute", "arcsecond",
+           "revolutions_per_minute")  # fmt: skip
 _NO_TORQUE = ("joule", "calorie", "electron_volt", "watt")
 
 
@@ -82,8 +94,10 @@ def expression(text: str) -> str:
 
     Examples
     --------
-    >>> expression("°/s"), expression("N.m"), expression("rad_s"), expression("raw")
+    >>> expression("°/s"), expression("N.m"), expression("rad_s"), expression("left")
     ('degree/(second)', 'newton*meter', 'radian/(second)', '')
+    >>> expression("Nm/(mV/V)")
+    'newton*meter*volt/(millivolt)'
     """
     text = text.strip().replace("º", "°").replace("μ", "µ").replace("⁻¹", "^-1")
     if not text or len(text) > _LONGEST:
@@ -92,6 +106,9 @@ def expression(text: str) -> str:
         return _WHOLE[text]
     text = re.sub(r"(?i)(?<=[\w°])[\s_]*\bper\b[\s_]*|_per_", "/", text)
     text = re.sub(r"^(rad|deg|mrad)_s$", r"\1/s", text)
+    nested = _RATIO_BELOW.fullmatch(text)
+    if nested:  # divided by a ratio is times its inverse
+        text = f"{nested[1]}·{nested[3]}/{nested[2]}"
     above: list[str] = []
     below: list[str] = []
     for index, part in enumerate(text.split("/")):
@@ -144,10 +161,12 @@ def factor(text: str, standard: str, scale: str = "") -> float | None:
     if not written and not times:
         return None
     units = registry()
-    unit = units.Unit(written or "dimensionless") * units.Unit(times or "dimensionless")
-    if unit.dimensionality != units.Unit(si).dimensionality or not _fits(unit, standard):
-        return None
-    return float(number * (1.0 * unit).to(si).magnitude)
+    own, more = units.Unit(written or "dimensionless"), units.Unit(times or "dimensionless")
+    is_share = own.dimensionless and (1.0 * own).to("").magnitude != 1.0
+    if is_share and _is(more, standard) and not _names(own) & _names(more):
+        return None  # 2.5 Nm of a column in %: for 1 %, or for 100?
+    unit = own * more
+    return float(number * (1.0 * unit).to(si).magnitude) if _is(unit, standard) else None
 
 
 def split_number(text: str) -> tuple[float, str | None]:
@@ -159,6 +178,19 @@ def split_number(text: str) -> tuple[float, str | None]:
     if not found[2]:
         return number, ""
     return number, expression(found[2]) or None
+
+
+def divided_by(scale: str) -> str:
+    """Return the unit by which a scale divides last, nothing where it divides by none.
+
+    Examples
+    --------
+    >>> divided_by("2.5 Nm/V"), divided_by("0.5 Nm/(mV/V)"), divided_by("20 deg/s/V")
+    ('V', 'mV/V', 'V')
+    """
+    found = re.fullmatch(r".*/\s*(?:\(([^()]+)\)|([^()/]+))\s*", scale)
+    unit = (found[1] or found[2]).strip() if found else ""
+    return unit if expression(unit) else ""
 
 
 def ratio(written: str, other: str) -> float | None:
@@ -178,9 +210,19 @@ def ratio(written: str, other: str) -> float | None:
     return float((1.0 * one).to(wanted).magnitude)
 
 
-def _fits(unit: pint.Unit, standard: str) -> bool:
-    """Tell apart what has one dimension: N·m and J, rad/s and Hz, rad and a bare number."""
-    parts = [str(name) for name, _ in (1.0 * unit).unit_items()]
+def _names(unit: pint.Unit) -> set[str]:
+    """Return the names of the units that a unit is made of."""
+    return {str(name) for name, _ in (1.0 * unit).unit_items()}
+
+
+def _is(unit: pint.Unit, standard: str) -> bool:
+    """Whether a unit is one of a channel.
+
+    What has one dimension is told apart: N·m and J, rad/s and Hz, rad and a bare number.
+    """
+    if unit.dimensionality != registry().Unit(BY_STANDARD[standard].si).dimensionality:
+        return False
+    parts = _names(unit)
     angular = [part for part in parts if part.endswith(_ANGLES)]
     if standard in ("angle_rad", "velocity_rad_s", "velocity_command_rad_s"):
         return len(angular) % 2 == 1

@@ -5,6 +5,7 @@ Rows are counted from 0; a stretch ends before its `stop`.
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.analysis.reading.channels.headers import read_header
 from rigidimeter.analysis.reading.channels.quantities import names_epochs
 from rigidimeter.analysis.reading.formats.columns import seconds
 from rigidimeter.analysis.reading.formats.gaps import Rows, longest_s
@@ -25,7 +27,10 @@ from rigidimeter.core.words import series
 
 ROWS_A_LABEL = 100
 """A column whose label changes more often, on average, is no column of trials."""
+MOST_LABELS = 12
+"""Of a column that is not named as trials are: states, conditions, phases."""
 _COMPLETE = 0.95
+_DECIMALS = re.compile(r"-?\d*[.,]\d+")
 
 
 @dataclass(frozen=True)
@@ -114,10 +119,14 @@ def by_length(source: str, clock: Rows, length_s: float) -> tuple[list[Stretch],
     return stretches, notices
 
 
-def unused_labels(table: Table, used: Collection[str], n_rows: int) -> list[Notice]:
-    """Return a warning for each unused column that numbers trials by its name and values.
+def unused_labels(
+    table: Table, used: Collection[str], n_rows: int, lacking: Collection[str]
+) -> list[Notice]:
+    """Return a warning for each unused column whose few values last long, as labels of rows do.
 
-    Columns whose labels change at the same rows have one warning.
+    A column that is named as trials are may have many. One of a measured quantity has a unit, a
+    name that says so, or values between whole numbers. Columns whose labels change at the same rows
+    have one warning.
 
     Parameters
     ----------
@@ -125,25 +134,38 @@ def unused_labels(table: Table, used: Collection[str], n_rows: int) -> list[Noti
     used : collection of str
         Columns that are used.
     n_rows : int
+    lacking : collection of str
+        Of ``epoch`` and ``condition``, those for which no column is used.
     """
     alike: dict[tuple[int, ...], dict[str, list[str]]] = {}
-    for name in (one for one in table.columns if one not in used and names_epochs(one)):
+    for name in (one for one in table.columns if one not in used):
+        trials = names_epochs(name)
+        header = read_header(name, table.units.get(name, ""))
         column = table.columns[name]
-        runs = _runs(column, n_rows // ROWS_A_LABEL) if column.size == n_rows else []
-        labels = [label for label, _, _ in runs if label]
-        if len(runs) > 1 and labels:
+        if column.size != n_rows or (not trials and (header.kind or header.unit)):
+            continue
+        runs = _runs(column, n_rows // ROWS_A_LABEL)
+        labels = list(dict.fromkeys(label for label, _, _ in runs if label))
+        few = len(labels) <= MOST_LABELS and not any(_DECIMALS.fullmatch(one) for one in labels)
+        if len(runs) > 1 and labels and (trials or few):
             alike.setdefault(tuple(start for _, start, _ in runs), {})[name] = labels
     notices = []
     for columns in alike.values():
         name, labels = next(iter(columns.items()))
+        options = [
+            f"--column {shlex.quote(f'{label}={name}')} {what}"
+            for label, what in (
+                ("epoch", "reads each of its labels as an epoch"),
+                ("condition", "takes its labels for conditions"),
+            )
+            if label in lacking and (label == "epoch" or not names_epochs(name))
+        ]
+        if not options:
+            continue
         shown = ", ".join(labels[:3]) + (", …" if labels[3:] else "")
         others = [repr(other) for other in columns if other != name]
         too = f", nor are {series(others)}, which change with it" if others else ""
-        option = shlex.quote(f"epoch={name}")
-        text = (
-            f"{table.source}: column {name!r} ({shown}) is not used{too}; --column {option} reads "
-            "each of its labels as an epoch"
-        )
+        text = f"{table.source}: column {name!r} ({shown}) is not used{too}; {series(options)}"
         notices.append(Notice("warning", text))
     return notices
 

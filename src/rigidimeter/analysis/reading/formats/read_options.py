@@ -47,6 +47,9 @@ class ReadOptions:
         Of the columns of a text that does not name them.
     table : str
         The sheet that is read, of a file with several.
+    missing : str
+        The numbers, with commas between them, that stand for lost samples of torque and motion;
+        ``none`` where no number does. Where nothing is given they are found.
 
     Raises
     ------
@@ -66,6 +69,7 @@ class ReadOptions:
     skip_rows: int = 0
     names: tuple[str, ...] = ()
     table: str = ""
+    missing: str = ""
 
     def __post_init__(self) -> None:
         positive = (
@@ -87,7 +91,23 @@ class ReadOptions:
             raise UserError(f"--skip-rows {self.skip_rows}: must be a whole number of at least 0")
         if self.task not in (None, *get_args(Task)):
             raise UserError(f"--task {self.task}: must be {' or '.join(get_args(Task))}")
-        _ = self.said  # refuses what is not a quantity
+        _ = self.missing_values, self.said  # refuses what is not a quantity
+
+    @cached_property
+    def missing_values(self) -> tuple[float, ...] | None:
+        """The numbers that stand for lost samples; None where they are to be found."""
+        if self.missing in ("", "none"):
+            return () if self.missing else None
+        try:
+            values = tuple(float(text) for text in self.missing.split(","))
+        except ValueError:
+            values = (math.nan,)
+        if not all(map(math.isfinite, values)):
+            raise UserError(
+                f"--missing {self.missing}: must be numbers with commas between them, as in "
+                "--missing 0,-999, or none"
+            )
+        return values
 
     @cached_property
     def said(self) -> Said:

@@ -50,8 +50,8 @@ from rigidimeter.core.files import (
 
 _DECIMAL_COMMA = re.compile(r"^(\s*[+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*)$")
 _CALIBRATION = re.compile(
-    r"(?i)\d\s*[\w·.*°]+\s*(?:/|per)\s*(?:m?V|counts?|digits?|LSB|bits?)\b"
-    r"|\d\s*(?:m?V|counts?|digits?|LSB|bits?)\s*(?:/|per)\s*[\w·.*°]+"
+    r"(?i)\d\s*[\w·.*°]+\s*(?:/|per)\s*(?:\(?m?V/V|m?[VA]|counts?|digits?|LSB|bits?)\b"
+    r"|\d\s*(?:m?[VA]|counts?|digits?|LSB|bits?)\s*(?:/|per)\s*[\w·.*°]+"
 )
 _SECONDS = re.compile(r"(?i)[^\[(]*[\[(]\s*s(?:ec)?\s*[\])](?: \(\d+\))?")
 _LABCHART = b"Interval="

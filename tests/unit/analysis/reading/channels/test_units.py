@@ -102,6 +102,14 @@ def test_a_unit_of_the_file_that_is_not_known_contradicts_the_name():
         ("N", "0.25 m", "", 4.0, 1.0),
         ("N", "25 cm", "", 4.0, 1.0),
         ("Nmm", "-1", "", 500.0, -0.5),
+        ("mV/V", "0.5 Nm/(mV/V)", "", 2.0, 1.0),
+        ("", "0.5 Nm/(mV/V)", "", 2.0, 1.0),
+        ("A", "0.62 Nm/A", "", 2.0, 1.24),
+        ("mA", "0.62 Nm/A", "", 2000.0, 1.24),
+        ("%", "0.03 Nm/%", "", 50.0, 1.5),
+        ("bar", "0.4 Nm/bar", "", 2.0, 0.8),
+        ("raw", "0.001 Nm", "", 500.0, 0.5),
+        ("Nm", "0.62", "", 2.0, 1.24),
     ],
 )
 def test_scale_and_offset(unit, scale, offset, raw, expected):
@@ -112,8 +120,12 @@ def test_scale_and_offset(unit, scale, offset, raw, expected):
 @pytest.mark.parametrize(
     ("unit", "scale", "offset", "told"),
     [
-        ("N", "", "", "say the lever arm, as in --scale 'torque=0.25 m'"),
-        ("V", "", "", "say --scale 'torque=2.5 Nm/V'"),
+        ("N", "", "", "say the lever arm, as in --scale 'torque=NUMBER m'"),
+        ("V", "", "", "say --scale 'torque=NUMBER Nm/V'"),
+        ("mV/V", "", "", r"say --scale 'torque=NUMBER Nm/\(mV/V\)'"),
+        ("mV/V", "0.5 Nm", "", "does not make Nm"),  # of 1 mV/V, or of its unit 0.001?
+        ("%", "2.5 Nm", "", "does not make Nm"),  # of 1 %, or of 100?
+        ("A", "2.5", "", "does not make Nm"),
         ("Nm", "2.5 Nm/V", "", "does not make Nm"),
         ("V", "0 Nm/V", "", "must not be 0"),
         ("V", "fast", "", "does not make Nm"),
@@ -124,3 +136,17 @@ def test_scale_and_offset(unit, scale, offset, raw, expected):
 def test_what_does_not_make_a_torque_is_refused(unit, scale, offset, told):
     with pytest.raises(UserError, match=told):
         conversion("torque_nm", "T", unit, scale, offset)
+
+
+def test_a_velocity_is_scaled_by_its_own_unit():
+    """The "/s" of rad/s is no column in seconds."""
+    assert conversion("velocity_rad_s", "speed", "", "0.25 rad/s", "").factor == 0.25
+    assert conversion("velocity_rad_s", "speed", "raw", "0.25 rad/s", "").factor == 0.25
+    per_volt = conversion("velocity_rad_s", "speed", "", "20 deg/s/V", "")
+    assert per_volt.factor == pytest.approx(np.radians(20.0))
+
+
+def test_what_brackets_hold_and_no_table_knows_is_named():
+    header = read_header("Torque [furlong]")
+    assert (header.kind, header.unit, header.in_brackets) == ("torque", "", "furlong")
+    assert read_header("Torque [A]").unit == "A"
