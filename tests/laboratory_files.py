@@ -16,6 +16,7 @@ from tests.dialects import (
     Dialect,
     csv,
 )
+from tests.known_joint import TRUTH
 
 T, M, D = TIME_S, TORQUE_NM, ANGLE_DEG
 HALF = T.size // 2
@@ -31,6 +32,24 @@ _BLOCK_HEAD = (
     "X_Dimension\tTime\tTime\t\nX0\t0.0E+0\t0.0E+0\t\nDelta_X\t0.005\t0.005\t\n"
     "***End_of_Header***\t\t\t\nX_Value\tTorque\tAngle\tComment"
 )
+
+
+LOST = np.random.default_rng(11).random(T.size) < 0.03
+
+
+def _with_pauses() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return time, torque and angle of 60 s at 50/s below 2 Hz, with 0.1 s missing now and then."""
+    rng = np.random.default_rng(12)
+    steps = 0.02 + 0.1 * (rng.random(2400) < 0.02)
+    time_s = np.cumsum(steps)
+    hz = np.arange(6, 120) / 60.0
+    phase, size = rng.uniform(0, 2 * np.pi, hz.size), 0.01 / (1 + hz)
+    at = 2 * np.pi * hz * time_s[:, None] + phase
+    angle, velocity, acceleration = (
+        np.sum(size * (2 * np.pi * hz) ** k * np.cos(at + k * np.pi / 2), axis=1) for k in range(3)
+    )
+    torque = TRUTH @ np.array([acceleration, velocity, angle])
+    return time_s, torque + 0.001 * rng.normal(size=time_s.size), np.degrees(angle)
 
 
 def _block(part: slice) -> bytes:
@@ -189,6 +208,52 @@ LABORATORY: Mapping[str, Dialect] = {
         "r.csv",
         csv("t [s],M [Nm],phi [deg]", T, M, np.where(np.arange(T.size) % 50, D + 340.0, 0.0)),
     ),
+    "a torque lost in single rows, written as 0": Dialect(
+        "r.csv", csv("t [s],M [Nm],phi [deg]", T, np.where(LOST, 0.0, M), D)
+    ),
+    "an angle lost in single rows, written as 0": Dialect(
+        "r.csv", csv("t [s],M [Nm],phi [deg]", T, M, np.where(LOST, 0.0, D))
+    ),
+    "a torque that overflows to -9.99": Dialect(
+        "r.csv",
+        csv("t [s],M [Nm],phi [deg]", T, np.where(np.isin(np.arange(T.size), (900, 2100, 3333)),
+            -9.99, M), D),
+    ),
+    "a torque of -999 after its unit was given": Dialect(
+        "r.csv",
+        csv("t [s],M,phi [deg]", T, np.where(LOST, -999.0, M), D),
+        {"unit": {"torque": "Nm"}},
+    ),
+    "an angle of 32767": Dialect(
+        "r.csv", csv("t [s],M [Nm],phi [deg]", T, M, np.where(LOST, 32767.0, D))
+    ),
+    "a bridge in mV/V": Dialect(
+        "r.csv", csv("t [s],torque cell [mV/V],phi [deg]", T, M / 0.5, D),
+        {"scale": {"torque": "0.5 Nm/(mV/V)"}},
+    ),
+    "a bridge in mV/V, of which the scale says nothing": Dialect(
+        "r.csv", csv("t [s],torque cell [mV/V],phi [deg]", T, M / 0.5, D),
+        {"scale": {"torque": "0.5 Nm"}}, refused="NUMBER Nm/(mV/V)",
+    ),
+    "a motor's current": Dialect(
+        "r.csv", csv("t [s],iq [A],phi [deg]", T, M / 0.62, D),
+        {"column": {"torque": "iq [A]"}, "scale": {"torque": "0.62 Nm/A"}},
+    ),
+    "a current of the axis q, and a constant": Dialect(
+        "r.csv",
+        csv("t [s],M [Nm],phi [deg],q-axis [A],torque constant [Nm/A]", T, M, D, M / 0.62, 0 * T),
+    ),
+    "a raw speed": Dialect(
+        "r.csv", csv("t [s],M [Nm],speed (raw)", T, M, VELOCITY_RAD_S / 0.25),
+        {"scale": {"velocity": "0.25 rad/s"}},
+    ),
+    "factors in the head": Dialect(
+        "r.csv",
+        csv("# torque cell: 1.7 Nm/V\n# goniometer: 20 deg/V\nt [s],torque (V),angle (V)",
+            T, M / 1.7, D / 20),
+        refused="--scale 'angle=20 deg/V' (as the file states)",
+    ),
+    "a slow motion with pauses": Dialect("r.csv", csv("t [s],M [Nm],phi [deg]", *_with_pauses())),
     "decimated after the rate of the head": Dialect(
         "r.csv",
         csv("# Sampling rate: 1000 Hz, decimated by 5 for export\ntorque [Nm],angle [rad]", M,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -184,8 +185,15 @@ class _Task(NamedTuple):
 def _answered(task: _Task, how: How, folder: Path | None) -> list[Row]:
     """Return the rows of an input; `folder` is what its path starts from, where that is not here.
 
-    Rows name the input as it was given.
+    Rows name the input as it was given. What an estimate computed refers to itself, so it is
+    collected here: a worker would keep some 17 MB of each recording.
     """
+    rows = _rows_of(task, how, folder)
+    gc.collect()
+    return rows
+
+
+def _rows_of(task: _Task, how: How, folder: Path | None) -> list[Row]:
     one = task.input
     if folder is None or one.path.is_absolute():
         return answer(one, task.digest, how)

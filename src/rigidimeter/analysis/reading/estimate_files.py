@@ -8,7 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import csv_text, plain_values, read_json, write_json, write_text
+from rigidimeter.core.files import (
+    ESTIMATES_BYTES,
+    csv_text,
+    json_text,
+    plain_values,
+    read_json,
+    size_text,
+    write_text,
+)
 from rigidimeter.core.findings import finding_from
 from rigidimeter.core.records import (
     AMPLITUDE,
@@ -54,8 +62,21 @@ def estimates_document(analysis: Analysis) -> dict[str, Any]:
 
 
 def write_estimates_json(path: Path, analysis: Analysis) -> None:
-    """Write the document of an analysis."""
-    write_json(path, estimates_document(analysis))
+    """Write the document of an analysis.
+
+    Raises
+    ------
+    UserError
+        If it would be larger than what is read back.
+    """
+    text = json_text(estimates_document(analysis))
+    size = len(text.encode())
+    if size > ESTIMATES_BYTES:
+        raise UserError(
+            f"{path}: {len(analysis.fits)} epochs take {size_text(size)} as JSON, and at most "
+            f"{size_text(ESTIMATES_BYTES)} are read; write them as CSV, or use `rigidimeter batch`"
+        )
+    write_text(path, text)
 
 
 def write_estimates_csv(path: Path, analysis: Analysis) -> None:
@@ -75,7 +96,7 @@ def read_estimates(path: Path) -> Analysis:
     UserError
         If the file is not such a document.
     """
-    document = read_json(path)
+    document = read_json(path, ESTIMATES_BYTES)
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema not in READ_SCHEMAS:
         raise UserError(f"{path}: schema is {schema!r}; expected {ESTIMATES_SCHEMA!r}")

@@ -32,6 +32,7 @@ from rigidimeter.core.files.size_limits import (
     BOOTSTRAP_COUNTS,
     CELLS,
     DOCUMENT_BYTES,
+    ESTIMATES_BYTES,
     EXPANDED_BYTES,
     EXPANSION,
     MAGNITUDE,

@@ -126,7 +126,7 @@ def read_bytes(path: Path, max_bytes: int) -> bytes:
     return content
 
 
-def read_json(path: Path) -> Any:
+def read_json(path: Path, largest: int = DOCUMENT_BYTES) -> Any:
     """Return what a JSON file holds.
 
     Raises
@@ -134,7 +134,7 @@ def read_json(path: Path) -> Any:
     UserError
         If the file cannot be read, is not JSON, or goes beyond `core.files.size_limits`.
     """
-    return parse_json(read_bytes(path, DOCUMENT_BYTES), str(path))
+    return parse_json(read_bytes(path, largest), str(path))
 
 
 def parse_json(data: bytes, source: str) -> Any:

@@ -19,6 +19,9 @@ TABLE_BYTES = 32 * MIB
 DOCUMENT_BYTES = 32 * MIB
 """Of a JSON file: 10,000 estimated epochs take 30 MB. Parsed, JSON takes up to 25 times as much."""
 
+ESTIMATES_BYTES = 512 * MIB
+"""Of estimates as JSON: 170,000 epochs; what is larger is not written."""
+
 SETTINGS_BYTES = 1 * MIB
 """Of a TOML file: all settings with their remarks take 20 kB."""
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 import scipy
@@ -189,12 +190,11 @@ def _grid(
     if stop_s - start_s > LONGEST_S:
         if (stop_s - start_s) / LONGEST_S > 1e4:
             return None
-        inside = (motion[0] >= start_s) & (motion[0] <= stop_s)
-        block = ((motion[0][inside] - start_s) // LONGEST_S).astype(int)
-        sizes = np.bincount(block)
+        minutes = start_s + LONGEST_S * np.arange((stop_s - start_s) // LONGEST_S + 2)
+        edges = np.searchsorted(motion[0], minutes)
         spread = [
-            np.std(motion[1][inside][block == k]) if sizes[k] >= FEWEST else 0.0
-            for k in range(sizes.size)
+            np.std(motion[1][begin:end]) if end - begin >= FEWEST else 0.0
+            for begin, end in pairwise(edges)
         ]
         start_s += LONGEST_S * int(np.argmax(spread))
         stop_s = min(stop_s, start_s + LONGEST_S)

@@ -25,19 +25,23 @@ _ROUNDING_S = 1e-6  # of stamps as large as the seconds since 1970
 
 @dataclass(frozen=True)
 class Rows:
-    """The clock of a table, and how much of the time up to each row is due to its gaps."""
+    """The clock of a table, and how much of the time up to each row is due to its gaps.
+
+    Intervals of up to `bridged_s` are none, however fast the samples are.
+    """
 
     time_s: NDArray[np.float64]
     step_s: float
     in_gaps_s: NDArray[np.float64]
+    bridged_s: float = 0.0
 
     @classmethod
-    def of(cls, time_s: NDArray[np.float64]) -> Rows:
+    def of(cls, time_s: NDArray[np.float64], bridged_s: float = 0.0) -> Rows:
         """Measure a clock of two or more stamps."""
         step_s = _typical_step_s(time_s)
         steps = np.diff(time_s)
-        excess = np.where(steps > longest_s(step_s), steps - step_s, 0.0)
-        return cls(time_s, step_s, np.concatenate(([0.0], np.cumsum(excess))))
+        excess = np.where(steps > longest_s(step_s, bridged_s), steps - step_s, 0.0)
+        return cls(time_s, step_s, np.concatenate(([0.0], np.cumsum(excess))), bridged_s)
 
 
 @dataclass(frozen=True)
@@ -86,9 +90,9 @@ class Break:
     lost: bool
 
 
-def longest_s(step_s: float) -> float:
+def longest_s(step_s: float, bridged_s: float = 0.0) -> float:
     """Return the longest interval that is bridged, for samples that are `step_s` apart."""
-    return max(_LONGEST_STEPS * step_s, _LONGEST_S) + _ROUNDING_S
+    return max(_LONGEST_STEPS * step_s, _LONGEST_S, bridged_s) + _ROUNDING_S
 
 
 def make_signal(name: str, clock: Rows, values: NDArray[np.float64]) -> Signal:
@@ -130,7 +134,7 @@ def find_losses(
         Loss(int(empty[k]), float(clock.time_s[before[k] + 1]), float(clock.time_s[after[k] - 1]))
         for k in np.flatnonzero(lossy)
     ]
-    limit_s = longest_s(signal.step_s)
+    limit_s = longest_s(signal.step_s, clock.bridged_s)
     breaks = [
         Break(
             signal.name,

@@ -32,8 +32,10 @@ from rigidimeter.analysis.reading.formats.gaps import (
     about_losses,
     find_losses,
     kept_rows,
+    longest_s,
     make_signal,
 )
+from rigidimeter.analysis.reading.formats.pauses import bridged_s
 from rigidimeter.analysis.reading.formats.read_options import ReadOptions
 from rigidimeter.analysis.reading.formats.table import Table, nearest
 from rigidimeter.core.errors import UserError
@@ -53,10 +55,11 @@ def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], 
     """
     read = channels_of_table(table, options)
     names, n_rows = read.names, read.time_s.size
-    clock = Rows.of(read.time_s)
+    clock, bridged = _clock(table.source, read)
     signals, notices = _signals(table.source, read, clock)
     _check_rate(table.source, names.get("time_s"), signals.values())
     labels = {name: _label_column(table, names[name], n_rows) for name in LABELS if name in names}
+    notices += bridged
     stretches, more = _stretches(table, clock, labels.get("epoch"), options.epoch_length_s)
     notices += more
     _check_epochs(table.source, len(stretches))
@@ -92,6 +95,31 @@ def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], 
             + (f" ({reasons.replace(f'{table.source}: ', '')})" if reasons else "")
         )
     return epochs, notices
+
+
+def _clock(source: str, read: TableChannels) -> tuple[Rows, list[Notice]]:
+    """Return the clock of the rows, and a warning where it pauses for less than the motion asks."""
+    clock = Rows.of(read.time_s)
+    shortest_s = longest_s(clock.step_s)
+    pauses = np.diff(read.time_s)
+    pauses = pauses[pauses > shortest_s]
+    if not pauses.size:
+        return clock, []
+    channels = [
+        (read.time_s[finite], values[finite])
+        for name in ("torque_nm", *MOTION)
+        if (values := read.values.get(name)) is not None
+        for finite in [np.isfinite(values)]
+    ]
+    longest = bridged_s(channels)
+    bridged = pauses[pauses <= longest]
+    if not bridged.size:
+        return clock, []
+    text = (
+        f"{source}: the clock pauses {bridged.size} times for up to {seconds(float(bridged.max()))}"
+        "; torque and motion are slow enough to be interpolated there"
+    )
+    return Rows.of(read.time_s, longest), [Notice("warning", text)]
 
 
 def _check_epochs(source: str, n_epochs: int) -> None:
