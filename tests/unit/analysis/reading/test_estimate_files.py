@@ -230,3 +230,10 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
         write_estimates_json(path, ANALYSIS)
     assert path.read_text() == "the older one"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_could_not_be_read_back_is_not_written(tmp_path, monkeypatch):
+    monkeypatch.setattr("rigidimeter.analysis.reading.estimate_files.ESTIMATES_BYTES", 2000)
+    with pytest.raises(UserError, match="2 epochs take .* KiB as JSON, and at most 1.95 KiB"):
+        write_estimates_json(tmp_path / "e.json", ANALYSIS)
+    assert not (tmp_path / "e.json").exists()
