@@ -25,6 +25,9 @@ ERROR_SHARE = 1e-3
 RELATIVE = 1e-4
 """For numbers without an error of their own."""
 
+ROUNDING = 1e-12
+"""What is smaller is the rounding of another processor: no answer is so small."""
+
 _P = re.compile(r"(^|_)p(_|$)")
 
 
@@ -93,7 +96,7 @@ def _same(key: str, old: Value, new: Value, row: Row) -> bool:
         return old == new
     if math.isnan(old) or math.isnan(new):
         return math.isnan(old) and math.isnan(new)
-    return abs(old - new) <= max(_tolerance(key, row), 1e-15)
+    return abs(old - new) <= max(_tolerance(key, row), ROUNDING)
 
 
 def _tolerance(key: str, row: Row) -> float:
