@@ -234,6 +234,6 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
 
 def test_what_could_not_be_read_back_is_not_written(tmp_path, monkeypatch):
     monkeypatch.setattr("rigidimeter.analysis.reading.estimate_files.ESTIMATES_BYTES", 2000)
-    with pytest.raises(UserError, match="2 epochs take .* KiB as JSON, and at most 1.95 KiB"):
+    with pytest.raises(UserError, match=r"2 epochs take .* KiB as JSON, and at most 1\.95 KiB"):
         write_estimates_json(tmp_path / "e.json", ANALYSIS)
     assert not (tmp_path / "e.json").exists()
