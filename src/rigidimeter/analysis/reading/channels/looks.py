@@ -193,7 +193,7 @@ def _grid(
         minutes = start_s + LONGEST_S * np.arange((stop_s - start_s) // LONGEST_S + 2)
         edges = np.searchsorted(motion[0], minutes)
         spread = [
-            np.std(motion[1][begin:end]) if end - begin >= FEWEST else 0.0
+            float(np.std(motion[1][begin:end])) if end - begin >= FEWEST else 0.0
             for begin, end in pairwise(edges)
         ]
         start_s += LONGEST_S * int(np.argmax(spread))
