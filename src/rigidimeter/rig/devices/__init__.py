@@ -72,6 +72,7 @@ from rigidimeter.rig.devices.cia402.state_words import (
     sdo_write_bytes,
     state_of,
     velocity_of,
+    velocity_torque_of,
 )
 from rigidimeter.rig.devices.composed import ComposedRig, Home
 from rigidimeter.rig.devices.enable_line import SerialEnableLine

@@ -102,7 +102,7 @@ def _message(index: int, identifier: int, mapped: tuple[int, ...]) -> tuple[Entr
 def dictionary(
     objectdictionary: Any,
     node_id: int,
-    rated_torque_mnm: int | None,
+    rated_torque_mnm: int | None = None,
     without: Collection[int] = (),
 ) -> Any:
     """Return the object dictionary, made with `canopen.objectdictionary`.

@@ -26,6 +26,7 @@ from rigidimeter.rig.devices import (
     sdo_write_bytes,
     state_of,
     velocity_of,
+    velocity_torque_of,
 )
 from rigidimeter.rig.devices.base import DeviceError
 from rigidimeter.rig.guard import Cause
@@ -100,6 +101,7 @@ def test_frames_are_little_endian_and_signed():
     assert position_of(bytes.fromhex("3706 FF FFFFFFFF")) == (0x0637, -1, -1)
     assert velocity_of(bytes.fromhex("00000080")) == -(2**31)
     assert inputs_of(bytes.fromhex("01000080")) == 0x80000001
+    assert velocity_torque_of(bytes.fromhex("00010000 FFFF")) == (256, -1)
     assert emergency(bytes.fromhex("3081 11 0000000000")) == (0x8130, 0x11)
 
 
@@ -123,6 +125,20 @@ def test_a_frame_of_the_wrong_length_is_none(decode, length):
 )
 def test_an_emergency_of_another_length_is_an_emergency(data, found):
     assert emergency(bytes.fromhex(data)) == found
+
+
+@pytest.mark.parametrize("length", [0, 4, 5, 7, 8])
+def test_a_frame_of_velocity_and_torque_has_six_bytes(length):
+    assert velocity_torque_of(bytes(length)) is None
+
+
+def test_the_torque_is_in_the_velocity_frame_and_nothing_else_changes():
+    kept = {(o.index, o.subindex): o.value for o in objects(Cia402Settings())}
+    found = {(o.index, o.subindex): o.value for o in objects(Cia402Settings(), True)}
+    assert {at: found[at] for at in found if found[at] != kept.get(at)} == {
+        (0x1A01, 0): 2,
+        (0x1A01, 2): 0x6077_0010,
+    }
 
 
 def test_an_expedited_write_is_as_cia_301_writes_it():

@@ -95,6 +95,58 @@ def test_what_does_not_fit_is_named(tmp_path, without, changes, label, found):
         commission(None, eds=tmp_path / "drive.eds")
 
 
+TORQUE = {
+    (0x6076, 0): ("0x7", "ro", 0),
+    (0x6077, 0): ("0x3", "ro", 1),
+    (0x1A01, 2): ("0x7", "rw", 0),
+}
+
+
+def with_torque(path, without=(), **changes):
+    """Add the objects of the drive's torque to an EDS."""
+    text = path.read_text()
+    for address, (kind, access, mappable) in TORQUE.items():
+        index, subindex = address
+        if index in without:
+            continue
+        section = f"{index:04X}sub{subindex}" if subindex else f"{index:04X}"
+        keys = {"ParameterName": "torque", "ObjectType": "0x7", "DataType": kind}
+        keys |= {"AccessType": access, "PDOMapping": mappable}
+        keys |= changes.get(f"o{index:04X}", {})
+        text += f"[{section}]\n" + "".join(f"{k}={v}\n" for k, v in keys.items()) + "\n"
+    path.write_text(text)
+    return path
+
+
+def rows(path, **settings):
+    return {row.label: row for row in compare_eds(path, Cia402Settings(**settings))}
+
+
+def test_a_drive_that_reports_its_torque_has_it_in_the_velocity_frame(tmp_path):
+    found = rows(with_torque(eds(tmp_path)))
+    assert all(row.fits for row in found.values())
+    assert found["0x6077:00 in a frame"] == ("0x6077:00 in a frame", True, "16 bits", "16 bits")
+    assert "velocity frame's entry 2 (0x1A01:02)" in found
+    assert "0x6077:00 in a frame" not in rows(tmp_path / "drive.eds", reads_torque=False)
+
+
+@pytest.mark.parametrize(
+    ("change", "label", "found"),
+    [
+        ({"without": (0x6076,)}, "motor rated torque (0x6076:00)", "no such object"),
+        ({"without": (0x6077,)}, "actual torque (0x6077:00)", "no such object"),
+        ({"without": (0x1A01,)}, "velocity frame's entry 2 (0x1A01:02)", "no such sub-index"),
+        ({"o6077": {"PDOMapping": 0}}, "0x6077:00 in a frame", "16 bits, not to be mapped"),
+        ({"o6077": {"DataType": "0x4"}}, "0x6077:00 in a frame", "32 bits"),
+    ],
+)
+def test_a_drive_without_its_torque_fits_and_says_what_lacks(tmp_path, change, label, found):
+    path = with_torque(eds(tmp_path), **change)
+    assert wrong(path) == {}
+    assert rows(path)[label] == (label, True, found, "optional")
+    assert "0x6077:00 in a frame" not in rows(path) or label == "0x6077:00 in a frame"
+
+
 def test_a_fixed_mapping_fits_if_it_is_what_is_needed(tmp_path):
     fixed = {
         f"o{o.index:04X}_{o.subindex}": {"AccessType": "const", "DefaultValue": o.value}

@@ -45,6 +45,7 @@ from rigidimeter.rig.devices.cia402.state_words import (
     sdo_write_bytes,
     state_of,
     velocity_of,
+    velocity_torque_of,
 )
 
 COMMUNICATION = (0x81, 0x82)
@@ -80,7 +81,7 @@ class NodeBus:
         self._repeats_s = math.inf  # when a stop is sent again, or what it did is asked for
         self._asks_state = False
         self._position: int | None = None
-        self._velocity: int | None = None
+        self._velocity: tuple[int, int] | None = None  # and torque
         self._beaten_s = -math.inf
         self.statusword = 0
         self.seen_bits = 0
@@ -92,6 +93,10 @@ class NodeBus:
         self.mode = 0
         self.raw = (0, 0)
         """Position and velocity of the last complete measurement, in the drive's units."""
+        self.has_torque = False
+        """Whether the velocity frame is mapped with the torque in it."""
+        self.torque = 0
+        """Torque of the last complete measurement, in thousandths of the rated torque."""
         self.sequence = 0
         """Number of complete measurements received."""
         self.measured_s = -math.inf
@@ -258,7 +263,7 @@ class NodeBus:
             if self._expected(self._position is None):
                 self._position = position
         elif identifier == ids.velocity:
-            velocity = velocity_of(data)
+            velocity = self._velocity_in(data)
             if velocity is None:
                 return False
             if self._expected(self._velocity is None):
@@ -277,13 +282,20 @@ class NodeBus:
         else:
             return True
         if self._position is not None and self._velocity is not None:
-            self.raw = (self._position, self._velocity)
+            self.raw = (self._position, self._velocity[0])
+            self.torque = self._velocity[1]
             self.measured_s = self.sync_s
             self.asked_s = math.inf
             self.sequence += 1
             self.counts["received"] += 1
             self._close_question()
         return True
+
+    def _velocity_in(self, data: bytearray) -> tuple[int, int] | None:
+        if self.has_torque:
+            return velocity_torque_of(data)
+        velocity = velocity_of(data)
+        return None if velocity is None else (velocity, 0)
 
     def _expected(self, first: bool) -> bool:
         """Return whether a frame is the first of its kind since a SYNC of ours, and note others."""

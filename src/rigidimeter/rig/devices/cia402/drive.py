@@ -2,10 +2,10 @@
 
 Before the loop, SDO transfers write the settings and read them back. The loop waits for no SDO and
 has no threads: each `write` sends a SYNC and the command, the drive answers every SYNC with its
-state, position and velocity, and the next `read` receives them. `write` also sends the heartbeat
-that keeps the drive enabled. If the loop hangs, the heartbeat ends with it, and the drive stops by
-itself: by its heartbeat watchdog (0x1016), and sooner by its command deadline (0x1400:05) if it has
-one.
+state, position, velocity and, if it can, torque, and the next `read` receives them. `write` also
+sends the heartbeat that keeps the drive enabled. If the loop hangs, the heartbeat ends with it, and
+the drive stops by itself: by its heartbeat watchdog (0x1016), and sooner by its command deadline
+(0x1400:05) if it has one.
 
 The drive gets bounds of its own, if `bound` was called (see `drive_bounds`): they are written by
 `configure` and again by `enable`, since the position limits are those about where the joint stands.
@@ -33,6 +33,7 @@ from rigidimeter.rig.devices.bounds import (
 )
 from rigidimeter.rig.devices.cia402.bus import NodeBus
 from rigidimeter.rig.devices.cia402.drive_bounds import ask_drive, wanted_bounds, write_bounds
+from rigidimeter.rig.devices.cia402.drive_torque import FACT, find_rated_torque, is_in_frame
 from rigidimeter.rig.devices.cia402.power_up_sequence import FAULTS, power_up, reset_fault
 from rigidimeter.rig.devices.cia402.sdo_transfers import (
     read_back,
@@ -60,6 +61,7 @@ from rigidimeter.rig.devices.cia402.state_words import (
     POWERED,
     SLIPPED,
     TICK_FRAMES,
+    TICK_FRAMES_WITH_TORQUE,
     Cia402State,
     Control,
     Nmt,
@@ -93,8 +95,8 @@ class Cia402Drive:
         )
         self._wire = NodeBus(settings, now, self._who)
         self._scale = scale(settings)
-        self._objects = objects(settings)
-        self._readable = (*self._objects, displayed_mode(settings))
+        self._expect(objects(settings))
+        self._nm_per_permille = math.nan  # of the drive's torque; NaN where it is not read
         self._bounds: DriveBounds | None = None
         self._tight: Tight | None = None
         self._slips = False  # the drive has a bound of the slippage
@@ -110,6 +112,11 @@ class Cia402Drive:
         self._settled_s = -math.inf
         self._cause = Cause.NONE
         self._sample = MotionSample(math.nan, math.nan, -math.inf, cause=int(Cause.DRIVE_LOST))
+
+    def _expect(self, written: tuple[Object, ...]) -> None:
+        """Take these objects as those that are written, and read back at each `enable`."""
+        self._objects = written
+        self._readable = (*written, displayed_mode(self._settings))
 
     @property
     def counts(self) -> Mapping[str, int]:
@@ -156,12 +163,18 @@ class Cia402Drive:
             refuse_two_nodes(sdo, who)
             identity = {entry.name: read_object(sdo, entry, who) for entry in IDENTITY}
             firmware, name = read_text(sdo, 0x100A, who), read_text(sdo, 0x1008, who)
-            absent = [entry for entry in self._objects if not write_object(sdo, entry, who)]
+            rated_nm, no_torque = find_rated_torque(sdo, settings, who)
+            absent = self._write(sdo, with_torque=bool(rated_nm))
+            if rated_nm and not is_in_frame(sdo, settings, who):
+                rated_nm, no_torque = 0.0, "not available: not taken into the velocity frame"
+                absent = self._write(sdo, with_torque=False)
             read_object(sdo, inputs(settings), who)
             entries = self._write_bounds(sdo)
             found = read_back(sdo, (*self._readable, *entries), who)
         self._wire.network(Nmt.START)
         self._configured = True
+        self._wire.has_torque = bool(rated_nm)
+        self._nm_per_permille = rated_nm / 1000.0 if rated_nm else math.nan
         watchdogs = [settings.drive_watchdog_s]
         if settings.command_deadline_s > 0 and not any(entry.index == 0x1400 for entry in absent):
             watchdogs.append(settings.command_deadline_s)
@@ -172,6 +185,7 @@ class Cia402Drive:
         values.update({f"{BOUND_FACT} {name}": words for name, _, words, _ in self.bounds})
         if settings.button_bit >= 0:
             values["button_bit"] = settings.button_bit
+        values.update({FACT: no_torque} if no_torque else {"rated_torque_nm": abs(rated_nm)})
         values["braking_rad_s2"] = min(ramps) / self._scale.units_per_rad_s2
         return DeviceFacts(
             model=name or f"vendor {identity['vendor']}, product {identity['product']}",
@@ -180,6 +194,11 @@ class Cia402Drive:
             watchdog_s=min(watchdogs),
             values=values,
         )
+
+    def _write(self, sdo: Any, with_torque: bool) -> list[Object]:
+        """Write every setting; return the optional ones that the drive does not have."""
+        self._expect(objects(self._settings, with_torque))
+        return [entry for entry in self._objects if not write_object(sdo, entry, self._who)]
 
     def reset_fault(self) -> None:
         """Reset a fault at the operator's request; the drive stays without power.
@@ -258,6 +277,7 @@ class Cia402Drive:
                 wire.measured_s,
                 wire.sequence,
                 wire.raw,
+                drive_torque_nm=wire.torque * self._nm_per_permille,
             )
         status = wire.emergency << 16 | wire.statusword
         cause = self._cause if wire.sequence else Cause.DRIVE_LOST
@@ -371,7 +391,8 @@ class Cia402Drive:
             )
 
     def _tick_frames(self) -> tuple[int, ...]:
-        return (*TICK_FRAMES, INPUTS_BYTES) if self._settings.button_bit >= 0 else TICK_FRAMES
+        tick = TICK_FRAMES_WITH_TORQUE if self._wire.has_torque else TICK_FRAMES
+        return (*tick, INPUTS_BYTES) if self._settings.button_bit >= 0 else tick
 
     def _require_configured(self) -> None:
         self._configured = self._configured and not self._wire.booted

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import io
 import logging
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import TABLE_BYTES, read_bytes
+from rigidimeter.rig.devices.cia402.drive_torque import FACT, torque_entries, torque_objects
 from rigidimeter.rig.devices.cia402.sdo_transfers import library
 from rigidimeter.rig.devices.cia402.setup import (
     IDENTITY,
@@ -59,15 +61,32 @@ def compare_eds(path: Path, settings: Cia402Settings) -> list[EdsMatch]:
         ) from None
     if 0x1000 not in described:
         raise UserError(f"{path}: is no EDS: it must have a section [1000], as every node has")
+    lacking = _lacking_torque(described, settings)
     # What is written last remains.
-    last = {(entry.index, entry.subindex): entry for entry in objects(settings)}
+    last = {(entry.index, entry.subindex): entry for entry in objects(settings, lacking is None)}
     found = [_written(entry, described) for entry in last.values()]
+    found += [] if lacking is None else [lacking]
     found += [_read(entry, described) for entry in (IDENTITY[0], displayed_mode(settings))]
     return found + [
         _mapped(entry, described)
         for entry in last.values()
         if entry.index & 0xFE00 in (0x1600, 0x1A00) and entry.subindex and _free(entry, described)
     ]
+
+
+def _lacking_torque(described: Any, settings: Cia402Settings) -> EdsMatch | None:
+    """Return why the drive's own torque is not read, None if it is."""
+    if not settings.reads_torque:
+        return EdsMatch(FACT, True, "reads_torque is false", "optional")
+    read = (replace(entry, optional=False) for entry in torque_objects(settings))
+    entries = torque_entries(settings)
+    needed = [_read(entry, described) for entry in read]
+    needed += [_written(replace(entry, optional=False), described) for entry in entries]
+    needed += [
+        _mapped(entry, described) for entry in entries if entry.subindex and _free(entry, described)
+    ]
+    first = next((match for match in needed if not match.fits), None)
+    return first and first._replace(fits=True, needed="optional")
 
 
 def _free(entry: Object, described: Any) -> bool:

@@ -35,8 +35,9 @@ class Cia402Settings(Section):
     `interface` and `channel` are those of python-can; some interfaces number their channels.
     `bitrate` is that of the bus; with socketcan the operating system sets it, and here it only
     limits the loop rate. `port` is used by udp_multicast alone. `axis_offset` and `axis_subindex`
-    are those of the axis, 0 for a drive of one. `command_deadline_s` 0 means no command deadline; a
-    drive without one still has its heartbeat watchdog.
+    are those of the axis, 0 for a drive of one. `reads_torque` false leaves the drive's own torque
+    out of its answers, where the bus is too slow for it. `command_deadline_s` 0 means no command
+    deadline; a drive without one still has its heartbeat watchdog.
 
     The default decelerations are above the default `guard.acceleration_limit_deg_s2`, since the
     guard relies on a drive that brakes at least that fast; commissioning compares the two.
@@ -62,6 +63,7 @@ class Cia402Settings(Section):
     acceleration_units_per_rev_s2: float = quantity(8192.0, "unit/(rev/s²)", 1e-3, 2.0**31)
     gear_ratio: float = quantity(100.0, "1", 1e-3, 1e5)
     sign: Literal[1, -1] = 1
+    reads_torque: bool = True
     zero_counts: int = quantity(0, "counts", -(2**31), 2**31 - 1)
     max_velocity_rad_s: float = quantity(4.0, "rad/s", 0.0, 100.0, above=True)
     acceleration_rad_s2: float = quantity(60.0, "rad/s²", 0.0, 1e4, above=True)
@@ -182,8 +184,11 @@ IDENTITY = tuple(
 """Read, never written."""
 
 
-def objects(settings: Cia402Settings) -> tuple[Object, ...]:
-    """Return the objects to write, in order; if one is written twice the last value remains."""
+def objects(settings: Cia402Settings, with_torque: bool = False) -> tuple[Object, ...]:
+    """Return the objects to write, in order; if one is written twice the last value remains.
+
+    `with_torque` adds the drive's torque to the velocity frame.
+    """
     units = scale(settings)
     ids = frames(settings.node_id)
     watchdog_ms = round(settings.drive_watchdog_s * 1e3)
@@ -208,7 +213,7 @@ def objects(settings: Cia402Settings) -> tuple[Object, ...]:
         of_axis("abort-connection option", 0x6007, 2, settings.abort_option, signed=True),
         Object("drive's heartbeat in ms", 0x1017, 0, 2, round(settings.heartbeat_s * 1e3)),
         Object("heartbeat watchdog", 0x1016, 1, 4, settings.master_id << 16 | watchdog_ms),
-        *_messages(settings, ids, round(settings.command_deadline_s * 1e3)),
+        *_messages(settings, ids, round(settings.command_deadline_s * 1e3), with_torque),
     )
 
 
@@ -231,7 +236,9 @@ def is_pressed(settings: Cia402Settings, levels: int) -> bool:
     return bit >= 0 and levels >> bit & 1 == settings.button_pressed_level
 
 
-def _messages(settings: Cia402Settings, ids: Frames, deadline_ms: int) -> tuple[Object, ...]:
+def _messages(
+    settings: Cia402Settings, ids: Frames, deadline_ms: int, with_torque: bool
+) -> tuple[Object, ...]:
     """Return the PDO mapping: one command frame, two answers to every SYNC, and no others."""
 
     def mapped(*entries: tuple[int, int]) -> tuple[int, ...]:
@@ -243,7 +250,7 @@ def _messages(settings: Cia402Settings, ids: Frames, deadline_ms: int) -> tuple[
 
     command = mapped((0x6040, 16), (0x60FF, 32))
     position = mapped((0x6041, 16), (0x6061, 8), (0x6064, 32))
-    velocity = mapped((0x606C, 32))
+    velocity = mapped((0x606C, 32), *([(0x6077, 16)] if with_torque else []))
     deadline = Object(
         *("command deadline in ms", 0x1400, 5, 2, deadline_ms),
         optional=True,
@@ -254,7 +261,7 @@ def _messages(settings: Cia402Settings, ids: Frames, deadline_ms: int) -> tuple[
         # A command takes effect when it arrives (255), a measurement is taken at every SYNC (1).
         *_message("command frame", 0x1400, ids.command, 255, command, (deadline,)),
         *_message("position frame", 0x1800, ids.position, 1, position),
-        *_message("velocity frame", 0x1801, ids.velocity, 1, velocity),
+        *_message("velocity frame", 0x1801, ids.velocity, 1, velocity, needed=1),
         *(button if settings.button_bit >= 0 else ()),
         *(
             Object(
@@ -286,8 +293,12 @@ def _message(
     transmission: int,
     entries: tuple[int, ...],
     more: tuple[Object, ...] = (),
+    needed: int | None = None,
 ) -> tuple[Object, ...]:
-    """Return the steps in which CiA 301 allows a mapping to change: off, emptied, filled, on."""
+    """Return the steps in which CiA 301 allows a mapping to change: off, emptied, filled, on.
+
+    A drive need not have room for more than the first `needed` entries.
+    """
     fixed = partial(Object, fixed=True)
     identifier = fixed(f"{name}'s identifier", index, 1, 4, id_, mask=~NO_REMOTE_REQUEST)
     count = fixed(f"{name}'s number of entries", index + 0x200, 0, 1, len(entries))
@@ -296,7 +307,10 @@ def _message(
         fixed(f"{name}'s transmission type", index, 2, 1, transmission),
         *more,
         replace(count, value=0),
-        *(fixed(f"{name}'s entry {k}", index + 0x200, k, 4, e) for k, e in enumerate(entries, 1)),
+        *(
+            fixed(f"{name}'s entry {k}", index + 0x200, k, 4, e, optional=k > (needed or k))
+            for k, e in enumerate(entries, 1)
+        ),
         count,
         identifier,
     )

@@ -30,7 +30,7 @@ SYNC_ID = 0x080
 BOOTED, STOPPED, OPERATIONAL, PRE_OPERATIONAL = 0x00, 0x04, 0x05, 0x7F
 """NMT states in a node's heartbeat."""
 
-TICK_FRAMES = (6, 0, 7, 4)
+TICK_FRAMES, TICK_FRAMES_WITH_TORQUE = (6, 0, 7, 4), (6, 0, 7, 6)
 """Data bytes of the frames of one tick: command, SYNC, position, velocity."""
 
 INPUTS_BYTES = 4
@@ -169,7 +169,7 @@ def frames(node_id: int) -> Frames:
 
 _COMMAND = struct.Struct("<Hi")
 _POSITION = struct.Struct("<Hbi")
-_VELOCITY = struct.Struct("<i")
+_VELOCITY, _VELOCITY_TORQUE = struct.Struct("<i"), struct.Struct("<ih")
 _EMERGENCY = struct.Struct("<HB")
 _SDO = struct.Struct("<BHBI")
 _INPUTS = struct.Struct("<I")
@@ -193,6 +193,11 @@ def velocity_of(data: bytes | bytearray) -> int | None:
 def inputs_of(data: bytes | bytearray) -> int | None:
     """Return the digital inputs of their frame, None if it is damaged."""
     return int(_INPUTS.unpack(data)[0]) if len(data) == _INPUTS.size else None
+
+
+def velocity_torque_of(data: bytes | bytearray) -> tuple[int, int] | None:
+    """Return velocity and torque of a velocity frame with both, None if it is damaged."""
+    return _VELOCITY_TORQUE.unpack(data) if len(data) == _VELOCITY_TORQUE.size else None
 
 
 class Emergency(NamedTuple):
