@@ -108,7 +108,8 @@ PASSED_ON = {
 
 
 def test_every_misbehaviour_has_its_test():
-    others = {"ignores quick stop", "torque frozen"}  # the second in test_drive_torque
+    # The last in test_drive_torque.
+    others = {"ignores quick stop", "short emergency", "torque frozen"}
     assert set(CIA402_MISBEHAVIOURS) == {*CAUSES, *REFUSED, *PASSED_ON, *others}
 
 
