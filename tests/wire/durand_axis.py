@@ -127,6 +127,9 @@ class DurandAxis:
     def value(self, index: int, subindex: int = 0) -> int:
         return int(self._objects.read(index, subindex))
 
+    def has(self, index: int) -> bool:
+        return index in OBJECTS
+
     def emergency(self, code: int, register: int) -> None:
         self._node.emcy.set(code, register)
 

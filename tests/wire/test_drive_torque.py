@@ -84,12 +84,12 @@ class SmallFrames(Cia402Emulator):
 
     entry_refused = 0x06040042
 
-    def _on_write(self, index: int, data: bytes, **more: Any) -> None:
-        if index == 0x1A01 and more["subindex"] > 1:
+    def _on_write(self, index: int, subindex: int, data: bytes, **more: Any) -> None:
+        if index == 0x1A01 and subindex > 1:
             raise self._abort(self.entry_refused)
-        if index == 0x1A01 and more["subindex"] == 0 and data[0] > 1:
+        if index == 0x1A01 and subindex == 0 and data[0] > 1:
             raise self._abort(0x06040042)
-        super()._on_write(index, data, **more)
+        super()._on_write(index, subindex, data, **more)
 
 
 class NoSecondEntry(SmallFrames):
