@@ -25,8 +25,8 @@ def commission(
     ),
     yes: bool = OPTIONS.flag(
         "--yes",
-        "Consent to every motion in advance. Checks that need a person are skipped, so the "
-        "record is valid for an emulated rig only.",
+        "Consent to every motion in advance, for an emulated rig only. Checks that need a person "
+        "are skipped.",
     ),
     known_torque: float | None = OPTIONS.option(
         "--known-torque-nm NM",
@@ -80,6 +80,11 @@ def commission(
     if not rigfile.emulated and not signed_by.strip():
         raise UserError(
             f"{rig}: is real hardware; name the person responsible for it with --signed-by NAME"
+        )
+    if yes and not rigfile.emulated:
+        raise UserError(
+            f"{rig}: is real hardware; somebody must check that nobody's arm is in it and "
+            "answer, so leave out --yes"
         )
     asked = operator(yes=yes, known_torque_nm=known_torque, known_angle_deg=known_angle)
     with claimed(rigfile, chosen, path, "commission again", asked) as setup:

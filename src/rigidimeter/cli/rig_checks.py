@@ -8,6 +8,7 @@ import queue
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -20,9 +21,9 @@ from rigidimeter.cli.terminal_tables import Table
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings
 from rigidimeter.rig.acquisition import DeadlineClock
-from rigidimeter.rig.acquisition.processes import prepare_loop_process
+from rigidimeter.rig.acquisition.processes import LoneSupervision, prepare_loop_process
 from rigidimeter.rig.commissioning import Operator, RigCheck, Setup, Timebase
-from rigidimeter.rig.console import QUESTION
+from rigidimeter.rig.console import BEAT, QUESTION
 from rigidimeter.rig.devices import RigFile
 
 
@@ -54,17 +55,21 @@ def operator(
         Whether everything is consented to in advance, with nobody present.
     piped : bool
         Whether another program asks somebody: each question is a line that begins with
-        `rig.console.QUESTION`, its answer the line ``yes`` or anything else. When that
-        program is gone the check is ended as by SIGTERM.
+        `rig.console.QUESTION`, its answer the line ``yes`` or anything else. The line
+        `rig.console.BEAT`, some twenty times a second, says that somebody is there: the rig stops
+        where it is missing. When that program is gone the check is ended as by SIGTERM.
     known_torque_nm, known_angle_deg : float, optional
         As an `Operator` has them.
     """
     ask: Callable[[str], bool] = partial(typer.confirm, default=False, err=True)
+    seen_ns = None
     if yes:
         ask = _consent
     elif piped:
-        ask = _Piped().ask
-    return Operator(ask, partial(echo, err=True), not yes, known_torque_nm, known_angle_deg)
+        there = _Piped()
+        ask, seen_ns = there.ask, there.seen_ns
+    say = partial(echo, err=True)
+    return Operator(ask, say, not yes, known_torque_nm, known_angle_deg, seen_ns)
 
 
 def _consent(_: str) -> bool:
@@ -72,9 +77,10 @@ def _consent(_: str) -> bool:
 
 
 class _Piped:
-    """Questions and answers as lines; the end of the input ends the process."""
+    """Questions, answers and beats as lines; the end of the input ends the process."""
 
     def __init__(self) -> None:
+        self._seen_ns = time.monotonic_ns()
         self._answers: queue.SimpleQueue[str] = queue.SimpleQueue()
         threading.Thread(target=self._listen, name="answers", daemon=True).start()
 
@@ -82,11 +88,18 @@ class _Piped:
         echo(f"{QUESTION}{question}", err=True)
         return self._answers.get() == "yes"
 
+    def seen_ns(self) -> int:
+        """Return when somebody was last known to be there."""
+        return self._seen_ns
+
     def _listen(self) -> None:
         # Not through `sys.stdin`, whose lock a thread must not hold when the program ends.
         with os.fdopen(os.dup(sys.stdin.fileno()), "rb", buffering=0) as answers:
             for line in answers:
-                self._answers.put(line.decode(errors="replace").strip())
+                self._seen_ns = time.monotonic_ns()
+                text = line.decode(errors="replace").strip()
+                if text != BEAT:
+                    self._answers.put(text)
         os.kill(os.getpid(), signal.SIGTERM)
 
 
@@ -108,16 +121,24 @@ def claimed(
     clock = DeadlineClock()
     with rigfile.claim() as lock, interrupted_once(record, again):
         rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, lock=lock)
-        yield Setup(rig, settings, Timebase(clock.now_s, clock.wait_until), asked)
+        limits = settings.loop
+        supervise = partial(
+            LoneSupervision,
+            asked.seen_ns,
+            console_lost_s=limits.console_lost_s,
+            stall_s=limits.stall_s,
+        )
+        yield Setup(rig, settings, Timebase(clock.now_s, clock.wait_until), asked, supervise)
 
 
 @contextlib.contextmanager
 def interrupted_once(record: Path | None, again: str) -> Iterator[None]:
-    """Let Ctrl-C, Ctrl-\\, SIGTERM and the end of the terminal end it, once; say what that left.
+    """Let Ctrl-C, Ctrl-\\, Ctrl-Z, SIGTERM and the end of the terminal end it, once.
 
     A second one would break off the steps that bring the drive to rest and take its power away.
     """
-    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+    # A stopped program (Ctrl-Z) would leave the last command in force.
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
     before = {}
 
     def ended(_: int, __: FrameType | None) -> None:

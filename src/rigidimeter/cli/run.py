@@ -21,7 +21,14 @@ def run(
     ),
     seed: int | None = SEED,
     unattended: bool = RUN.flag(
-        "--unattended", "Run without an operator. What would pause the session ends it instead."
+        "--unattended",
+        "Run without an operator. What would pause the session ends it instead; hardware also "
+        "needs --confirm.",
+    ),
+    confirm: str = RUN.option(
+        "--confirm TEXT",
+        'The words "nobody in the rig". With --unattended on hardware; recorded.',
+        "",
     ),
     priority: int = PRIORITY,
     cpu: int | None = CPU,
@@ -52,6 +59,7 @@ def run(
       rigidimeter run protocol.toml --rig rig.toml --out session
       rigidimeter run --resume session --rig rig.toml --out session-2
     """
+    from rigidimeter.cli.attendance import attendance
     from rigidimeter.cli.planned_session import (
         checked_rig,
         conclude,
@@ -88,9 +96,9 @@ def run(
         conclude(led, out, rig, nwb=False)
         return
     planned = checked_rig(planned, rig)
-    attended = not unattended and sys.stdin is not None and sys.stdin.isatty()
+    attended, confirmed = attendance(rig, unattended=unattended, confirm=confirm)
     shown = planned.shown(virtual=rig is None)
-    realtime = Realtime(priority=priority, cpu=cpu, attended=attended)
+    realtime = Realtime(priority=priority, cpu=cpu, attended=attended, confirmed=confirmed)
     with terminal_view(sys.stdin if attended else None, sys.stdout, shown) as console:
         ended = run_planned(planned, out, rig, realtime, console)
     for remark in ended.remarks:

@@ -32,10 +32,18 @@ def test_a_record_that_cannot_be_written_is_refused_before_the_trials(rigidimete
         (tmp_path / "folder", "cannot be written (it is a folder)"),
         (rig, "is read or written already"),
     ):
-        ran = rigidimeter("commission", "--rig", rig, "--out", out, "--yes")
+        signed = ("--signed-by", "A. Weber")
+        ran = rigidimeter("commission", "--rig", rig, "--out", out, *signed)
         assert ran.status == 1
         assert words in ran.err
     assert rig.read_text() == HARDWARE
+
+
+def test_hardware_does_not_move_by_a_consent_that_nobody_gave(rigidimeter, tmp_path):
+    rig = tmp_path / "RIG.toml"
+    rig.write_text(HARDWARE)
+    ran = rigidimeter("commission", "--rig", rig, "--yes", "--signed-by", "A. Weber")
+    assert (ran.status, "is real hardware; somebody must check" in ran.err) == (1, True)
 
 
 @pytest.mark.parametrize("value", [0.0, float("nan"), float("inf")])
@@ -44,7 +52,9 @@ def test_a_known_torque_that_tells_nothing_is_refused(value):
         _check_known({"--known-torque-nm": value})
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP]
+)
 def test_who_interrupts_twice_does_not_break_off_the_stopping(tmp_path, number):
     before, steps = signal.getsignal(number), []
     record = tmp_path / "record.json"

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import asdict
 from types import SimpleNamespace
 
 import pytest
 
+from rigidimeter.cli.attendance import attendance
 from rigidimeter.cli.page_session import lead_session
 from rigidimeter.cli.realtime_rig import HOME_TOLERANCE_RAD
 from rigidimeter.core.errors import UserError
@@ -83,7 +85,10 @@ def resume(tmp_path, rigidimeter):
         rig = tmp_path / "rig.toml"
         rig.write_text(RIG)
         with pytest.raises(BuiltError):
-            rigidimeter("run", "--resume", tmp_path / "s", "--rig", rig, "--out", tmp_path / "n")
+            rigidimeter(
+                *("run", "--resume", tmp_path / "s", "--rig", rig, "--out", tmp_path / "n"),
+                *("--unattended", "--confirm", "nobody in the rig"),
+            )
 
     return run
 
@@ -98,6 +103,67 @@ def test_a_session_that_began_nowhere_leaves_the_home_to_the_rig_file(seen, resu
     resume(None)
     assert seen.home is None
     assert "origin_rad" not in seen.continues
+
+
+EMULATED = """
+[torque_sensor]
+driver = "ati-rdt"
+address = "127.0.0.1"
+[drive]
+driver = "cia402"
+interface = "virtual"
+channel = "test"
+"""
+
+
+@pytest.mark.parametrize(
+    ("rig", "terminal", "options", "there"),
+    [
+        (None, False, {}, (False, "")),
+        (None, True, {}, (True, "")),
+        (None, True, {"unattended": True}, (False, "")),
+        (EMULATED, False, {}, (False, "")),
+        (EMULATED, False, {"unattended": True}, (False, "")),
+        (RIG, True, {}, (True, "")),
+        (RIG, False, {}, "the input is no terminal, so nobody could stop it"),
+        (RIG, False, {"unattended": True}, '--unattended needs --confirm "nobody in the rig"'),
+        (RIG, False, {"unattended": True, "confirm": "yes"}, "not 'yes', and that it is so"),
+        (
+            RIG,
+            False,
+            {"unattended": True, "confirm": "Nobody  in the rig"},
+            (False, "nobody in the rig"),
+        ),
+        (RIG, True, {"confirm": "nobody in the rig"}, "goes with --unattended alone"),
+    ],
+)
+def test_hardware_moves_with_somebody_there_or_where_it_is_written_that_nobody_is_in_it(
+    tmp_path, monkeypatch, rig, terminal, options, there
+):
+    monkeypatch.setattr("rigidimeter.cli.attendance.at_terminal", lambda: terminal)
+    path = None
+    if rig is not None:
+        path = tmp_path / "rig.toml"
+        path.write_text(rig)
+    asked = {"unattended": False, "confirm": "", **options}
+    if isinstance(there, str):
+        with pytest.raises(UserError, match=re.escape(there)):
+            attendance(path, **asked)
+    else:
+        assert attendance(path, **asked) == there
+
+
+@pytest.mark.parametrize("typed", ["nobody in the rig", "n"])
+def test_at_a_terminal_it_is_typed(tmp_path, monkeypatch, typed):
+    monkeypatch.setattr("rigidimeter.cli.attendance.at_terminal", lambda: True)
+    monkeypatch.setattr("typer.prompt", lambda *_, **__: typed)
+    path = tmp_path / "rig.toml"
+    path.write_text(RIG)
+    if typed == "n":
+        with pytest.raises(UserError, match="and that it is so"):
+            attendance(path, unattended=True, confirm="")
+    else:
+        assert attendance(path, unattended=True, confirm="") == (False, "nobody in the rig")
 
 
 @pytest.mark.parametrize(("outcome", "status"), [("success", 0), ("fail", 1)])

@@ -34,6 +34,7 @@ from rigidimeter.rig.acquisition.run_states import (
 from rigidimeter.rig.acquisition.session_run import SessionResult, run_session
 from rigidimeter.rig.acquisition.stop_remedies import REMEDIES, SUSPENDED
 from rigidimeter.rig.acquisition.stop_report import Found, Latched, StopReport, report_stop
+from rigidimeter.rig.acquisition.supervision import NoSupervision, Supervision
 from rigidimeter.rig.acquisition.tick import (
     REST,
     ControlLoop,

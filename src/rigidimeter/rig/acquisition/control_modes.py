@@ -14,10 +14,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 from rigidimeter.core.settings import LONGEST_STEP, ControllerSettings
 from rigidimeter.model import admittance_step, minimum_jerk, tracking_step
+from rigidimeter.rig.acquisition.decision import STALLED
 from rigidimeter.rig.acquisition.run_states import Order
 from rigidimeter.rig.acquisition.tick import (
     REST,
@@ -200,10 +202,21 @@ def _brake_rad_s(loop: ControlLoop) -> float:
 def _ramp_unrecorded(loop: ControlLoop) -> None:
     """Only write: what else a tick does has failed."""
     # The ramp takes its time, however late the failure made it.
-    loop.tick += max(ticks_late(loop), 0)
+    late = max(ticks_late(loop), 0)
+    loop.tick += late
+    if max(late, loop.elapsed_ticks - 1) >= loop.stall_ticks or _was_suspended(loop):
+        # As in `decide`: a drive with a watchdog has stopped, and must not be set going again.
+        loop.guard = loop.guard._replace(velocity_rad_s=0.0)
+        loop.rig.write(0.0)
     while (velocity := loop.guard.velocity_rad_s) != 0.0:
         velocity = math.copysign(max(abs(velocity) - _brake_rad_s(loop), 0.0), velocity)
         loop.guard = loop.guard._replace(velocity_rad_s=velocity)
         loop.clock.wait_until(loop.time_s)
         loop.rig.write(velocity)
         loop.tick += 1
+
+
+def _was_suspended(loop: ControlLoop) -> bool:
+    with suppress(Exception):  # it may be what has failed
+        return loop.supervision.cause(loop.time_s) == STALLED
+    return False

@@ -20,7 +20,13 @@ from numpy.typing import NDArray
 
 from rigidimeter.core.session import Sample
 from rigidimeter.core.settings import CommissioningSettings, Settings
-from rigidimeter.rig.acquisition import ControlLoop, control_modes, ramp_to_rest
+from rigidimeter.rig.acquisition import (
+    ControlLoop,
+    NoSupervision,
+    Supervision,
+    control_modes,
+    ramp_to_rest,
+)
 from rigidimeter.rig.devices.base import DeviceError, Now, Reading, Rig
 from rigidimeter.rig.guard import Cause, Reaction
 
@@ -74,6 +80,9 @@ class Operator:
     known_torque_nm, known_angle_deg : float or None
         A torque that hands or a weight put on the joint, toward positive angles; an angle by which
         hands turn the joint.
+    seen_ns : callable or None
+        When somebody was last known to be there, in nanoseconds of CLOCK_MONOTONIC; None where a
+        terminal's signals say that somebody has gone.
     """
 
     ask: Callable[[str], bool]
@@ -81,6 +90,7 @@ class Operator:
     present: bool = True
     known_torque_nm: float | None = None
     known_angle_deg: float | None = None
+    seen_ns: Callable[[], int] | None = None
 
 
 @dataclass(frozen=True)
@@ -96,12 +106,16 @@ class Setup:
     time : Timebase
         Of the same clock that the drivers have.
     operator : Operator
+    supervise : callable
+        Gives each trial what is asked at every tick of it: somebody must be there while the rig may
+        move.
     """
 
     rig: Rig
     settings: Settings
     time: Timebase
     operator: Operator
+    supervise: Callable[[], Supervision] = NoSupervision
 
     @property
     def limits(self) -> CommissioningSettings:
@@ -197,7 +211,7 @@ def trial(setup: Setup, *stretches: Stretch, spread: float = 0.0) -> TrialResult
         rig.enable()
         _empty(setup)
         here: Any = _Shifted(setup, setup.time.now() + 1.0 / setup.rate_hz, spread)
-        loop = ControlLoop(settings, here, here, samples.append)
+        loop = ControlLoop(settings, here, here, samples.append, supervision=setup.supervise())
         try:
             for stretch in stretches:
                 stretch(loop)

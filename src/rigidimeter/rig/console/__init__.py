@@ -23,6 +23,8 @@ from rigidimeter.rig.console.session_progress import (
 )
 from rigidimeter.rig.console.stop_keys import KEYS_HERE, NO_KEYS, StopKeys, stop_keys
 from rigidimeter.rig.console.terminal import (
+    BEAT,
+    BEAT_S,
     LEAVE,
     QUESTION,
     KeyView,

@@ -36,6 +36,12 @@ from rigidimeter.rig.console.session_progress import SessionPlan
 QUESTION = "question: "
 """With which a command begins a line that somebody must answer."""
 
+BEAT = "beat"
+"""The line by which a program that leads a command says that somebody is there."""
+
+BEAT_S = 0.05
+"""So often it says so."""
+
 LEAVE = b"\x1b[0m\n"
 LEAVE_S = 0.5
 """For so long it is tried to end the line on a terminal that takes no output."""

@@ -170,3 +170,24 @@ def test_a_ramp_takes_both_signs_and_ends_at_zero():
         ticks = len(samples)
         ramp_to_rest(loop)  # at rest already: nothing is sent
         assert len(samples) == ticks
+
+
+@pytest.mark.parametrize("how", ["suspended", "before the tick", "in the tick"])
+def test_no_ramp_goes_on_from_the_velocity_before_the_computer_stood_still(how):
+    """A signal that waited ends the tick, and the drive has long stopped by itself."""
+    stalled = {20: SETTINGS.loop.stall_s + 0.0005}
+    desk = Desk({20: Cause.STALLED} if how == "suspended" else {})
+    loop, _ = made(SETTINGS, desk=desk, late=stalled if how == "before the tick" else {})
+    run_ticks(loop, 1, 20, constant(2.0))
+    before = len(written(loop))
+    assert loop.rig.velocity_rad_s > 10 * CHANGE_RAD_S
+
+    def fails(elapsed_ticks=1):
+        if how == "in the tick":
+            loop.clock.late.update(stalled)
+        raise KeyboardInterrupt
+
+    loop.rig.read = fails
+    with pytest.raises(KeyboardInterrupt):
+        ramp_to_rest(loop)
+    assert set(written(loop)[before:]) == {0.0}

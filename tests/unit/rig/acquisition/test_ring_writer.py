@@ -8,6 +8,8 @@ import pytest
 from rigidimeter.core.session import Sample
 from rigidimeter.rig.acquisition import NOTHING, Run, State
 from rigidimeter.rig.acquisition.processes import (
+    Flag,
+    LoneSupervision,
     ProcessCondition,
     RingSink,
     Role,
@@ -197,3 +199,44 @@ def test_a_loop_held_up_twice_as_it_begins_was_not_suspended(shared):
     )
     assert not held_up
     assert supervision.cause(0.0) == Cause.NONE
+
+
+@pytest.mark.parametrize("flag", [Flag.END_ASKED, Flag.ABORT_ASKED])
+def test_a_signal_does_not_hide_that_the_computer_was_suspended(shared, flag):
+    """By its cause the ramp would begin at the velocity before, which the drive has long left."""
+    shared.status.raise_flag(flag)
+    now_ns = boot_ns = START_NS
+    supervision = SharedSupervision(shared, now_ns=lambda: now_ns, boot_ns=lambda: boot_ns)
+    boot_ns += 1000 * MS
+    assert supervision.cause(0.0) == Cause.STALLED
+
+
+def lone(**options):
+    clock = {"now": START_NS, "boot": START_NS, "seen": START_NS}
+    options.setdefault("operator_seen_ns", lambda: clock["seen"])
+    return clock, LoneSupervision(
+        now_ns=lambda: clock["now"], boot_ns=lambda: clock["boot"], **options
+    )
+
+
+def test_a_check_stops_where_nobody_says_that_somebody_is_there():
+    clock, supervision = lone(console_lost_s=0.5)
+    clock["now"] += 500 * MS
+    clock["boot"] += 500 * MS
+    assert supervision.cause(0.0) == Cause.NONE
+    clock["now"] += 1
+    assert supervision.cause(0.0) == Cause.CONSOLE_LOST
+    assert supervision.measured == pytest.approx(0.5)
+    clock["seen"] = clock["now"]
+    assert supervision.cause(0.0) == Cause.NONE
+    assert (supervision.order(), supervision.attended) == (NOTHING, False)
+
+
+def test_a_check_at_a_terminal_needs_no_beats_but_notices_a_suspension():
+    clock, supervision = lone(operator_seen_ns=None, stall_s=0.1)
+    clock["now"] += 10_000 * MS
+    clock["boot"] += 10_100 * MS
+    assert supervision.cause(0.0) == Cause.NONE
+    clock["boot"] += 1
+    assert supervision.cause(0.0) == Cause.STALLED
+    assert supervision.measured == pytest.approx(0.1)

@@ -15,6 +15,7 @@ import pytest
 
 from rigidimeter.core.settings import CommissioningSettings, Settings, parse_settings
 from rigidimeter.model import JointDynamics
+from rigidimeter.rig.acquisition import NoSupervision, Supervision
 from rigidimeter.rig.commissioning import (
     CommissioningRecord,
     Operator,
@@ -255,6 +256,7 @@ def commissioned(settings: Settings, fake_rig: Callable[..., FakeRig]) -> Commis
         tables: Mapping[str, Any] | None = None,
         emulated: bool = False,
         signed_by: str = "A. Weber",
+        supervise: Callable[[], Supervision] = NoSupervision,
         **faults: Any,
     ) -> CommissioningRecord:
         rig, file, timebase, world = fake_rig(joint, noise_sd_nm, emulated, faults)
@@ -266,7 +268,7 @@ def commissioned(settings: Settings, fake_rig: Callable[..., FakeRig]) -> Commis
             known_angle_deg=known_angle_deg,
         )
         return commission_rig(
-            Setup(rig, chosen, timebase, operator),
+            Setup(rig, chosen, timebase, operator, supervise),
             file,
             made_utc="2026-01-01T00:00:00+00:00",
             software="0",

@@ -10,7 +10,7 @@ from tests.unit.rig.commissioning.conftest import at_hand
 
 from rigidimeter.core.settings import Settings, SubjectSettings, changed_settings, parse_settings
 from rigidimeter.planning import prbs_nm
-from rigidimeter.rig.acquisition import ControlLoop, SimulatedClock, perturb
+from rigidimeter.rig.acquisition import ControlLoop, NoSupervision, SimulatedClock, perturb
 from rigidimeter.rig.commissioning import A_PERSON_TELLS, as_measured
 from rigidimeter.rig.devices import SimulatedRig
 from rigidimeter.rig.guard import Cause
@@ -30,6 +30,25 @@ def test_a_healthy_rig_passes_and_its_numbers_are_right(commissioned: Any) -> No
     assert record.numbers["torque_delay_s"] == pytest.approx(0.02, abs=2e-3)
     assert record.numbers["bandwidth_hz"] == pytest.approx(50.0, rel=0.05)
     assert set(record.not_tried) == {"known torque", "known angle"}
+
+
+class Leaves(NoSupervision):
+    """Somebody who is there for the first ticks of each trial."""
+
+    def __init__(self, ticks: int) -> None:
+        self.ticks = ticks
+
+    def cause(self, now_s: float) -> int:
+        self.ticks -= 1
+        return int(Cause.NONE if self.ticks >= 0 else Cause.CONSOLE_LOST)
+
+
+def test_a_trial_stops_where_nobody_is_there_any_more(commissioned: Any) -> None:
+    """By the word of the program that leads it: a page that is gone, a server that hangs."""
+    record = commissioned(supervise=lambda: Leaves(20))
+    assert not record.passed
+    assert any(Cause.CONSOLE_LOST.sentence in check.words for check in record.failed)
+    assert "bandwidth_hz" not in record.numbers
 
 
 def test_a_flag_answers_for_nobody(commissioned: Any) -> None:

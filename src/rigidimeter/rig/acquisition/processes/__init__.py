@@ -8,6 +8,7 @@ from rigidimeter.rig.acquisition.processes.end_signals import (
     signals_are_orders,
 )
 from rigidimeter.rig.acquisition.processes.live_estimate import Estimator
+from rigidimeter.rig.acquisition.processes.lone_supervision import LoneSupervision
 from rigidimeter.rig.acquisition.processes.loop_process import LoopSide, Realtime
 from rigidimeter.rig.acquisition.processes.lsl_streams import streamer_main
 from rigidimeter.rig.acquisition.processes.orphaned_memory import complete_left

@@ -40,6 +40,8 @@ class Realtime:
         Whether J, B and K are estimated while the session runs.
     attended : bool
         Whether an operator is there who can go on after a hold.
+    confirmed : str
+        What was written where nobody is: that nobody is in the rig. Recorded.
     """
 
     priority: int = 80
@@ -47,6 +49,7 @@ class Realtime:
     lock_memory: bool = True
     live_estimate: bool = True
     attended: bool = True
+    confirmed: str = ""
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,9 @@ def loop_main(
         attended=realtime.attended,
         console_pid=console_pid,
     )
+
+    if not realtime.attended:
+        sink.event("unattended", time_s=0.0, confirmed=realtime.confirmed)
 
     def ready() -> Prepared:
         shared.touch()

@@ -138,7 +138,7 @@ class RingSink:
         self.event("session_ended", time_s=time_s, outcome=outcome, reason=reason)
 
 
-_boot_ns: Nanoseconds = partial(time.clock_gettime_ns, CLOCK_BOOTTIME)
+boot_ns: Nanoseconds = partial(time.clock_gettime_ns, CLOCK_BOOTTIME)
 
 
 class SharedSupervision:
@@ -180,7 +180,7 @@ class SharedSupervision:
         attended: bool = True,
         console_pid: int = 0,
         now_ns: Nanoseconds = time.monotonic_ns,
-        boot_ns: Nanoseconds = _boot_ns,
+        boot_ns: Nanoseconds = boot_ns,
     ) -> None:
         self.attended = attended
         self.measured = math.nan

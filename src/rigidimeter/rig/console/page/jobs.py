@@ -15,16 +15,13 @@ from html import escape
 from pathlib import Path
 
 from rigidimeter.core.settings import Settings
-from rigidimeter.rig.console import QUESTION
+from rigidimeter.rig.console import BEAT, BEAT_S, QUESTION
 from rigidimeter.rig.console.page.rig_steps import RigStep
 
 LONGEST_S = 300.0
 
 NICENESS = 10
 """Of a command that computes: a session that is started beside it comes first."""
-
-POLL_S = 0.1
-"""How often it is looked whether a command is to be ended."""
 
 RigSteps = Callable[[Settings, Path | None], tuple[RigStep, ...]]
 
@@ -123,7 +120,8 @@ class Jobs:
         on_question : callable
             Takes a question; True is consent.
         going_on : callable
-            Whether it may go on. If not it is told to end, and stops the rig as it does so.
+            Whether it may go on: it is told so some twenty times a second, and stops the rig where
+            it does not hear it. If not it is told to end, and stops the rig as it does so.
         """
         lines: list[str] = []
         async with self._one:
@@ -133,7 +131,7 @@ class Jobs:
                 stdout=asyncio.subprocess.PIPE,
                 stderr=asyncio.subprocess.STDOUT,
             )  # fmt: skip
-            watch = asyncio.create_task(_end_when(process, going_on))
+            watch = asyncio.create_task(_beat_while(process, going_on))
             try:
                 assert process.stdout is not None
                 async for raw in process.stdout:
@@ -164,9 +162,12 @@ async def _answer(process: asyncio.subprocess.Process, asked: Awaitable[bool]) -
     ended.cancel()
 
 
-async def _end_when(process: asyncio.subprocess.Process, going_on: Callable[[], bool]) -> None:
+async def _beat_while(process: asyncio.subprocess.Process, going_on: Callable[[], bool]) -> None:
+    """Tell a command that somebody is there as long as that is so, then to end."""
     while going_on():
-        await asyncio.sleep(POLL_S)
+        if process.stdin is not None and not process.stdin.is_closing():
+            process.stdin.write(f"{BEAT}\n".encode())
+        await asyncio.sleep(BEAT_S)
     with suppress(ProcessLookupError):
         process.terminate()
 

@@ -5,14 +5,22 @@ import sys
 
 import pytest
 
+from rigidimeter.rig.console import BEAT
 from rigidimeter.rig.console.page import QUESTION, CommandResult, Jobs, jobs
 
 ASKS = f"""
 import sys
 print("first", flush=True)
 print({QUESTION!r} + "go on?", flush=True)
-print("answer", sys.stdin.readline().strip(), flush=True)
-sys.stdin.readline()
+print("answer", next(line for line in sys.stdin if line != {BEAT!r} + "\\n").strip(), flush=True)
+for line in sys.stdin: pass
+"""
+
+COUNTS = f"""
+import sys
+for _ in range(3): assert sys.stdin.readline() == {BEAT!r} + "\\n"
+print("three beats", flush=True)
+for line in sys.stdin: pass
 """
 
 
@@ -53,6 +61,14 @@ def test_a_command_that_may_not_go_on_is_ended_though_nobody_answers(monkeypatch
     answer, said = converse(monkeypatch, ASKS, asked, lambda _: not asked_for)
     assert said == ["first"]
     assert not answer.good
+
+
+def test_a_command_that_moves_the_rig_is_told_again_and_again_that_somebody_is_there(monkeypatch):
+    async def asked(_):
+        raise AssertionError
+
+    _, said = converse(monkeypatch, COUNTS, asked, lambda said: not said)
+    assert said == ["three beats"]
 
 
 def test_an_answer_names_no_folder_that_is_gone_and_no_markup():
