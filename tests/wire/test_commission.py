@@ -26,7 +26,7 @@ from rigidimeter.rig.commissioning import (
     record_path,
     write_record,
 )
-from rigidimeter.rig.devices import load_rig
+from rigidimeter.rig.devices import LOST, load_rig
 
 pytest.importorskip("can")
 pytest.importorskip("canopen")
@@ -101,6 +101,9 @@ def test_a_healthy_can_rig_passes_with_an_operator(can_bench: Any) -> None:
     assert failed == []
     assert record.passed
     assert record.not_tried == ()
+    shown = {c.name: c.words for c in record.checks if c.name.startswith("bound of")}
+    print(f"\n{shown}")
+    assert list(shown) == [f"bound of the {name}" for name in LOST]
     assert record.numbers["angle_per_command"] == pytest.approx(1.0, abs=0.02)
     assert record.numbers["bandwidth_hz"] == pytest.approx(50.0, rel=0.3)
     assert 0.0 <= record.numbers["torque_delay_s"] < 0.03
@@ -154,6 +157,17 @@ def test_a_torque_of_the_wrong_sign_is_caught(can_bench: Any, tmp_path: Path) ->
     rig = changed(can_bench.rig, tmp_path, '"ati-rdt"', '"ati-rdt"\nsign = 1')
     _, failed = tried(rig, settings(250.0))
     assert failed == ["torque against motion"]
+
+
+def test_bounds_that_sleep_are_written_and_not_shown(can_bench: Any) -> None:
+    can_bench.misbehave("drive", "bound sleeps", 0x607D)
+    record, failed = tried(can_bench.rig, settings(250.0))
+    assert failed == []
+    checks = {c.name: c for c in record.checks if c.name.startswith("bound of")}
+    assert [name for name, c in checks.items() if not c.passed] == ["bound of the position"]
+    assert checks["bound of the position"].words == "written, not shown"
+    assert "bound of the position" in record.not_tried
+    assert abs(can_bench.state()["angle_rad"]) < 0.01
 
 
 def test_an_angle_of_the_wrong_sign_is_caught(can_bench: Any) -> None:

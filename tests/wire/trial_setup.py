@@ -7,7 +7,7 @@ from typing import Any
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.rig.acquisition import DeadlineClock
 from rigidimeter.rig.commissioning import Operator, Setup, Timebase
-from rigidimeter.rig.devices import RigFile
+from rigidimeter.rig.devices import RigFile, drive_bounds
 
 
 def settings(rate_hz: float, **tables: Any) -> Settings:
@@ -30,5 +30,6 @@ def settings(rate_hz: float, **tables: Any) -> Settings:
 
 def setup(rigfile: RigFile, chosen: Settings, operator: Operator, **options: Any) -> Setup:
     clock = DeadlineClock()
-    rig = rigfile.build(clock.now_s, chosen.rig.tick_rate_hz, **options)
+    bounds = drive_bounds(chosen)
+    rig = rigfile.build(clock.now_s, chosen.rig.tick_rate_hz, bounds=bounds, **options)
     return Setup(rig, chosen, Timebase(clock.now_s, clock.wait_until), operator)

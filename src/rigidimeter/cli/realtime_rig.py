@@ -49,7 +49,7 @@ def run_loop(
         return
     # What is slow to load is loaded before the sensor's samples flow.
     from rigidimeter.rig.commissioning import check_record, require_daily_check
-    from rigidimeter.rig.devices import Home, load_rig
+    from rigidimeter.rig.devices import Home, drive_bounds, load_rig
 
     rigfile = load_rig(rig_path)
     home = Home(home_rad, HOME_TOLERANCE_RAD) if home_rad is not None else None
@@ -61,7 +61,8 @@ def run_loop(
         return commissioned.not_tried
 
     with rigfile.claim() as lock:
-        rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, home, lock)
+        bounds = drive_bounds(settings)
+        rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, home, lock, bounds)
         _run(settings, protocol, rig, lambda _: {}, clock, side, approve)
 
 

@@ -24,7 +24,7 @@ from rigidimeter.rig.acquisition import DeadlineClock
 from rigidimeter.rig.acquisition.processes import LoneSupervision, prepare_loop_process
 from rigidimeter.rig.commissioning import Operator, RigCheck, Setup, Timebase
 from rigidimeter.rig.console import BEAT, QUESTION
-from rigidimeter.rig.devices import RigFile
+from rigidimeter.rig.devices import RigFile, drive_bounds
 
 
 def require_answers(*, yes: bool, piped: bool = False) -> None:
@@ -120,7 +120,8 @@ def claimed(
         echo(line, err=True)
     clock = DeadlineClock()
     with rigfile.claim() as lock, interrupted_once(record, again):
-        rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, lock=lock)
+        bounds = drive_bounds(settings)
+        rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, lock=lock, bounds=bounds)
         limits = settings.loop
         supervise = partial(
             LoneSupervision,

@@ -146,6 +146,7 @@ class EmulatedRig:
 
     def rig_toml(self) -> str:
         """Return the contents of a rig file for this rig."""
+        side = self.arm.drive_side
         if self._kind == "ascii":
             drive = (
                 f'driver = "ascii"\nport = "{self.drive.port}"\n'
@@ -157,6 +158,8 @@ class EmulatedRig:
                 f'interface = "udp_multicast"\nchannel = "{MULTICAST_GROUP}"\n'
                 f"port = {self._bus['port']}\n"
                 "acceleration_rad_s2 = 150.0\ndeceleration_rad_s2 = 150.0\n"
+                f"reflected_inertia_kg_m2 = {side.reflected_inertia_kg_m2}\n"
+                f"friction_nm = {side.friction_nm}\n"
                 # The emulators are threads of one process and reply later than a servo would.
                 "command_deadline_s = 0.1\nlost_s = 0.15\n"
             )

@@ -26,7 +26,7 @@ from rigidimeter.rig.commissioning.sealed_record import (
     read_sealed,
     write_sealed,
 )
-from rigidimeter.rig.devices import RigFile
+from rigidimeter.rig.devices import BOUND_FACT, RigFile
 
 KIND = RecordKind(
     "rigidimeter.commissioning/1",
@@ -199,7 +199,11 @@ def stable_facts(facts: Mapping[str, Any]) -> dict[str, Any]:
             "model": found["model"],
             "serial": found["serial"],
             "watchdog_s": found["watchdog_s"],
-            "values": {k: v for k, v in found["values"].items() if k not in VOLATILE},
+            "values": {
+                k: v
+                for k, v in found["values"].items()
+                if k not in VOLATILE and not k.startswith(BOUND_FACT)
+            },
         }
         for role, found in facts.items()
     }

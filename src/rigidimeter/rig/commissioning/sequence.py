@@ -5,6 +5,7 @@
     a small move                 does it move at all as told
     a swing, and quick steps     directions, scales, delays, bandwidth, margins
     a known torque               by hand
+    bounds in the drive          each tightened, in a slow move
     silence                      watchdog
     emergency stop
 
@@ -20,6 +21,7 @@ from typing import Any
 
 from rigidimeter.core.settings import Settings
 from rigidimeter.model import Margins, loop_stability, near_instability
+from rigidimeter.rig.commissioning.bound_trials import bound_checks
 from rigidimeter.rig.commissioning.checks import RigCheck, impossible, with_unit, yes
 from rigidimeter.rig.commissioning.commissioning_record import (
     CommissioningRecord,
@@ -127,6 +129,7 @@ def _try_all(setup: Setup, found: CheckResults, facts: Mapping[str, Any]) -> Non
         found.refrain("the motions went wrong; put that right first")
         return
     found.checks.append(known_torque(setup))
+    found.checks += bound_checks(setup)
     operator.say("Watchdog: nothing is written for a while; the drive must stop by itself.")
     found.checks += watchdog_checks(setup, facts["drive"]["watchdog_s"])
     found.checks += emergency_stop_checks(setup)

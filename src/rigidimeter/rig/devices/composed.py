@@ -22,6 +22,7 @@ from rigidimeter.rig.devices.base import (
     TorqueSensor,
     VelocityDrive,
 )
+from rigidimeter.rig.devices.bounds import BoundFound, Tight
 from rigidimeter.rig.devices.enable_line import EnableLine
 from rigidimeter.rig.guard import REACTIONS, Cause
 
@@ -221,6 +222,17 @@ class ComposedRig:
     def powered(self) -> bool:
         """Whether the drive has not said that it has no power; False if its driver cannot tell."""
         return bool(getattr(self._drive, "powered", False))
+
+    @property
+    def bounds(self) -> tuple[BoundFound, ...]:
+        """What came of the drive's own bounds; empty where its driver writes none."""
+        return tuple(getattr(self._drive, "bounds", ()))
+
+    def tighten(self, tight: Tight | None) -> None:
+        """Have one of the drive's bounds so tight, when it is enabled next, that a move ends."""
+        tighten = getattr(self._drive, "tighten", None)
+        if tighten is not None:
+            tighten(tight)
 
     def stop(self) -> None:
         """Let the drive brake along its own ramp."""

@@ -33,6 +33,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import read_toml
 from rigidimeter.core.settings import validated
 from rigidimeter.rig.devices.base import DeviceFacts, Now
+from rigidimeter.rig.devices.bounds import DriveBounds
 from rigidimeter.rig.devices.composed import ComposedRig, Home
 from rigidimeter.rig.devices.rig_lock import RigLock
 
@@ -120,11 +121,13 @@ class RigFile:
         tick_rate_hz: float,
         home: Home | None = None,
         lock: RigLock | None = None,
+        bounds: DriveBounds | None = None,
     ) -> ComposedRig:
         """Create the devices without connecting.
 
         `home` overrides that of the file. `lock` takes the serial numbers too, once they are read:
-        one device may have two addresses.
+        one device may have two addresses. `bounds` are those that a drive must not exceed by
+        itself, where its driver has a method `bound` that takes them.
         """
 
         def take_serials(facts: Mapping[str, DeviceFacts]) -> None:
@@ -136,6 +139,8 @@ class RigFile:
                 )
 
         made = {role: driver(settings, now) for role, (driver, settings) in self.devices.items()}
+        if bounds is not None and hasattr(made["drive"], "bound"):
+            made["drive"].bound(bounds)
         return ComposedRig(
             made["torque_sensor"],
             made["drive"],

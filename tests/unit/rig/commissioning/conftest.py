@@ -23,7 +23,7 @@ from rigidimeter.rig.commissioning import (
     Timebase,
     commission_rig,
 )
-from rigidimeter.rig.devices import ComposedRig, RigFile
+from rigidimeter.rig.devices import BoundFound, ComposedRig, RigFile, Tight
 from rigidimeter.rig.devices.base import DeviceError, DeviceFacts, MotionSample, TorqueSample
 from rigidimeter.rig.guard import Cause
 from rigidimeter.testing import EmulatedArm
@@ -89,7 +89,33 @@ class FakeDrive:
         self._on, self._status, self._cause = "on_before" in faults, 0, Cause.NONE
         self._written_s = 0.0
         self._queue: deque[tuple[float, float]] = deque()
+        self._tight: Tight | None = None
+        self._start_rad = 0.0
         self.counts: dict[str, int] = {"received": 0, "lost": 0}
+
+    @property
+    def bounds(self) -> tuple[BoundFound, ...]:
+        where = {"obeyed": "0x1", "asleep": "0x1", "absent": ""}
+        given = self._faults.get("bounds", {})
+        return tuple(BoundFound(name, where[how], "w", "l") for name, how in given.items())
+
+    def tighten(self, tight: Tight | None) -> None:
+        self._tight = tight
+
+    def _bounded(self, wanted_rad_s: float) -> float:
+        """Obey the bound that is tight, if it is one that the drive obeys."""
+        tight = self._tight
+        if tight is None or self._faults["bounds"][tight.name] != "obeyed" or not wanted_rad_s:
+            return wanted_rad_s
+        if tight.name in ("speed", "motor speed"):
+            return math.copysign(min(abs(wanted_rad_s), 0.5 * tight.speed_rad_s), wanted_rad_s)
+        if tight.name == "position":
+            outward = math.copysign(1.0, wanted_rad_s) * (self._arm.motion()[0] - self._start_rad)
+            return 0.0 if outward >= 0.5 * tight.reach_rad else wanted_rad_s
+        if tight.name == "slippage":
+            self._halt()
+            self._status, self._cause = 8, Cause.DRIVE_FAULT
+        return 0.0
 
     def connect(self) -> None: ...
 
@@ -107,6 +133,7 @@ class FakeDrive:
             raise DeviceError("drive: no power; release the emergency stop")
         self._on, self._status, self._cause = True, 1, Cause.NONE
         self._written_s = self._now()
+        self._start_rad = self._arm.motion()[0]
 
     def _pressed(self) -> bool:
         return self._now() >= float(self._faults.get("pressed_at_s", math.inf))
@@ -115,6 +142,7 @@ class FakeDrive:
         now_s = self._now()
         while self._queue and self._queue[0][0] <= now_s + 1e-9:
             wanted_rad_s = self._faults.get("command_scale", 1.0) * self._queue.popleft()[1]
+            wanted_rad_s = self._bounded(wanted_rad_s)
             self._arm.command(wanted_rad_s + self._faults.get("drift_rad_s", 0.0))
         after_s = self._faults.get("stops_after_s", 0.1)
         silent = "deaf_watchdog" not in self._faults and now_s - self._written_s > after_s

@@ -169,8 +169,8 @@ class Cia402Drive:
                 rated_nm, no_torque = 0.0, "not available: not taken into the velocity frame"
                 absent = self._write(sdo, with_torque=False)
             read_object(sdo, inputs(settings), who)
-            entries = self._write_bounds(sdo)
-            found = read_back(sdo, (*self._readable, *entries), who)
+            entries = self._write_bounds(sdo, None)
+            found, held = read_back(sdo, self._readable, who), read_back(sdo, entries, who)
         self._wire.network(Nmt.START)
         self._configured = True
         self._wire.has_torque = bool(rated_nm)
@@ -182,6 +182,7 @@ class Cia402Drive:
         values.update({entry.label: "absent" for entry in absent})
         values.update({k: value for k, value in identity.items() if value is not None})
         ramps = [found[entry.label] for entry in self._objects if entry.name in BRAKING]
+        values.update({f"{BOUND_FACT} {label}": value for label, value in held.items()})
         values.update({f"{BOUND_FACT} {name}": words for name, _, words, _ in self.bounds})
         if settings.button_bit >= 0:
             values["button_bit"] = settings.button_bit
@@ -232,7 +233,7 @@ class Cia402Drive:
                     if entry.name in (CONTROLWORD, TARGET):
                         write_object(sdo, entry, self._who)
                 self._refuse_pressed(read_object(sdo, inputs(self._settings), self._who))
-                entries = self._write_bounds(sdo)
+                entries = self._write_bounds(sdo, self._tight)
                 read_back(sdo, (*self._readable, *entries), self._who)
             wire.network(Nmt.START)
             wire.drain()
@@ -371,13 +372,13 @@ class Cia402Drive:
         self._wire.send_both_ways(self._control)
         self._halted = False
 
-    def _write_bounds(self, sdo: Any) -> tuple[Object, ...]:
+    def _write_bounds(self, sdo: Any, tight: Tight | None) -> tuple[Object, ...]:
         """Write the bounds about where the joint stands; return the objects that hold them."""
         if self._bounds is None:
             return ()
         settings, who = self._settings, self._who
         says = ask_drive(sdo, settings, who)
-        wanted = wanted_bounds(settings, self._bounds, says, self._tight)
+        wanted = wanted_bounds(settings, self._bounds, says, tight)
         self.bounds, written = write_bounds(sdo, wanted, who)
         self._slips = any(found.name == SLIPPAGE and found.where for found in self.bounds)
         return written
