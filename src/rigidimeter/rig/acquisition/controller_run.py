@@ -90,6 +90,12 @@ class ControllerRun:
             self.run = run
             self._state_changed(run)
 
+    def come_to_end(self) -> None:
+        """Say that the arm was brought to rest and no more ticks are due."""
+        if not self.is_in(State.FAULTED):
+            self.run = Run(State.STOPPING)
+        self._state_changed(self.run)
+
     def begin(self, phase: Phase) -> None:
         """Say what is asked of the joint from the next tick on."""
         self.loop.phase = phase

@@ -7,7 +7,7 @@ import math
 from rigidimeter.core.units import deg_from_rad
 from rigidimeter.rig.acquisition.control_modes import hold, ramp_to_rest
 from rigidimeter.rig.acquisition.controller_run import ControllerRun
-from rigidimeter.rig.acquisition.run_states import Phase, Run, State
+from rigidimeter.rig.acquisition.run_states import Phase
 from rigidimeter.rig.acquisition.supervision import Sink
 from rigidimeter.rig.acquisition.tick import ControlLoop
 from rigidimeter.rig.devices.base import Rig
@@ -26,8 +26,7 @@ def end_session(run: ControllerRun, rig: Rig, sink: Sink) -> None:
     try:
         ramp_to_rest(run.loop)
     finally:
-        if not run.is_in(State.FAULTED):
-            run.change_state(Run(State.STOPPING))
+        run.come_to_end()
         try:
             _brake_and_disable(run.loop, rig)
             if why := _after_power(run.loop, rig):

@@ -186,7 +186,6 @@ class KeyView(LineView):
     ) -> None:
         super().__init__(None, None, plan, now)
         self._tty = tty
-        self._state: State | None = None
         self._prompt: str | None = None
         self._key_s = self._asked_s = -1e9
         self._there, self._bell_due = True, False
@@ -247,21 +246,25 @@ class KeyView(LineView):
         if key not in KEYS:
             self._say(f"{key!r} is no order: pausing now")
         command = KEYS.get(key, Command.PAUSE_NOW)
-        if command is Command.RESUME and self._must_ask():
+        if command is Command.RESUME and self._must_ask(status):
             return
         self._asked_s = -1e9
         self._post(Order(command), status)
 
-    def _must_ask(self) -> bool:
-        """Whether a resume is to be asked for again: in a pause it sets the arm going."""
-        if self._state is State.RUNNING or self._now() - self._asked_s <= AGAIN_S:
+    def _must_ask(self, status: SharedStatus) -> bool:
+        """Whether a resume is to be asked for again: it sets the arm going unless a run goes on.
+
+        By what the loop shows now, not by what was on the screen: a hold may have come since.
+        """
+        loop = status.loop()
+        goes_on = loop is not None and loop.tick >= 0 and loop.state == State.RUNNING
+        if goes_on or self._now() - self._asked_s <= AGAIN_S:
             return False
         self._asked_s = self._now()
         self._say("press r again within 5 s: the arm will move")
         return True
 
     def _show(self, facts: Facts) -> bool:
-        self._state = facts.state
         begun = math.isfinite(facts.angle_deg)
         line = self._line(facts).strip() if begun else facts.state_words
         if self._prompt is not None:

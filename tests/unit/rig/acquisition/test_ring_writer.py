@@ -2,6 +2,7 @@
 
 import math
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -164,6 +165,25 @@ def test_a_loop_that_stops_says_so_since_its_ticks_may_then_take_longer(shared, 
     sink.sample(sample(0.1))  # of the ramp to rest
     assert shared.status.loop().state == state
     assert shared.status.condition(Role.LOOP) is ProcessCondition.STOPPING
+
+
+@pytest.mark.parametrize(
+    ("run", "at_rest", "ends"),
+    [
+        (Run(State.STOPPING, at_once=True, aborted=True), False, False),
+        (Run(State.FAULTED), False, False),
+        (Run(State.FAULTED, at_once=True), False, True),  # halted: its power is cut now
+        (Run(State.STOPPING), True, True),
+        (Run(State.FAULTED), True, True),
+    ],
+)
+def test_as_long_as_the_arm_is_ramped_down_the_loop_must_not_be_silent(shared, run, at_rest, ends):
+    sink = RingSink(shared, tick_rate_hz=10.0)
+    sink.sample(sample(0.0))
+    sink.watch(SimpleNamespace(at_rest=at_rest))
+    sink.state_changed(run)
+    stopping = shared.status.condition(Role.LOOP) is ProcessCondition.STOPPING
+    assert stopping is ends
 
 
 def test_a_session_is_closed_once(shared):

@@ -296,6 +296,25 @@ def test_an_order_is_told_with_its_state_and_what_it_changed():
     assert (told[1]["command"], told[1]["state"], "name" in told[1]) == ("pause", "running", False)
 
 
+@pytest.mark.parametrize(
+    ("causes", "orders", "state"),
+    [
+        ({}, {10: Command.ABORT}, State.STOPPING),
+        ({20: Cause.DRIVE_FAULT}, {}, State.FAULTED),
+        ({}, {}, State.STOPPING),
+    ],
+)
+def test_that_no_more_ticks_are_due_is_said_once_the_arm_is_at_rest(causes, orders, state):
+    loops, said = [], []
+    session(
+        Desk(causes, orders),
+        values={"guard": {**VALUES["guard"], "acceleration_limit_deg_s2": 100.0}},
+        watch=loops.append,
+        state_changed=lambda run: said.append((run.state, loops[0].at_rest)),
+    )
+    assert said[-1] == (state, True)
+
+
 # Causes
 
 

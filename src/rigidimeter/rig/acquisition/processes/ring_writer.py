@@ -111,8 +111,11 @@ class RingSink:
         self._state = run.state
         self._pending = PAUSE_NEXT * run.pause_next + STOP_NEXT * run.stop_next
         self._show_s = -math.inf
+        # A session that ends still moves the arm until it is at rest, unless its power is cut now.
         if run.state in (State.STOPPING, State.FAULTED):
-            self._stopping()
+            cut = run.state is State.FAULTED and run.at_once
+            if cut or self._loop is None or self._loop.at_rest:
+                self._stopping()
 
     def event(self, kind: str, **facts: Any) -> None:
         """Record something that happened.
