@@ -1,6 +1,7 @@
 """Mutants that do the same as the module, by name, each with the reason."""
 
 SLOWER = "looks closer where it need not; what it finds there does not limit"
+ONE_WAY = "it is 1 or -1"
 NEAR = "step.py _fastest_toward: "
 ANSWER = "torque_answer.py "
 SIGN = "torque_sign.py "
@@ -73,14 +74,23 @@ EQUIVALENT: dict[str, str] = {
     "controller.py minimum_jerk: elapsed_s >= duration_s → elapsed_s > duration_s": "at its end "
     "the polynomial and its derivative are 0, too",
     "step.py guard_step: 1 → 0": "elapsed_ticks if not given: none counts as one",
-    NEAR + "speed * speed / (2.0 * limits.acceleration_rad_s2) → "
-    "speed * speed * (2.0 * limits.acceleration_rad_s2)": SLOWER,
-    NEAR + "2.0 * limits.acceleration_rad_s2 → 2.0 / limits.acceleration_rad_s2": SLOWER,
-    NEAR + "2.0 → 1.9801980198019802": SLOWER,
+    NEAR + "(speed * speed + (1.0 / SOFTLY - 1.0) * faster) / (2.0 * acceleration) → "
+    "(speed * speed + (1.0 / SOFTLY - 1.0) * faster) * (2.0 * acceleration)": SLOWER,
+    NEAR + "2.0 * acceleration → 2.0 / acceleration": SLOWER,
+    NEAR + "speed * speed - arrival2 → speed * speed + arrival2": SLOWER,
+    NEAR + "1.0 / SOFTLY - 1.0 → 1.0 / SOFTLY + 1.0": SLOWER,
+    NEAR + "1.0 → 1.01": SLOWER,
+    NEAR + "1.0 → 0.9900990099009901 #2": SLOWER,
+    NEAR + "0.0 → 0.001 #2": SLOWER,
+    NEAR + "0.0 → -0.001 #2": "a thousandth of 1 rad²/s²: less than a rounding of the angle",
+    NEAR + "toward > 0.0 → toward >= 0.0": ONE_WAY,
+    NEAR + "0.0 → 0.001": ONE_WAY,
+    NEAR + "0.0 → -0.001": ONE_WAY,
     NEAR + "if left >= speed * (reach_s + limits.interval_s + held_s) + stopping: ... → "
     "if False: ...": SLOWER,
     NEAR + "left >= speed * (reach_s + limits.interval_s + held_s) + stopping → "
     "left > speed * (reach_s + limits.interval_s + held_s) + stopping": SLOWER,
+    "contact.py contact_step: min(passed, ring.size) → passed": "goes round again: the same",
     NEAR + "1 → 0": "a whole round of the ring is where it began",
     "step.py _most_serious: reported != _NO_CAUSE and REACTIONS[reported] >= REACTIONS[found] → "
     "REACTIONS[reported] >= REACTIONS[found]": "no cause has the least reaction: both are none",

@@ -47,7 +47,7 @@ SIGNALS, LOOP, RECORDER, RECORDS, CONSOLE = (
 )
 PAGE, SERVER_STATE = "rig/console/page/live_socket.py", "rig/console/page/server_state.py"
 STEP, WATCH, LIMITS = "rig/guard/step.py", "rig/guard/watch.py", "rig/guard/limits.py"
-AGREEMENT = "rig/guard/agreement.py"
+AGREEMENT, CONTACT = "rig/guard/agreement.py", "rig/guard/contact.py"
 CONSISTENCY, ANSWER = "rig/guard/consistency.py", "rig/guard/torque_answer.py"
 CONTROLLER, COMPOSED = "model/controller.py", "rig/devices/composed.py"
 
@@ -212,9 +212,58 @@ HAND_MADE = tuple(
         ),
         (
             STEP,
-            "left = limits.position_rad - toward * angle",
-            "left = limits.position_rad - angle",
+            "left = min(limits.position_rad, end) - toward * angle",
+            "left = min(limits.position_rad, end) - angle",
             "one position limit is not kept",
+        ),
+        (
+            STEP,
+            "left = min(limits.position_rad, end) - toward * angle",
+            "left = limits.position_rad - toward * angle",
+            "the range of the person is not kept",
+        ),
+        (
+            STEP,
+            "end = limits.highest_rad if toward > 0.0 else -limits.lowest_rad",
+            "end = limits.highest_rad",
+            "one end of the range is taken for both",
+        ),
+        (
+            STEP,
+            "_stoppable_speed(softly, held_s, left + before)",
+            "math.inf",
+            "the speed of arrival has no bound",
+        ),
+        (
+            WATCH,
+            "if not limits.lowest_rad <= angle_rad + limits.tolerance_rad:",
+            "if False:",
+            "below the range nothing stops it",
+        ),
+        (
+            WATCH,
+            "if not angle_rad - limits.tolerance_rad <= limits.highest_rad:",
+            "if False:",
+            "above the range nothing stops it",
+        ),
+        (
+            WATCH,
+            "limited_s <= limits.at_limit_s and three_arrivals_s > limits.arrivals_s",
+            "limited_s <= limits.at_limit_s",
+            "an arm that comes to its limit again and again is not held",
+        ),
+        (
+            CONTACT,
+            "ticks += now - int(ring[place])",
+            "ticks += now",
+            "what was long ago is held against the arm",
+        ),
+        (CONTACT, " and not touching", "", "an arm that leans on its limit arrives all the time"),
+        (
+            CONTACT,
+            "    state.at_limit[:] = 0\n",
+            "",
+            "what was before a release is taken off what comes after it",
         ),
         (
             WATCH,

@@ -89,6 +89,59 @@ def test_a_second_order_drive_passes_by_its_own_overshoot_at_most(wanted, every,
     assert state.cause == Cause.NONE
 
 
+RANGE = EXACT._replace(lowest_rad=-0.2, highest_rad=0.35, at_limit_of_s=0.5, apart_s=0.2)
+
+
+@given(requests, st.integers(1, 20), st.integers(0, 25), st.integers(0, 20), st.integers(20, 200))
+@settings(max_examples=80)
+def test_a_range_is_never_left_on_either_side(wanted, every, late, lag, hold):
+    angles, _, state = run(RANGE, wanted, pure_delay(lag), hold=hold, every=every, late=late)
+    assert angles.min() >= RANGE.lowest_rad - 1e-9
+    assert angles.max() <= RANGE.highest_rad + 1e-9
+    assert state.cause == Cause.NONE
+
+
+@given(requests, st.integers(0, 20), st.integers(20, 200), st.floats(0.1, 2.0))
+@settings(max_examples=80)
+def test_the_hardest_braking_begins_at_the_speed_of_arrival(wanted, lag, hold, arrival):
+    """Within u T + u²/(2a) of the limit the joint is no faster toward it than u."""
+    limits = EXACT._replace(arrival_rad_s=arrival)
+    angles, _, state = run(limits, wanted, pure_delay(lag), hold=hold)
+    assert np.abs(angles).max() <= limits.position_rad + 1e-9
+    assert state.cause == Cause.NONE
+    speeds = np.diff(angles) / DT
+    left = limits.position_rad - np.sign(speeds) * angles[:-1]
+    near = arrival * DT + arrival**2 / (2.0 * limits.acceleration_rad_s2)
+    inside = left < near - 1e-9
+    assert np.abs(speeds[inside]).max(initial=0.0) <= arrival + 1e-9
+
+
+@given(requests, st.integers(1, 6), st.integers(20, 200))
+@settings(max_examples=30)
+def test_what_is_counted_at_the_limit_is_what_the_limit_held_back(wanted, passed, hold):
+    """Against a list of all ticks: those at the limit of the last half second, and arrivals."""
+    state, move, angles, commands = guard_state(RANGE), pure_delay(3), [0.0], []
+    marks, came = [], []
+    for k in range(len(wanted) * hold // passed):
+        request = wanted[min(k * passed // hold, len(wanted) - 1)]
+        state, sent, limited = guard_step(
+            RANGE, state, request, 0.0, angles[-1], 0.0, 0.0, 0.0, 0, passed
+        )
+        for _ in range(passed):
+            commands.append(sent)
+            angles.append(move(len(commands) - 1, commands))
+        at_limit = limited == Limited.POSITION
+        begins = at_limit and not (marks and marks[-1])
+        marks += [at_limit] * passed
+        if begins and (not came or len(marks) - came[-1] >= 200):
+            came.append(len(marks))
+        if at_limit or k % 50 == 0:
+            assert state.contact.ticks == sum(marks[-500:])
+        assert state.contact.arrivals == len(came)
+        if len(came) > 2:
+            assert abs(state.contact.three_s - (came[-1] - came[-3]) * DT) < 1e-9
+
+
 @given(requests)
 @settings(max_examples=40)
 def test_only_the_position_limit_brakes_harder_than_the_acceleration_limit(wanted):
@@ -163,6 +216,13 @@ STRICT = LIMITS._replace(
     power_w=5.0,
     energy_j=2.0,
     following_rad=0.1,
+    at_limit_s=0.02,
+    at_limit_of_s=0.1,
+    arrivals_s=1.0,
+    apart_s=0.01,
+    arrival_rad_s=1.0,
+    lowest_rad=-0.1,
+    highest_rad=0.3,
 )
 ticks = st.lists(
     st.tuples(

@@ -27,6 +27,7 @@ from rigidimeter.planning.joint_bandwidth import (
 )
 from rigidimeter.planning.motion_demand import (
     beyond_limits,
+    beyond_range,
     demand,
     ideal_response,
     time_constant_s,

@@ -17,7 +17,8 @@ with τ its reaction time, within which the drive may still do what it was told 
 the next step may come and T the tick until it is due, through both of which the last command stays
 in force; and a its acceleration limit. A joint that reaches θ at 1 rad/s with τ = 0.1 s, g =
 0.005 s, T = 0.001 s and a = 2 rad/s² needs 0.106 + 0.25 rad beyond θ. The guard slows a motion down
-as soon as |θ| + r(v) passes its limit.
+as soon as |θ| + r(v) passes its limit. Where the speed of arrival is bounded by u < v, it keeps
+(1/b − 1) (v² − u²) / (2 a) more, with b the part of a by which it then brakes from v to u.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rigidimeter.core.settings import GAP_S, ControllerSettings, GuardSettings, Settings
+from rigidimeter.core.settings import GAP_S, SOFTLY, ControllerSettings, GuardSettings, Settings
 from rigidimeter.core.units import deg_from_rad, rad_from_deg
 from rigidimeter.model import JointDynamics, arm_response
 
@@ -46,6 +47,8 @@ class Demand:
     reach_rad : float
         The largest angle including the room r(v) that the guard keeps free in the direction of the
         motion: it slows the motion where this passes its position limit.
+    lowest_rad, highest_rad : float
+        The same toward negative and toward positive angles.
     """
 
     angle_sd_rad: float
@@ -53,6 +56,8 @@ class Demand:
     peak_speed_rad_s: float
     peak_acceleration_rad_s2: float
     reach_rad: float
+    lowest_rad: float
+    highest_rad: float
 
 
 def time_constant_s(controller: ControllerSettings) -> float:
@@ -106,7 +111,7 @@ def demand(
     rate_hz : float
         Ticks a second.
     guard : GuardSettings
-        Whose reaction time and acceleration limit set the room to stop.
+        Whose reaction time, acceleration limit and speed of arrival set the room to stop.
 
     Examples
     --------
@@ -121,14 +126,20 @@ def demand(
     tick_s = 1.0 / rate_hz
     held_s = guard.reaction_time_s + max(GAP_S, tick_s) + tick_s
     room = speed * held_s + speed**2 / (2.0 * braking_rad_s2)
-    reach = np.maximum(np.abs(angle), angle * np.sign(velocity) + room)
+    arrival_rad_s = rad_from_deg(guard.arrival_speed_deg_s)
+    softly = (1.0 / SOFTLY - 1.0) * (speed**2 - arrival_rad_s**2) / (2.0 * braking_rad_s2)
+    room += np.maximum(softly, 0.0)
+    highest_rad = float(np.max(angle + np.where(velocity > 0.0, room, 0.0)))
+    lowest_rad = float(np.min(angle - np.where(velocity < 0.0, room, 0.0)))
     acceleration = np.diff(velocity, prepend=0.0) * rate_hz
     return Demand(
         angle_sd_rad=float(np.std(angle)),
         peak_angle_rad=float(np.max(np.abs(angle))),
         peak_speed_rad_s=float(np.max(speed)),
         peak_acceleration_rad_s2=float(np.max(np.abs(acceleration))),
-        reach_rad=float(np.max(reach)),
+        reach_rad=max(highest_rad, -lowest_rad),
+        lowest_rad=lowest_rad,
+        highest_rad=highest_rad,
     )
 
 
@@ -164,6 +175,33 @@ def beyond_limits(what: str, needs: Demand, guard: GuardSettings) -> tuple[str, 
         f"{getattr(guard, key):g} {unit}"
         for key, verb, value, unit in rows
         if deg_from_rad(value) > getattr(guard, key)
+    )
+
+
+def beyond_range(
+    what: str, needs: Demand, lowest_rad: float, highest_rad: float
+) -> tuple[str, ...]:
+    """Return a sentence for each end of a range that a motion would pass; none if it fits.
+
+    Parameters
+    ----------
+    what : str
+        What moves, as the sentences begin.
+    needs : Demand
+        Of that motion, from where it begins.
+    lowest_rad, highest_rad : float
+        The ends of the range, from there too.
+    """
+    rows = (
+        ("toward negative angles", -needs.lowest_rad, -lowest_rad),
+        ("toward positive angles", needs.highest_rad, highest_rad),
+    )
+    return tuple(
+        f"{what} reaches {deg_from_rad(reach_rad):.4g} deg {way} (with the room to stop), and the "
+        f"range of motion of this person ends {deg_from_rad(end_rad):.4g} deg from where the joint "
+        "stands"
+        for way, reach_rad, end_rad in rows
+        if reach_rad > end_rad
     )
 
 

@@ -12,7 +12,14 @@ from rigidimeter.core.settings import (
     parse_settings,
 )
 from rigidimeter.model import JointDynamics
-from rigidimeter.planning import beyond_limits, demand, ideal_response, sinusoid, time_constant_s
+from rigidimeter.planning import (
+    beyond_limits,
+    beyond_range,
+    demand,
+    ideal_response,
+    sinusoid,
+    time_constant_s,
+)
 from rigidimeter.rig.guard import Limited, guard_limits, guard_state, guard_step
 
 CONTROLLER = ControllerSettings(inertia_kg_m2=0.5, damping_nm_s_rad=2.0)
@@ -74,17 +81,49 @@ def test_a_slow_loop_may_be_a_tick_late() -> None:
     assert demand([0.0], [1.0], 50.0, guard).reach_rad == pytest.approx(0.1 + 0.02 + 0.02 + 0.25)
 
 
+def test_each_side_is_reached_by_itself() -> None:
+    guard = GuardSettings(acceleration_limit_deg_s2=math.degrees(2.0), reaction_time_s=0.1)
+    needs = demand([0.5, 0.2, -0.1], [1.0, 0.0, -1.0], RATE_HZ, guard)
+    room = 0.106 + 0.25
+    assert needs.highest_rad == pytest.approx(0.5 + room)
+    assert needs.lowest_rad == pytest.approx(-0.1 - room)
+    assert needs.reach_rad == needs.highest_rad
+    ends = -math.radians(30.0), math.radians(49.0)
+    assert needs.lowest_rad > ends[0]
+    assert beyond_range("the sinusoid", needs, ends[0], 0.9) == ()
+    (sentence,) = beyond_range("the sinusoid", needs, *ends)
+    assert sentence == (
+        "the sinusoid reaches 49.05 deg toward positive angles (with the room to stop), and the "
+        "range of motion of this person ends 49 deg from where the joint stands"
+    )
+    assert len(beyond_range("the sinusoid", needs, -0.4, 0.8)) == 2
+
+
+def test_above_the_speed_of_arrival_the_room_is_that_of_soft_braking() -> None:
+    # from 1 to 0.5 rad/s at 0.2 rad/s², from there at 2 rad/s²
+    values = {"acceleration_limit_deg_s2": math.degrees(2.0), "reaction_time_s": 0.1}
+    guard = GuardSettings(**values, arrival_speed_deg_s=math.degrees(0.5))
+    needs = demand([0.0], [1.0], RATE_HZ, guard)
+    assert needs.reach_rad == pytest.approx(0.106 + 0.75 / 0.4 + 0.25 / 4.0)
+    slow = demand([0.0], [0.5], RATE_HZ, guard)
+    assert slow == demand([0.0], [0.5], RATE_HZ, GuardSettings(**values))
+
+
 @pytest.mark.parametrize("rate_hz", [1000.0, 60.0])
 @pytest.mark.parametrize("speed_rad_s", [0.3, 2.0])
+@pytest.mark.parametrize("arrival_speed_deg_s", [1000.0, 60.0])
 def test_the_guard_lets_through_what_has_this_room_and_slows_what_has_not(
-    rate_hz: float, speed_rad_s: float
+    rate_hz: float, speed_rad_s: float, arrival_speed_deg_s: float
 ) -> None:
     """The room is the guard's own: at a constant speed, one step before the place and at it."""
     sensor = {"rate_hz": rate_hz}
     settings = parse_settings(
         {
             "rig": {"tick_rate_hz": rate_hz, "torque": sensor, "motion": sensor},
-            "guard": {"reaction_time_s": 0.05},
+            "guard": {
+                "reaction_time_s": 0.05,
+                "arrival_speed_deg_s": arrival_speed_deg_s,
+            },
         }
     )
     limits = guard_limits(settings)

@@ -27,6 +27,7 @@ from rigidimeter.core.settings.load import (
 from rigidimeter.core.settings.loop_settings import (
     GAP_S,
     LONGEST_STEP,
+    SOFTLY,
     ControllerSettings,
     GuardSettings,
     ZeroingSettings,

@@ -19,6 +19,10 @@ A loop under a real-time schedule is late by at most this; against a program tha
 longer there are the drive's own watchdog and the mechanical stops.
 """
 
+SOFTLY = 0.1
+"""Where the speed of arrival at the position limit is bounded, what is faster brakes by this part
+of the acceleration limit, before it comes so near that the rest takes all of it."""
+
 LONGEST_STEP = 5
 """In ticks: after a late one the controller steps over no more, however many were missed."""
 
@@ -50,11 +54,17 @@ class GuardSettings(Section):
     the zero offset of the drive. While zero is commanded the joint may move by at most
     `hold_limit_deg`. `min_inertia_kg_m2` is less than the inertia of the lightest thing that can
     be mounted: an accelerated joint that shows less torque than that has no working sensor.
+
+    The joint brakes for the position limit with `acceleration_limit_deg_s2`, from whatever speed it
+    has. With `arrival_speed_deg_s` below `speed_limit_deg_s` that braking begins at no more than
+    this speed; down to it the joint brakes with a tenth of that acceleration. The default is the
+    largest speed limit, so no bound.
     """
 
     position_limit_deg: float = quantity(40.0, "deg", 1.0, 180.0)
     speed_limit_deg_s: float = quantity(200.0, "deg/s", 1.0, 1000.0)
     acceleration_limit_deg_s2: float = quantity(6000.0, "deg/s²", 10.0, 100000.0)
+    arrival_speed_deg_s: float = quantity(1000.0, "deg/s", 1.0, 1000.0)
     reaction_time_s: float = quantity(0.02, "s", 0.0, 0.2)
     stale_s: float = quantity(0.1, "s", 0.002, 0.5)
     following_limit_deg: float = quantity(2.0, "deg", 0.1, 45.0)

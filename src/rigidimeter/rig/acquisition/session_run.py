@@ -241,7 +241,7 @@ def _stand_by(run: ControllerRun) -> bool:
 
 def _run_epoch(session: _Session, planned: PlannedEpoch) -> None:
     """Run one epoch and close it."""
-    settings, sink, run = session.settings, session.sink, session.run
+    sink, run = session.sink, session.run
     facts = session.before_epoch(planned)
     sink.event(
         "epoch_started",
@@ -259,7 +259,7 @@ def _run_epoch(session: _Session, planned: PlannedEpoch) -> None:
         ticks = perturb(run.loop, planned.number, session.perturbation_nm)
     else:
         ticks = follow(run.loop, planned.number, session.angle_rad, session.velocity_rad_s)
-    why = why_ended(settings, ticks.cause, ticks.limit_time_s)
+    why = why_ended(run.loop.limits, ticks.cause, ticks.limit_time_s)
     ending: Ending = "fail" if why else "success"
     if ticks.interrupted and not why:
         ending, why = "abort", "ended by the operator"

@@ -144,11 +144,20 @@ def _ahead(latched: Latched) -> Found:
 
 
 def _position(latched: Latched) -> Found:
-    limits = latched.limits
-    limit_deg = deg_from_rad(limits.position_rad + limits.tolerance_rad)
-    value_deg = deg_from_rad(abs(latched.guard.angle_rad))
-    setting = "guard.position_limit_deg and what sensor noise may add"
-    return Found(value_deg, limit_deg, "deg", _passed_s(latched), setting)
+    limits, angle_rad = latched.limits, latched.guard.angle_rad
+    low_rad, high_rad = limits.extent_rad
+    above = angle_rad - high_rad > low_rad - angle_rad  # beyond which end
+    end_rad = high_rad if above else low_rad
+    setting = "guard.position_limit_deg"
+    if abs(end_rad) < limits.position_rad:
+        setting = "the range of motion of this person, from where the joint began,"
+    return Found(
+        deg_from_rad(abs(angle_rad)),
+        deg_from_rad(abs(end_rad) + limits.tolerance_rad),
+        "deg",
+        _passed_s(latched),
+        f"{setting} and what sensor noise may add",
+    )
 
 
 def _speed(latched: Latched) -> Found:
@@ -245,10 +254,13 @@ def _seldom(latched: Latched) -> Found:
 
 
 def _held_at_limit(latched: Latched) -> Found:
+    limits, contact = latched.limits, latched.guard.contact
+    if contact.three_s <= limits.arrivals_s:
+        return Found(3.0, 2.0, f"arrivals within {limits.arrivals_s:g} s", contact.three_s)
     # It is added up tick by tick and was above the limit for the first time; the guard's own count
-    # is zero again, as a joint that is held is not driven against the limit.
-    held_s = latched.limits.at_limit_s + _passed_s(latched)
-    return Found(held_s, latched.limits.at_limit_s, "s", held_s)
+    # has gone on, as a joint that is held is not driven against the limit.
+    held_s = limits.at_limit_s + _passed_s(latched)
+    return Found(held_s, limits.at_limit_s, f"s of the last {limits.at_limit_of_s:g} s")
 
 
 def _missed(latched: Latched) -> Found:

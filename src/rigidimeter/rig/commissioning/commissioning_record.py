@@ -76,6 +76,9 @@ EXACT = ("reaction_time_s", "stale_s", "duration_s")
 FLOORS = ("min_inertia_kg_m2",)
 """Numbers among them that may be larger, never smaller."""
 
+ADDED: Mapping[str, float] = {"guard.arrival_speed_deg_s": 1000.0}
+"""Numbers that an older record does not have, each with what was so before it could be set."""
+
 
 @dataclass(frozen=True)
 class CommissioningRecord:
@@ -314,7 +317,7 @@ def _same_controller(path: Path, before: Mapping[str, Any], now: Mapping[str, An
         )
     for table in ("controller", *LIMITS):
         for key, value in now[table].items():
-            tried = before.get(table, {}).get(key)
+            tried = before.get(table, {}).get(key, ADDED.get(f"{table}.{key}"))
             if value != tried and not (table in LIMITS and _tighter(key, tried, value)):
                 raise UserError(f"{path}: covers {table}.{key} = {tried!r}, not {value!r}; {again}")
     arms = list(before.get("arms", {}).values())

@@ -18,6 +18,7 @@ from rigidimeter.rig.guard.consistency import (
     consistency_state,
     consistency_step,
 )
+from rigidimeter.rig.guard.contact import ContactState, contact_state, contact_step
 from rigidimeter.rig.guard.drive_torque import (
     PRESLIDING_RAD,
     SETTLED_S,
@@ -42,6 +43,7 @@ from rigidimeter.rig.guard.limits import (
     guard_limits,
     guard_state,
     released,
+    within_range,
 )
 from rigidimeter.rig.guard.step import Limited, guard_step, why_ended
 from rigidimeter.rig.guard.torque_answer import (

@@ -116,8 +116,8 @@ _SENTENCES = {
     "drive is faster than rig.drive_bandwidth_hz",
     Cause.TORQUE_SIGN: "the torque sensor answered the perturbation with the wrong sign",
     Cause.SELDOM_FRESH: "fresh readings came too seldom",
-    Cause.HELD_AT_LIMIT: "the joint was driven against the position limit for too long: the "
-    "subject pushes, or the torque has an offset or the wrong sign",
+    Cause.HELD_AT_LIMIT: "the joint was driven against the position limit for too long or too "
+    "often: the subject pushes, or the torque has an offset or the wrong sign",
     Cause.TORQUE_DISAGREES: "the torque sensor did not agree with the drive's own torque",
 }
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rigidimeter.core.settings import GAP_S, Settings
 from rigidimeter.core.units import rad_from_deg
 from rigidimeter.rig.guard.causes import Cause, Reaction
+from rigidimeter.rig.guard.contact import ContactState, contact_state, forgotten
 
 OVERSPEED = 1.25
 """A joint this much above the speed limit is out of the drive's control."""
@@ -19,23 +20,30 @@ UNDONE = 0.1
 """The part of the reaction time by which a second-order drive is still off where the reaction time
 is the least that the settings allow: its response overshoots, so it is no mixture of delays."""
 
-AT_LIMIT_S = 1.0
-"""A joint that is driven against the position limit for so long is not being measured. Whoever
-pushes it for a moment, or a perturbation that asks for more, turns back before."""
+AT_LIMIT_S, AT_LIMIT_OF_S = 1.0, 5.0
+"""A joint that is driven against the position limit for so long, of so long, is not being measured.
+Whoever pushes it for a moment, or a perturbation that asks for more, turns back before."""
+
+ARRIVALS_S, APART_S = 10.0, 0.2
+"""Nor is one that comes to the limit for the third time within so long, where what comes within
+`APART_S` of an arrival is the same one."""
 
 _NO_CAUSE, _NO_REACTION = int(Cause.NONE), int(Reaction.NONE)
 
 
 class GuardLimits(NamedTuple):
-    """Limits, symmetric about the initial position.
+    """Limits, in SI units; angles are from the initial position.
 
+    `position_rad` holds to both sides, `lowest_rad` and `highest_rad` cut it (see `within_range`).
     `reaction_time_s` is how long the drive may take to have done what it was told, and how far the
     stamp of a reading may be wrong. `gap_s` is how late a step may come without the position limit
     being crossed. `tolerance_rad` is how far beyond the position limit a reading may be before it
     counts as a fault: sensor noise at the limit is none. `stale_s` is how old a reading may be.
     `following_rad` is how far the angle may be outside of where the commands can have brought it,
-    `drift_rad_s` how fast that place may follow the angle. `at_limit_s` is for how long without a
-    break the position limit may hold the command back.
+    `drift_rad_s` how fast that place may follow the angle. `at_limit_s` is how much of the last
+    `at_limit_of_s` the position limit may hold the command back, `arrivals_s` how long three
+    arrivals there must take at least, `apart_s` how long after one the next counts. `arrival_rad_s`
+    bounds the speed at which the hardest braking begins.
     """
 
     position_rad: float
@@ -54,6 +62,18 @@ class GuardLimits(NamedTuple):
     following_rad: float = math.inf
     drift_rad_s: float = 0.0
     at_limit_s: float = math.inf
+    at_limit_of_s: float = 0.0
+    arrivals_s: float = 0.0
+    apart_s: float = 0.0
+    arrival_rad_s: float = math.inf
+    lowest_rad: float = -math.inf
+    highest_rad: float = math.inf
+
+    @property
+    def extent_rad(self) -> tuple[float, float]:
+        """The two angles between which the joint is kept."""
+        low = max(self.lowest_rad, -self.position_rad)
+        return low, min(self.highest_rad, self.position_rad)
 
 
 class GuardState(NamedTuple):
@@ -65,10 +85,11 @@ class GuardState(NamedTuple):
     used once. `angle_rad` is the last reading that was a number, `age_s` how old it is,
     `origin_rad` where the running sum began on the angle's scale (NaN before the first reading),
     `energy_j` what went to and fro within the last second. `cause` is the first one, `reaction` the
-    strongest. `limited_s` is for how long the position limit has held the command back.
+    strongest. `contact` is how long and how often the position limit has held the command back.
     """
 
     sent_rad: NDArray[np.float64]
+    contact: ContactState
     newest: int = 0
     velocity_rad_s: float = 0.0
     angle_rad: float = 0.0
@@ -77,7 +98,6 @@ class GuardState(NamedTuple):
     energy_j: float = 0.0
     cause: int = _NO_CAUSE
     reaction: int = _NO_REACTION
-    limited_s: float = 0.0
 
 
 def guard_limits(settings: Settings) -> GuardLimits:
@@ -106,19 +126,30 @@ def guard_limits(settings: Settings) -> GuardLimits:
         following_rad=rad_from_deg(following_deg),
         drift_rad_s=rad_from_deg(guard.drift_limit_deg_s),
         at_limit_s=AT_LIMIT_S,
+        at_limit_of_s=AT_LIMIT_OF_S,
+        arrivals_s=ARRIVALS_S,
+        apart_s=APART_S,
+        arrival_rad_s=rad_from_deg(guard.arrival_speed_deg_s),
     )
+
+
+def within_range(limits: GuardLimits, lowest_rad: float, highest_rad: float) -> GuardLimits:
+    """Return the limits cut by the range of motion of the person, from the initial position."""
+    return limits._replace(lowest_rad=lowest_rad, highest_rad=highest_rad)
 
 
 def guard_state(limits: GuardLimits) -> GuardState:
     """Return the state of a guard at rest that has seen nothing wrong."""
     memory_s = limits.stale_s + limits.reaction_time_s
-    return GuardState(np.zeros(math.ceil(memory_s / limits.interval_s) + 2))
+    sent_rad = np.zeros(math.ceil(memory_s / limits.interval_s) + 2)
+    return GuardState(sent_rad, contact_state(limits.interval_s, limits.at_limit_of_s))
 
 
 def released(state: GuardState) -> GuardState:
     """Return the state after a hold that the operator has ended.
 
-    What was sent is still remembered: the drive may still be doing it.
+    What was sent is still remembered: the drive may still be doing it. What counts against the
+    position limit begins anew.
 
     Raises
     ------
@@ -127,4 +158,5 @@ def released(state: GuardState) -> GuardState:
     """
     if state.reaction > Reaction.HOLD or state.velocity_rad_s != 0.0:
         raise ValueError("only a guard that holds the joint at rest can be released")
-    return state._replace(cause=_NO_CAUSE, reaction=_NO_REACTION)
+    contact = forgotten(state.contact)
+    return state._replace(contact=contact, cause=_NO_CAUSE, reaction=_NO_REACTION)

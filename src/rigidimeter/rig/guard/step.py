@@ -8,6 +8,8 @@ The guard knows nothing of the controller. Whatever velocity is asked for, it se
 - is at most the speed limit,
 - lets the joint stop before the position limit: v ≤ √(2 a d), less what is covered until the next
   step, with d the distance left. That step may come late by `gap_s`.
+- where the speed of arrival u is bounded, lets it be no faster than u where it begins to stop at a,
+  at d = u T + u²/(2a): beyond, v T + v²/(2b) ≤ d + (1/b − 1/a) u²/2, with b a tenth of a.
 
 The distance left is not counted from the last reading, which is old and does not show what the
 drive has been told but has not done yet. It is counted from the farthest point at which the joint
@@ -34,8 +36,10 @@ from math import isfinite, isnan
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.core.settings import Settings
+from rigidimeter.core.settings import SOFTLY
+from rigidimeter.core.units import deg_from_rad
 from rigidimeter.rig.guard.causes import REACTIONS, Cause, Reaction
+from rigidimeter.rig.guard.contact import contact_step
 from rigidimeter.rig.guard.limits import GuardLimits, GuardState
 from rigidimeter.rig.guard.watch import energy_after, found_wrong, outside
 
@@ -54,7 +58,7 @@ _NO_CAUSE, _NOT_LIMITED = int(Cause.NONE), int(Limited.NOT)
 _AT_LIMIT, _CUT = int(Limited.POSITION), int(Reaction.CUT)
 
 
-def why_ended(settings: Settings, cause: Cause, limit_time_s: float) -> str:
+def why_ended(limits: GuardLimits, cause: Cause, limit_time_s: float) -> str:
     """Return why an epoch does not count for what the guard did in it; empty where it counts.
 
     `limit_time_s` is when the position limit first held the command back, NaN if it never did.
@@ -62,10 +66,9 @@ def why_ended(settings: Settings, cause: Cause, limit_time_s: float) -> str:
     if cause is not Cause.NONE:
         return f"the guard stopped the rig: {cause.sentence}"
     if not math.isnan(limit_time_s):
-        return (
-            f"the arm came to the position limit of ±{settings.guard.position_limit_deg:g} deg "
-            f"at {limit_time_s:.3f} s"
-        )
+        low, high = map(deg_from_rad, limits.extent_rad)
+        limit = f"±{high:g} deg" if low == -high else f"{low:.4g} or {high:.4g} deg"
+        return f"the arm came to the position limit of {limit} at {limit_time_s:.3f} s"
     return ""
 
 
@@ -111,7 +114,7 @@ def guard_step(
     """
     dt, reaction_time_s = limits.interval_s, limits.reaction_time_s
     ticks_per_s = 1.0 / dt
-    ring, newest, sent_before, angle, age, origin, energy, cause, reaction, limited_s = state
+    ring, contact, newest, sent_before, angle, age, origin, energy, cause, reaction = state
     oldest, passed = ring.size - 1, max(elapsed_ticks, 1)
     was_latched = cause != _NO_CAUSE
     elapsed_s = passed * dt
@@ -156,7 +159,8 @@ def guard_step(
         torque_age_s,
         position_error,
         energy,
-        limited_s,
+        contact.ticks * dt,
+        contact.three_s,
     )
     found = _most_serious(found, disagreement, reported)
     if found != _NO_CAUSE:
@@ -182,8 +186,8 @@ def guard_step(
     fastest = _fastest_toward(limits, ring, newest, math.copysign(1.0, sent), angle, old_s)
     if abs(sent) > fastest:
         sent, limited = math.copysign(fastest, sent), max(limited, int(Limited.POSITION))
-    limited_s = limited_s + elapsed_s if limited == _AT_LIMIT else 0.0
-    after = GuardState(ring, newest, sent, angle, age, origin, energy, cause, reaction, limited_s)
+    contact = contact_step(contact, limited == _AT_LIMIT, passed, dt, limits.apart_s)
+    after = GuardState(ring, contact, newest, sent, angle, age, origin, energy, cause, reaction)
     return after, sent, limited
 
 
@@ -212,18 +216,26 @@ def _fastest_toward(
 
     It can then still stop in the distance left when the next step comes late.
     """
-    left = limits.position_rad - toward * angle
+    end = limits.highest_rad if toward > 0.0 else -limits.lowest_rad
+    left = min(limits.position_rad, end) - toward * angle
     reach_s = old_s + limits.reaction_time_s
     held_s = limits.interval_s + limits.gap_s
     # Far from the limit the search is spared: at full speed, after all that can be in flight and
     # one command more, the joint could still stop.
     speed = limits.speed_rad_s
-    stopping = speed * speed / (2.0 * limits.acceleration_rad_s2)
+    acceleration, arrival2 = limits.acceleration_rad_s2, limits.arrival_rad_s * limits.arrival_rad_s
+    faster = max(speed * speed - arrival2, 0.0)
+    stopping = (speed * speed + (1.0 / SOFTLY - 1.0) * faster) / (2.0 * acceleration)
     if left >= speed * (reach_s + limits.interval_s + held_s) + stopping:
         return speed
     back = math.ceil(min(reach_s * (1.0 / limits.interval_s), ring.size - 1))
     left -= _farthest_in_flight(ring, newest, back, toward)
-    return _stoppable_speed(limits.acceleration_rad_s2, held_s, left)
+    softly = SOFTLY * acceleration
+    before = 0.5 * arrival2 * (1.0 / softly - 1.0 / acceleration)
+    return min(
+        _stoppable_speed(acceleration, held_s, left),
+        _stoppable_speed(softly, held_s, left + before),
+    )
 
 
 def _farthest_in_flight(ring: NDArray[np.float64], newest: int, back: int, toward: float) -> float:

@@ -58,6 +58,7 @@ def found_wrong(
     position_error_rad: float,
     energy_j: float,
     limited_s: float,
+    three_arrivals_s: float,
 ) -> int:
     """Return the `Cause` of the first law that is broken, 0 if none is.
 
@@ -71,6 +72,10 @@ def found_wrong(
     if not isfinite(requested_rad_s):
         return int(Cause.COMMAND_NOT_FINITE)
     if not abs(angle_rad) <= limits.position_rad + limits.tolerance_rad:
+        return int(Cause.POSITION_LIMIT_EXCEEDED)
+    if not limits.lowest_rad <= angle_rad + limits.tolerance_rad:
+        return int(Cause.POSITION_LIMIT_EXCEEDED)
+    if not angle_rad - limits.tolerance_rad <= limits.highest_rad:
         return int(Cause.POSITION_LIMIT_EXCEEDED)
     if not age_s <= limits.stale_s:
         return int(Cause.MOTION_STALE)
@@ -91,6 +96,6 @@ def found_wrong(
         return int(Cause.TORQUE_HIGH)
     if not abs(torque_nm * velocity_rad_s) <= limits.power_w:
         return int(Cause.POWER_HIGH)
-    if not limited_s <= limits.at_limit_s:
+    if not (limited_s <= limits.at_limit_s and three_arrivals_s > limits.arrivals_s):
         return int(Cause.HELD_AT_LIMIT)
     return int(Cause.NONE)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from rigidimeter.core.records import Channel, Epoch, Outcome, readonly
 from rigidimeter.core.settings import Settings
 from rigidimeter.model import BiquadState, DriveState, JointDynamics
-from rigidimeter.rig.guard import Cause, guard_state, why_ended
+from rigidimeter.rig.guard import Cause, guard_limits, guard_state, why_ended
 from rigidimeter.virtual.batch.batch_epoch import EpochColumns, Joint
 from rigidimeter.virtual.batch.batch_rig import Bench, EpochInputs
 from rigidimeter.virtual.batch.compiled_steps import compiled
@@ -93,7 +93,9 @@ class Batch:
             Channel("velocity_command_rad_s", time_s, self.velocity_command_rad_s[i, rows]),
             Channel("perturbation_nm", time_s, self.perturbation_nm[i, rows]),
         ]
-        why = why_ended(self.settings, Cause(int(self.cause[i])), float(self.limit_time_s[i]))
+        why = why_ended(
+            guard_limits(self.settings), Cause(int(self.cause[i])), float(self.limit_time_s[i])
+        )
         prbs = self.settings.prbs
         return Epoch(
             source=self.source,

@@ -34,7 +34,7 @@ from rigidimeter.model import (
     moment,
     quantised,
 )
-from rigidimeter.rig.guard import Cause, step, watch
+from rigidimeter.rig.guard import Cause, contact, step, watch
 from rigidimeter.virtual.batch import batch_epoch as epoch
 
 
@@ -80,6 +80,7 @@ def compiled() -> Compiled:
                     energy_after=inlined(watch.energy_after),
                     found_wrong=inlined(watch.found_wrong, Cause=enum_numbers(Cause)),
                     outside=inlined(watch.outside),
+                    contact_step=inlined(contact.contact_step),
                     _most_serious=inlined(step._most_serious),
                     _fastest_toward=inlined(
                         step._fastest_toward,
@@ -125,7 +126,14 @@ def enum_numbers(members: type[IntEnum]) -> Any:
 def _digest() -> str:
     """Return a digest of every file that holds a step, and of this one."""
     steps = (
-        *(epoch.run_epoch, step.guard_step, watch.found_wrong, biquad_step, admittance_step),
+        *(
+            epoch.run_epoch,
+            step.guard_step,
+            watch.found_wrong,
+            contact.contact_step,
+            biquad_step,
+            admittance_step,
+        ),
         *(drive_step, arm_torque_nm, quantised, _digest),
     )
     files = sorted({str(sys.modules[step.__module__].__file__) for step in steps})

@@ -150,9 +150,7 @@ STALE = (1e3 * GUARD.stale_s, "ms")
         (Cause.ENERGY_HIGH, Found(0.7, GUARD.energy_limit_j, "J", 1.0, "guard.energy_limit_j")),
         (
             Cause.HELD_AT_LIMIT,
-            Found(
-                LIMITS.at_limit_s + PASSED_S, LIMITS.at_limit_s, "s", LIMITS.at_limit_s + PASSED_S
-            ),
+            Found(LIMITS.at_limit_s + PASSED_S, LIMITS.at_limit_s, "s of the last 5 s"),
         ),
         (
             Cause.MOVED_AT_REST,
@@ -209,6 +207,27 @@ def test_each_cause_is_told_with_its_number(cause, expected):
 )
 def test_the_larger_of_two_is_told(cause, changed, field, expected):
     assert getattr(told(cause, **changed), field) == pytest.approx(expected)
+
+
+def test_the_third_arrival_is_told_with_the_time_that_three_took():
+    guard = made(SETTINGS)[0].guard
+    contact = guard.contact._replace(three_s=6.5)
+    found = told(Cause.HELD_AT_LIMIT, guard={"contact": contact})
+    same(found, Found(3.0, 2.0, "arrivals within 10 s", 6.5))
+    contact = contact._replace(three_s=10.5)
+    assert told(Cause.HELD_AT_LIMIT, guard={"contact": contact}).unit == "s of the last 5 s"
+
+
+@pytest.mark.parametrize(("angle_rad", "end_rad"), [(-0.8, 0.2), (0.8, 0.4), (0.3, 0.4)])
+def test_of_a_range_the_end_that_was_passed_is_told(angle_rad, end_rad):
+    limits = {"lowest_rad": -0.2, "highest_rad": 0.4}
+    found = told(Cause.POSITION_LIMIT_EXCEEDED, guard={"angle_rad": angle_rad}, limits=limits)
+    assert found.value == pytest.approx(math.degrees(abs(angle_rad)))
+    assert found.limit == pytest.approx(math.degrees(end_rad + LIMITS.tolerance_rad))
+    assert found.setting == (
+        "the range of motion of this person, from where the joint began, and what sensor noise "
+        "may add"
+    )
 
 
 def test_a_stamp_ahead_may_be_so_by_the_reaction_time_and_a_tick():

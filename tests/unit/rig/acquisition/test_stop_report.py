@@ -209,7 +209,9 @@ def test_a_joint_against_its_limit():
     values = {"guard": {"position_limit_deg": 25.0}}
     account = stopped(values=values, speed_rad_s=3.0, inertia_kg_m2=0.0045)
     assert account.cause is Cause.HELD_AT_LIMIT
-    assert account.sentence.startswith(f"{Cause.HELD_AT_LIMIT.sentence}: 1 s, limit 1 s")
+    assert account.sentence.startswith(
+        f"{Cause.HELD_AT_LIMIT.sentence}: 1 s of the last 5 s, limit 1 s of the last 5 s; "
+    )
 
 
 def test_a_torque_that_does_not_answer():

@@ -360,6 +360,16 @@ def test_a_record_of_before_settings_were_renamed_covers_what_it_did(
         check(rigfile, settings=with_value("guard", "min_inertia_kg_m2", 0.99))
 
 
+def test_a_record_of_before_a_limit_could_be_set_covers_what_was_so_without_it(
+    rigfile: RigFile, record: CommissioningRecord
+) -> None:
+    values = covered(Settings())
+    del values["guard"]["arrival_speed_deg_s"]
+    write_record(record_path(rigfile.path), replace(record, covered=values))
+    assert check(rigfile).covered == values
+    assert check(rigfile, settings=with_value("guard", "arrival_speed_deg_s", 0.5)).passed
+
+
 @pytest.mark.parametrize("key", type(Settings().controller).model_fields)
 @pytest.mark.parametrize("factor", [0.99, 1.01])
 def test_another_controller_is_never_covered(

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from rigidimeter.core.settings import parse_settings
-from rigidimeter.rig.guard import Cause, GuardLimits, Reaction, guard_limits, guard_state, released
+from rigidimeter.rig.guard import (
+    Cause,
+    GuardLimits,
+    Reaction,
+    guard_limits,
+    guard_state,
+    released,
+    within_range,
+)
 
 DEG = math.pi / 180.0
 SETTINGS = {
@@ -15,6 +23,7 @@ SETTINGS = {
         "speed_limit_deg_s": 100.0,
         "acceleration_limit_deg_s2": 5000.0,
         "reaction_time_s": 0.05,
+        "arrival_speed_deg_s": 45.0,
         "stale_s": 0.2,
         "following_limit_deg": 3.0,
         "drift_limit_deg_s": 0.03,
@@ -55,6 +64,12 @@ def test_each_limit_is_the_settings_in_si_units():
         "following_rad": (3.0 + 0.25 + 0.5) * DEG,
         "drift_rad_s": 0.03 * DEG,
         "at_limit_s": 1.0,
+        "at_limit_of_s": 5.0,
+        "arrivals_s": 10.0,
+        "apart_s": 0.2,
+        "arrival_rad_s": 45.0 * DEG,
+        "lowest_rad": -math.inf,
+        "highest_rad": math.inf,
     }
     assert limits._asdict() == pytest.approx(expected, rel=1e-12)
 
@@ -70,6 +85,7 @@ def test_what_is_not_given_does_not_limit():
     assert limits[5:] == (
         *(0.0, 0.01, math.inf, 0.5),
         *(math.inf, math.inf, math.inf, math.inf, math.inf, 0.0, math.inf),
+        *(0.0, 0.0, 0.0, math.inf, -math.inf, math.inf),
     )
 
 
@@ -79,9 +95,24 @@ def test_the_memory_reaches_back_to_the_oldest_command_that_may_still_move_the_j
     assert state.sent_rad.shape == (522,)
     assert state.sent_rad.dtype == np.float64
     assert not state.sent_rad.any()
-    assert state[1:5] == (0, 0.0, 0.0, 0.0)
+    assert state[2:6] == (0, 0.0, 0.0, 0.0)
     assert math.isnan(state.origin_rad)
-    assert state[6:] == (0.0, Cause.NONE, Reaction.NONE, 0.0)
+    assert state[7:] == (0.0, Cause.NONE, Reaction.NONE)
+    assert state.contact.at_limit.tolist() == [0]
+    assert state.contact[1:] == (0, 0, False, *[math.inf] * 3, 0)
+
+
+def test_the_position_limit_is_remembered_for_its_time():
+    state = guard_state(GuardLimits(0.7, 3.0, 100.0, 0.02, 0.02, at_limit_of_s=0.05))
+    assert state.contact.at_limit.tolist() == [0, 0, 0]
+    assert state.contact.at_limit.dtype == np.int64
+
+
+def test_a_range_is_put_into_the_limits():
+    limits = within_range(guard_limits(parse_settings(SETTINGS)), -0.2, 9.0)
+    assert (limits.lowest_rad, limits.highest_rad) == (-0.2, 9.0)
+    assert limits.extent_rad == (-0.2, 30.0 * DEG)
+    assert within_range(limits, -9.0, 0.1).extent_rad == (-30.0 * DEG, 0.1)
 
 
 def test_a_memory_of_parts_of_a_tick_is_rounded_up():
@@ -101,7 +132,7 @@ def test_released_forgets_the_cause_alone():
     after = released(before)
     assert (after.cause, after.reaction) == (Cause.NONE, Reaction.NONE)
     assert after.sent_rad is before.sent_rad
-    assert after[1:7] == before[1:7]
+    assert after[2:8] == before[2:8]
 
 
 @pytest.mark.parametrize(

@@ -38,11 +38,19 @@ def test_away_from_a_limit_the_speed_is_free():
 
 @pytest.mark.parametrize("request_rad_s", [16.0, -16.0])
 @pytest.mark.parametrize(("age_s", "in_flight_s"), [(0.25, 0.75), (0.25001, 0.875)])
-def test_the_search_is_spared_only_where_it_could_find_nothing(request_rad_s, age_s, in_flight_s):
+@pytest.mark.parametrize(
+    ("arrival_rad_s", "stopping_rad"),
+    [(math.inf, 16.0), (16.0, 16.0), (20.0, 16.0), (8.0, (256.0 - 64.0) / 1.6 + 4.0)],
+)
+def test_the_search_is_spared_only_where_it_could_find_nothing(
+    request_rad_s, age_s, in_flight_s, arrival_rad_s, stopping_rad
+):
     # Full speed for as long as is remembered; then the angle at which the law begins to bind:
     # in flight 16 (0.25 + 0.5) and what a part of a tick adds, T = 0.25 s, stopping 16 · 16 / 16.
-    limits = BINARY._replace(gap_s=0.125, following_rad=math.inf)
-    room = 16.0 * in_flight_s + 16.0 * 0.25 + 16.0
+    limits = BINARY._replace(
+        position_rad=256.0, gap_s=0.125, following_rad=math.inf, arrival_rad_s=arrival_rad_s
+    )
+    room = 16.0 * in_flight_s + 16.0 * 0.25 + stopping_rad
     sign = math.copysign(1.0, request_rad_s)
 
     def sent_at(angle):
@@ -52,8 +60,8 @@ def test_the_search_is_spared_only_where_it_could_find_nothing(request_rad_s, ag
             state = state._replace(velocity_rad_s=request_rad_s)
         return step(state, request_rad_s, angle=sign * angle, age_s=age_s, limits=limits)[1:]
 
-    assert sent_at(64.0 - room) == (request_rad_s, Limited.NOT)
-    sent, limited = sent_at(64.0 - room + 0.125)
+    assert sent_at(256.0 - room) == (request_rad_s, Limited.NOT)
+    sent, limited = sent_at(256.0 - room + 0.03125)
     assert limited == Limited.POSITION
     assert 15.9 < abs(sent) < 16.0
 
@@ -122,7 +130,7 @@ def test_at_or_beyond_the_limit_nothing_goes_outward(sign, angle):
 
 def pressed(times, limits, state=None, request=1.0, elapsed=1):
     """Return the state after so many ticks at the limit, of a controller that asks for more."""
-    state = at() if state is None else state
+    state = at(limits=limits) if state is None else state
     for _ in range(times):
         state, _, _ = step(state, request, angle=0.7, limits=limits, elapsed=elapsed)
     return state
@@ -130,7 +138,7 @@ def pressed(times, limits, state=None, request=1.0, elapsed=1):
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_joint_that_is_driven_against_the_limit_for_long_is_held(sign):
-    limits = BINARY._replace(at_limit_s=1.0, reaction_time_s=0.0)
+    limits = BINARY._replace(at_limit_s=1.0, at_limit_of_s=5.0, reaction_time_s=0.0)
     state = guard_state(limits)._replace(velocity_rad_s=0.0)
     for tick in range(1, 12):
         state, sent, limited = step(state, sign, angle=sign * 64.0, limits=limits)
@@ -139,22 +147,131 @@ def test_a_joint_that_is_driven_against_the_limit_for_long_is_held(sign):
 
 
 def test_ticks_that_were_missed_at_the_limit_count():
-    limits = LIMITS._replace(at_limit_s=0.05)
+    limits = LIMITS._replace(at_limit_s=0.05, at_limit_of_s=0.2)
     assert pressed(6, limits, elapsed=10).cause == Cause.NONE  # 0.06 s, said at the next tick
     assert pressed(7, limits, elapsed=10).cause == Cause.HELD_AT_LIMIT
 
 
-def test_a_moment_away_from_the_limit_begins_the_time_again():
-    limits = LIMITS._replace(at_limit_s=0.05)
-    state = pressed(1, limits, pressed(45, limits), request=-0.01)
-    assert (state.limited_s, state.cause) == (0.0, Cause.NONE)
-    assert pressed(45, limits, state).cause == Cause.NONE
+def test_a_moment_away_from_the_limit_does_not_begin_the_time_again():
+    limits = LIMITS._replace(at_limit_s=0.05, at_limit_of_s=0.2)
+    state = pressed(10, limits, pressed(41, limits), request=-0.01)
+    assert (state.contact.ticks, state.contact.touching) == (41, False)
+    assert state.cause == Cause.NONE
+    assert pressed(11, limits, state).cause == Cause.HELD_AT_LIMIT
+    # What is longer ago than the memory does not count.
+    state = pressed(190, limits, state, request=-0.01)
+    assert state.contact.ticks == 0
+    assert pressed(51, limits, state).cause == Cause.NONE
 
 
-def test_after_the_operator_went_on_the_time_begins_again():
-    limits = LIMITS._replace(at_limit_s=0.05)
+def come_and_go(limits, apart_s, times):
+    """Return the state after so many arrivals of one tick each, this time apart."""
+    state = at(limits=limits)
+    for _ in range(times):
+        state = pressed(1, limits, state)
+        state = pressed(round(apart_s / limits.interval_s) - 1, limits, state, request=-0.01)
+    return state
+
+
+ARRIVE = LIMITS._replace(arrivals_s=1.0, apart_s=0.2)
+
+
+@pytest.mark.parametrize(
+    ("apart_s", "times", "arrivals", "cause"),
+    [
+        (0.4, 2, 2, Cause.NONE),
+        (0.4, 3, 3, Cause.HELD_AT_LIMIT),
+        (0.49, 3, 3, Cause.HELD_AT_LIMIT),
+        (0.51, 4, 4, Cause.NONE),  # three take more than a second
+        (0.125, 3, 2, Cause.NONE),  # 0, 0.25 s: the second is too near to the first
+        (0.125, 5, 3, Cause.HELD_AT_LIMIT),
+    ],
+)
+def test_the_third_arrival_within_a_time_is_held(apart_s, times, arrivals, cause):
+    state = come_and_go(ARRIVE, apart_s, times)
+    assert (state.contact.arrivals, state.cause) == (arrivals, cause)
+    assert state.reaction == cause.reaction
+
+
+def test_what_stays_at_the_limit_has_arrived_once():
+    assert pressed(900, ARRIVE).contact.arrivals == 1
+
+
+def test_time_that_was_missed_lies_between_arrivals():
+    state = pressed(1, ARRIVE, pressed(1, ARRIVE, elapsed=3), request=-0.01)
+    state = pressed(1, ARRIVE, state, elapsed=199)
+    assert (state.contact.arrivals, state.contact.before_s) == (2, pytest.approx(0.2))
+
+
+def test_after_the_operator_went_on_the_time_and_the_arrivals_begin_again():
+    limits = ARRIVE._replace(at_limit_s=0.05, at_limit_of_s=0.2)
     state = released(pressed(60, limits))
-    assert (state.limited_s, pressed(45, limits, state).cause) == (0.0, Cause.NONE)
+    assert state.contact.ticks == 0
+    state = pressed(45, limits, state)
+    assert (state.contact.ticks, state.cause) == (45, Cause.NONE)
+    state = released(come_and_go(limits, 0.3, 3))
+    state = pressed(1, limits, state)
+    assert (state.contact.arrivals, state.cause, state.contact.three_s) == (4, 0, math.inf)
+
+
+SOFT = LIMITS._replace(arrival_rad_s=0.5)
+NEAR = 0.5 * 0.001 + 0.25 / 200.0
+"""From here a joint at 0.5 rad/s stops at 100 rad/s², told to after another tick."""
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_speed_of_arrival_is_bounded(sign):
+    # nearer than that the law is the one without a bound
+    for left in (0.5 * NEAR, 0.999 * NEAR):
+        bounded = step(at(sign), sign, angle=sign * (0.7 - left), limits=SOFT)[1:]
+        assert bounded == step(at(sign), sign, angle=sign * (0.7 - left))[1:]
+        assert abs(bounded[0]) < 0.5
+    # farther away it can brake to that speed with 10 rad/s²
+    for more in (1e-9, 0.01, 0.03):
+        left = NEAR + more
+        _, sent, limited = step(at(sign), sign, angle=sign * (0.7 - left), limits=SOFT)
+        speed = abs(sent)
+        assert (speed - 0.5) * 0.001 + (speed**2 - 0.25) / 20.0 == pytest.approx(more, rel=1e-6)
+        assert 0.5 < speed < 1.0
+        assert limited == Limited.POSITION
+
+
+def test_a_bound_above_the_speed_limit_bounds_nothing():
+    loose = LIMITS._replace(arrival_rad_s=3.0)
+    for k in range(1, 400):
+        angle = 0.7 - 0.0002 * k
+        assert (
+            step(at(3.0), 3.0, angle=angle, limits=loose)[1:] == step(at(3.0), 3.0, angle=angle)[1:]
+        )
+
+
+RANGE = LIMITS._replace(lowest_rad=-0.25, highest_rad=0.5)
+
+
+@pytest.mark.parametrize(("sign", "end"), [(1.0, 0.5), (-1.0, 0.25)])
+def test_a_range_cuts_the_limit_on_each_side_by_itself(sign, end):
+    distance = 0.002
+    _, sent, limited = step(at(sign), sign, angle=sign * (end - distance), limits=RANGE)
+    assert abs(sent) * 0.001 + sent**2 / 200.0 == pytest.approx(distance, rel=1e-9)
+    assert limited == Limited.POSITION
+    state, sent, _ = step(at(), sign * 0.05, angle=sign * end, limits=RANGE)
+    assert (abs(sent), state.cause) == (0.0, Cause.NONE)
+    _, sent, limited = step(at(), -sign * 0.05, angle=sign * end, limits=RANGE)
+    assert (sent, limited) == (-sign * 0.05, Limited.NOT)
+    beyond = sign * (end + RANGE.tolerance_rad)
+    assert step(at(), angle=beyond * 0.9999, limits=RANGE)[0].cause == Cause.NONE
+    assert step(at(), angle=beyond * 1.0001, limits=RANGE)[0].cause == Cause.POSITION_LIMIT_EXCEEDED
+
+
+def test_a_range_wider_than_the_limit_changes_nothing():
+    wide = LIMITS._replace(lowest_rad=-0.7, highest_rad=2.0)
+    for angle in (0.699, -0.699, 0.705, -0.705, 0.72, -0.72):
+        for speed in (1.0, -1.0):
+            with_range = step(at(speed), speed, angle=angle, limits=wide)
+            assert with_range[1:] == step(at(speed), speed, angle=angle)[1:]
+            assert with_range[0].cause == step(at(speed), speed, angle=angle)[0].cause
+    assert wide.extent_rad == (-0.7, 0.7)
+    assert RANGE.extent_rad == (-0.25, 0.5)
 
 
 def test_just_before_the_limit_something_still_goes_outward():

@@ -6,7 +6,15 @@ import pytest
 from tests.unit.rig.guard.one_step import BINARY, LIMITS, at, step
 
 from rigidimeter.core.settings import Settings
-from rigidimeter.rig.guard import Cause, Limited, Reaction, guard_step, why_ended
+from rigidimeter.rig.guard import (
+    Cause,
+    Limited,
+    Reaction,
+    guard_limits,
+    guard_step,
+    why_ended,
+    within_range,
+)
 
 
 def test_the_numbers_of_the_record():
@@ -272,14 +280,20 @@ def test_while_latched_the_position_limit_still_holds():
 
 
 def test_a_cause_is_why_an_epoch_ended():
-    why = why_ended(Settings(), Cause.TORQUE_NOT_FINITE, 1.0)
+    why = why_ended(guard_limits(Settings()), Cause.TORQUE_NOT_FINITE, 1.0)
     assert why == f"the guard stopped the rig: {Cause.TORQUE_NOT_FINITE.sentence}"
 
 
 def test_a_limit_that_was_reached_is_why_it_does_not_count():
-    why = why_ended(Settings(), Cause.NONE, 1.23456)
+    why = why_ended(guard_limits(Settings()), Cause.NONE, 1.23456)
     assert why == "the arm came to the position limit of ±40 deg at 1.235 s"
 
 
+def test_of_a_range_both_ends_are_named():
+    limits = within_range(guard_limits(Settings()), math.radians(-12.0), 2.0)
+    why = why_ended(limits, Cause.NONE, 1.0)
+    assert why == "the arm came to the position limit of -12 or 40 deg at 1.000 s"
+
+
 def test_a_sound_epoch_counts():
-    assert why_ended(Settings(), Cause.NONE, math.nan) == ""
+    assert why_ended(guard_limits(Settings()), Cause.NONE, math.nan) == ""

@@ -22,6 +22,7 @@ LIMITS = GuardLimits(
     energy_j=5.0,
     following_rad=0.03125,
     at_limit_s=1.0,
+    arrivals_s=4.0,
 )
 WELL = {
     "requested_rad_s": 0.5,
@@ -34,6 +35,7 @@ WELL = {
     "position_error_rad": 0.0,
     "energy_j": 0.1,
     "limited_s": 0.5,
+    "three_arrivals_s": 8.0,
 }
 
 AT_THE_BOUNDARY = [
@@ -49,8 +51,8 @@ AT_THE_BOUNDARY = [
 SIGNED = {"angle_rad", "velocity_rad_s", "position_error_rad", "torque_nm"}
 
 
-def found(**values):
-    return found_wrong(LIMITS, **{**WELL, **values})
+def found(limits=LIMITS, **values):
+    return found_wrong(limits, **{**WELL, **values})
 
 
 def test_nothing_is_wrong():
@@ -63,6 +65,21 @@ def test_a_law_holds_up_to_its_limit_and_no_further(field, limit, cause):
     for sign in (1.0, -1.0) if field in SIGNED else (1.0,):
         assert found(**{field: sign * limit}) == Cause.NONE
         assert found(**{field: sign * math.nextafter(limit, math.inf)}) == cause
+
+
+def test_three_arrivals_must_take_longer_than_their_time():
+    assert found(three_arrivals_s=math.nextafter(4.0, 5.0)) == Cause.NONE
+    assert found(three_arrivals_s=4.0) == Cause.HELD_AT_LIMIT
+    assert found(three_arrivals_s=math.nan) == Cause.HELD_AT_LIMIT
+
+
+@pytest.mark.parametrize(("angle_rad", "beyond"), [(-0.375, -math.inf), (0.625, math.inf)])
+def test_the_range_has_a_limit_on_each_side(angle_rad, beyond):
+    cut = LIMITS._replace(lowest_rad=-0.25, highest_rad=0.5)  # and a tolerance of 0.125
+    assert found(cut, angle_rad=angle_rad) == Cause.NONE
+    outside = math.nextafter(angle_rad, beyond)
+    assert found(cut, angle_rad=outside) == Cause.POSITION_LIMIT_EXCEEDED
+    assert found(angle_rad=outside) == Cause.NONE
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
