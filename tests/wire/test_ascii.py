@@ -59,6 +59,26 @@ def test_facts_are_read_from_the_drive(wire):
     assert facts.values["deceleration_counts_s2"] == pytest.approx(500_000.0)
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_current_of_the_motor_is_its_torque_where_the_scale_is_given(wire, sign):
+    drive = wire.drive(sign=sign, torque_nm_per_a=1.0)
+    assert drive.configure().values["rated_torque_nm"] == pytest.approx(10.0)
+    drive.enable()
+    wire.arm.voluntary_nm = lambda _: -2.0
+    sample, _ = wire.run(drive, 0.0, 0.3)
+    assert sample.drive_torque_nm == pytest.approx(sign * wire.arm.drive_torque_nm(), abs=0.006)
+    assert abs(sample.drive_torque_nm) > 1.5
+    drive.disable()
+    assert wire.run(drive, 0.0, 0.3)[0].drive_torque_nm == 0.0
+
+
+def test_without_its_scale_the_current_is_not_read(wire):
+    drive = wire.enabled()
+    sample, _ = wire.run(drive, 0.0, 0.2)
+    assert math.isnan(sample.drive_torque_nm)
+    assert all("0x0c" not in request for _, request, _ in wire.emulator.log)
+
+
 def test_velocity_mode_asks_for_a_watchdog_of_hardware(wire):
     with pytest.raises(DeviceError, match="external_watchdog = true"):
         wire.drive(mode="velocity").configure()

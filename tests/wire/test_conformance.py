@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -84,7 +87,7 @@ def rdt() -> Iterator[SensorFixture]:
 
 
 @contextmanager
-def ascii_fixture(mode: str) -> Iterator[DriveFixture]:
+def ascii_fixture(mode: str, **more: float) -> Iterator[DriveFixture]:
     arm = EmulatedArm(JOINT)
     emulator = AsciiEmulator(arm)
     settings = AsciiDrive.Settings(
@@ -94,6 +97,7 @@ def ascii_fixture(mode: str) -> Iterator[DriveFixture]:
         external_watchdog=mode == "velocity",
         lost_s=0.15,
         horizon_s=0.2,  # the cycle is measured on a machine that is shared
+        **more,
     )
     try:
         yield DriveFixture(
@@ -160,6 +164,7 @@ SENSORS = {"ati-analogue": analogue, "ati-rdt": rdt}
 DRIVES = {
     "ascii-moves": lambda: ascii_fixture("moves"),
     "ascii-velocity": lambda: ascii_fixture("velocity"),
+    "ascii-torque": lambda: ascii_fixture("moves", torque_nm_per_a=1.0),
     "cia402": cia402,
     "cia402-durand": cia402_on_another_stack,
 }
@@ -196,3 +201,26 @@ def test_a_sensor_that_its_driver_calls_frozen_a_little_later_does_not_pass() ->
         )
         with pytest.raises(ConformanceError, match="a good sample has no cause; TORQUE_FROZEN"):
             sensor_samples_flow(fixture)
+
+
+@pytest.mark.parametrize(
+    ("torque_nm", "said"),
+    [(math.nan, "is a number in N·m at the joint"), (1e3, "at most 33 times rated_torque_nm = 10")],
+)
+def test_a_drive_that_promises_a_torque_and_has_none_does_not_pass(torque_nm, said) -> None:
+    check = next(check for check in DRIVE_CHECKS if "torque" in check.__name__)
+    with cia402() as made, pytest.raises(ConformanceError, match=said):
+        check(replace(made, make=lambda: Spoiled(made.make(), torque_nm)))
+
+
+class Spoiled:
+    """A drive with another torque in its samples."""
+
+    def __init__(self, drive: Any, torque_nm: float) -> None:
+        self._drive, self._torque_nm = drive, torque_nm
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._drive, name)
+
+    def read(self) -> Any:
+        return self._drive.read()._replace(drive_torque_nm=self._torque_nm)

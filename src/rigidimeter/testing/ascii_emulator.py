@@ -59,7 +59,9 @@ LOOP_GAIN_S = 60.0
 SPEEDS = {getattr(termios, f"B{rate}"): rate for rate in (9600, 19200, 38400, 57600, 115200)}
 FAULT, ENABLE_OPEN, DISABLED, NO_PWM, MOVING = 1 << 22, 1 << 11, 1 << 12, 1 << 15, 1 << 27
 TEXTS = {0x92: "EMU-055-18", 0x81: "4711"}
-READ_ONLY = (0x18, 0x32, 0xA0)
+READ_ONLY = (0x0C, 0x18, 0x22, 0x32, 0xA0)
+NM_PER_A = 1.0
+"""Torque at the joint, by the drive's own scale, for an ampere of its motor."""
 
 
 class AsciiEmulator:
@@ -88,6 +90,7 @@ class AsciiEmulator:
         self._faults: dict[str, Any] = {}
         self._registers = {0x24: OFF, 0x2F: 0, 0x36: 1000, 0x37: 1000, 0x90: POWER_UP_BAUD}
         self._registers |= dict.fromkeys((0xA4, 0xC8, 0xCA, 0xCB), 0)
+        self._registers[0x22] = round(100.0 * arm.drive_side.rated_torque_nm / NM_PER_A)
         self._registers |= dict.fromkeys((0xCC, 0xCD, 0xCF), 10_000)
         position = self._counts()[0]
         self._generator = Trapezoid(position, position)
@@ -225,6 +228,9 @@ class AsciiEmulator:
         position, velocity = self._seen()
         status = self._faults.get("status_is", self._status())
         live = {0x32: position, 0x18: velocity, 0xA0: status}
+        if register == 0x0C:
+            torque_nm = self._arm.drive_torque_nm() if self._powered() else 0.0
+            live[register] = round(100.0 * torque_nm / NM_PER_A)
         value = live.get(register, self._registers.get(register))
         return "e 15" if value is None else f"v {value}"
 

@@ -31,8 +31,8 @@ class RecentSamples(NamedTuple):
     """The samples of the last second in a few numbers; NaN where there are none.
 
     The largest are absolute values. `torque_nm` is the mean of the last 0.1 s, readable where the
-    torque itself is not. Ages are those of the last sample. `held_back` says whether the position
-    limit held a command back.
+    torque itself is not, and so is `drive_torque_nm`, NaN if the drive reports none. Ages are those
+    of the last sample. `held_back` says whether the position limit held a command back.
     """
 
     samples: int = 0
@@ -47,6 +47,7 @@ class RecentSamples(NamedTuple):
     torque_status: int = 0
     motion_status: int = 0
     held_back: bool = False
+    drive_torque_nm: float = math.nan
 
 
 def recent_samples(rows: NDArray[np.void]) -> RecentSamples:
@@ -55,10 +56,10 @@ def recent_samples(rows: NDArray[np.void]) -> RecentSamples:
         return RecentSamples()
     last = rows[-1]
     power_w = rows["torque_nm"] * rows["velocity_rad_s"]
-    newest = rows["torque_nm"][rows["time_s"] > last["time_s"] - 0.1]
+    newest = rows[rows["time_s"] > last["time_s"] - 0.1]
     return RecentSamples(
         int(rows.size),
-        float(np.mean(newest)),
+        float(np.mean(newest["torque_nm"])),
         _largest(rows["angle_rad"]),
         _largest(rows["velocity_rad_s"]),
         _largest(rows["torque_nm"]),
@@ -69,6 +70,7 @@ def recent_samples(rows: NDArray[np.void]) -> RecentSamples:
         int(last["torque_status"]),
         int(last["motion_status"]),
         bool(np.any(rows["limited"] == Limited.POSITION)),
+        float(np.mean(newest["drive_torque_nm"])),
     )
 
 

@@ -55,6 +55,8 @@ def status_line(facts: Facts) -> str:
     if facts.countdown_words:
         parts.append(f"{facts.countdown_words}: {facts.countdown_s:.0f} s left")
     parts += [f"{facts.angle_deg:+6.1f} deg", f"{facts.torque_nm:+6.2f} N·m"]
+    if math.isfinite(facts.drive_torque_nm):
+        parts[-1] += f" (drive {facts.drive_torque_nm:+.2f})"
     known = [value.text for value in facts.live if value.settled]
     if known:
         parts.append(f"{facts.live_words}, live: {', '.join(known)}")

@@ -100,8 +100,8 @@ class Facts:
         J, B and K.
     live_words : str
         Of which epoch they are.
-    angle_deg, torque_nm : float
-        Now; the torque is the mean of 0.1 s.
+    angle_deg, torque_nm, drive_torque_nm : float
+        Now; torques are means of 0.1 s. The drive's is that of its motor, NaN if it reports none.
     distances : tuple of LimitDistance
     indicators : tuple of Indicator
     cause : Cause
@@ -125,6 +125,7 @@ class Facts:
     live_words: str
     angle_deg: float
     torque_nm: float
+    drive_torque_nm: float
     distances: tuple[LimitDistance, ...]
     indicators: tuple[Indicator, ...]
     cause: Cause
@@ -175,6 +176,7 @@ def facts(
         live_words=live_words,
         angle_deg=deg_from_rad(loop.angle_rad),
         torque_nm=recent.torque_nm,
+        drive_torque_nm=recent.drive_torque_nm,
         distances=distances,
         indicators=all_indicators(
             plan.settings, loop, recent, distances, recorder, left_s, caution

@@ -21,7 +21,10 @@ from rigidimeter.core.settings import OnlineSettings
 from rigidimeter.rig.acquisition import REST
 from rigidimeter.rig.acquisition.processes import ROW, Estimator, SampleReader, SampleRing
 
-TRACES = ("torque_nm", "angle_rad", "velocity_command_rad_s", "perturbation_nm")
+TRACES = (
+    *("torque_nm", "angle_rad", "velocity_command_rad_s", "perturbation_nm"),
+    "drive_torque_nm",
+)
 AT_ONCE = ("angle_rad", "torque_nm", "measured_nm", "modelled_nm")
 """What is drawn one over the other, so of each piece the values of one sample."""
 

@@ -23,6 +23,9 @@ from rigidimeter.testing.conformance.fixture import (
 
 DRIVE_COUNTS = ("received", "lost", "damaged")
 POWER_OFF_S = 0.1
+MOST_RATED = 33.0
+"""Of a drive's torque in its rated torque: more is no torque, or of another unit."""
+
 AT_REST = 0.02
 """As a part of the fixture's speed."""
 
@@ -76,6 +79,35 @@ def drive_samples_flow(fixture: DriveFixture) -> None:
         wait_for(newer, fixture, "a new sample arrives")
         sample = drive.read()
         check_sample(sample, sample.angle_rad + sample.velocity_rad_s, fixture.now)
+
+
+def drive_reports_torque_or_none(fixture: DriveFixture) -> None:
+    """Check that samples hold a torque if the facts have `rated_torque_nm`, and NaN if not."""
+    with closing(fixture.make()) as drive:
+        drive.connect()
+        rated = drive.configure().values.get("rated_torque_nm")
+        require(
+            rated is None or (isinstance(rated, float | int) and 0.0 < rated < math.inf),
+            f"rated_torque_nm, if the facts have it, is above 0; it is {rated!r}",
+        )
+        drive.enable()
+        before_s = drive.read().time_s
+        for _ in range(50):
+            _run(drive, fixture, 0.0, 1)
+            sample = drive.read()
+            torque_nm = sample.drive_torque_nm
+            if rated is None:
+                require(
+                    math.isnan(torque_nm),
+                    f"without rated_torque_nm in the facts drive_torque_nm is NaN; it is "
+                    f"{torque_nm:g}",
+                )
+            elif sample.time_s > before_s:
+                require(
+                    abs(torque_nm) <= MOST_RATED * float(rated),  # which NaN is not
+                    f"drive_torque_nm is a number in N·m at the joint, at most {MOST_RATED:g} "
+                    f"times rated_torque_nm = {rated:g}; it is {torque_nm:g}",
+                )
 
 
 def drive_returns_what_was_sent(fixture: DriveFixture) -> None:
@@ -240,6 +272,7 @@ DRIVE_CHECKS: tuple[Callable[[DriveFixture], None], ...] = (
     drive_energises_by_enable_only,
     drive_enables_at_rest,
     drive_samples_flow,
+    drive_reports_torque_or_none,
     drive_returns_what_was_sent,
     drive_bounds_commands,
     drive_read_never_waits,

@@ -242,6 +242,7 @@ def test_the_last_second_in_numbers():
     rows["motion_time_s"] = rows["time_s"] - 2e-3
     rows["torque_nm"][:-100], rows["torque_nm"][-100:] = 9.0, 1.0
     rows["torque_nm"][500] = -12.0
+    rows["drive_torque_nm"][-100:] = 2.5
     rows["velocity_rad_s"] = -0.5
     rows["angle_rad"][3], rows["angle_rad"][4] = -0.3, math.nan
     rows["lateness_s"][7] = 4e-3
@@ -249,6 +250,7 @@ def test_the_last_second_in_numbers():
     found = recent_samples(rows)
     assert found.samples == 1000
     assert found.torque_nm == pytest.approx(1.0)
+    assert found.drive_torque_nm == pytest.approx(2.5)
     assert found.largest_angle_rad == 0.3
     assert found.largest_torque_nm == 12.0
     assert found.largest_power_w == 6.0

@@ -80,6 +80,9 @@ def test_the_status_says_where_the_run_is_and_why_it_stands():
     assert line(loop).startswith(
         "    12.2 s | epoch 1 of 3: OFF, prbs | epoch: 8 s left |   +5.7 deg |  -1.50 N·m"
     )
+    assert "drive" not in line(loop)
+    reports = recent._replace(drive_torque_nm=2.25)
+    assert "|  -1.50 N·m (drive +2.25)" in status_line(facts(PLAN, progress, loop, (), reports))
     assert "live" not in line(loop, [LiveEstimate()])
     known = [estimate(0.1 * k, epoch=1) for k in range(1, 100)]
     assert "epoch 1, live: J 4.500e-3 ± 0.020e-3 kg·m², B" in line(loop, known)

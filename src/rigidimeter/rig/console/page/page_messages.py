@@ -234,7 +234,7 @@ def is_known(facts: Facts) -> bool:
 
 
 def points(traces: Traces, *, modelled: bool) -> bytes:
-    """Return samples as little-endian float64, 13 numbers for each piece of time.
+    """Return samples as little-endian float64, 15 numbers for each piece of time.
 
     The time in s; the least values of the traces, then the largest; then those of the piece's
     first sample: angle, torque, and the torque in the band of the live estimate, measured and

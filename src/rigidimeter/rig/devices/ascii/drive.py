@@ -11,11 +11,12 @@ deceleration. It is at rest within
 even if the computer is dead. ``mode = "velocity"`` has no such end and is refused unless
 `external_watchdog` says that a relay removes the power when the loop's pulses cease.
 
-A cycle sends target, velocity and start, then reads position, velocity, and in turn the event
-status or the desired state. `read` and `write` only exchange batches with a thread (see `line`). A
-command during an unfinished cycle is not sent, and `write` returns the one still in force. The
-velocity is the drive's own register, computed at its control rate; differences of positions would
-contain the jitter of time stamps from a serial line.
+A cycle sends target, velocity and start, then reads position, velocity, the motor's current where
+`torque_nm_per_a` says what torque that is, and in turn the event status or the desired state.
+`read` and `write` only exchange batches with a thread (see `line`). A command during an unfinished
+cycle is not sent, and `write` returns the one still in force. The velocity is the drive's own
+register, computed at its control rate; differences of positions would contain the jitter of time
+stamps from a serial line.
 
 If the loop was held up for longer than the horizon, the drive has stopped by itself and must not be
 started again: commands are zero from then on, as after any fault, until `enable`.
@@ -64,6 +65,7 @@ class AsciiDrive:
         per_deg = settings.counts_per_turn / 360.0
         self._per_rad = settings.sign * settings.counts_per_turn / (2.0 * math.pi)
         self._offset_rad = math.radians(settings.angle_offset_deg)
+        self._nm_per_a = settings.sign * settings.torque_nm_per_a
         self._fastest = settings.max_velocity_deg_s * per_deg
         self._acceleration = settings.acceleration_deg_s2 * per_deg
         self._braking = self._deceleration = settings.deceleration_deg_s2 * per_deg
@@ -136,6 +138,10 @@ class AsciiDrive:
             "braking_rad_s2": self._deceleration / abs(self._per_rad),
             "external_watchdog": int(s.external_watchdog),
         }
+        if s.torque_nm_per_a:
+            values["rated_torque_nm"] = 0.01 * talk.value(0x22) * s.torque_nm_per_a
+        else:
+            values["drive's torque"] = "not read: torque_nm_per_a is 0"
         return DeviceFacts(
             model=talk.text(0x92),
             serial=talk.text(0x81),
@@ -189,6 +195,7 @@ class AsciiDrive:
             (feedback.position, feedback.speed),
             feedback.status,
             int(feedback.cause),
+            0.01 * feedback.current * self._nm_per_a,
         )
 
     def write(self, velocity_rad_s: float) -> float:
@@ -280,7 +287,8 @@ class AsciiDrive:
         if line is not None:
             self._cycle += 1
             turns = (0xA0, 0x24) if ask_all else ((0x24,) if self._cycle % 2 else (0xA0,))
-            requests = (*commands, *map(read_request, (0x32, 0x18, *turns)))
+            asked = (0x32, 0x18, *self._settings.current_registers, *turns)
+            requests = (*commands, *map(read_request, asked))
             self._feedback.asked(requests, self._now())
             line.submit(*requests)
 

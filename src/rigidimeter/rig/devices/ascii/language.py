@@ -9,6 +9,7 @@ Each line ends with a carriage return. Registers used, in counts of the position
 
     0x24 desired state: 0 off, 11 programmed velocity, 21 trajectory generator
     0x2f programmed velocity, 0x18 actual velocity, both in 0.1 counts/s; 0x32 actual position
+    0x0c actual current of the motor, 0x22 its continuous limit, both in 0.01 A
     0x36, 0x37 acceleration and deceleration of the velocity loop, in 1000 counts/s²
     0xc8 profile: 0 absolute trapezoid; 0xca target, 0xcb velocity in 0.1 counts/s
     0xcc, 0xcd, 0xcf acceleration, deceleration, deceleration of an abort, in 10 counts/s²
@@ -16,8 +17,9 @@ Each line ends with a carriage return. Registers used, in counts of the position
 
 The baud change, the states, the units of 0x18, 0x2f, 0x36, 0x37 and 0xca..0xcd and profile 0 are
 taken from published programs for such drives. The rest is from memory of the public programmer's
-guide and must be verified at commissioning: the bits of the event status, 0x81, 0x92 and 0xcf, that
-`t 1` accepts a changed target and velocity during a move, and that `t 0` at rest changes nothing.
+guide and must be verified at commissioning: the bits of the event status, 0x0c, 0x22, 0x81, 0x92
+and 0xcf, that `t 1` accepts a changed target and velocity during a move, and that `t 0` at rest
+changes nothing.
 
 Moves are absolute, not relative. Sources disagree on whether a relative move started during another
 one starts from the present position or from the previous target. In the second case every command
@@ -184,6 +186,8 @@ class Feedback:
         self._baud, self._jump, self._fastest, self._state_on = baud, jump, fastest, state_on
         self.position = self.speed = self.status = 0
         """Position in counts, velocity in 0.1 counts/s, and the event status."""
+        self.current = math.nan
+        """Of the motor, in 0.01 A; NaN before it was read."""
         self.position_s = -math.inf
         self.sequence = -1
         self.cause = Cause.NONE
@@ -258,6 +262,8 @@ class Feedback:
             self.sequence += 1
         elif request == read_request(0x18):
             self.speed = reply.value
+        elif request == read_request(0x0C):
+            self.current = reply.value
         elif request == read_request(0xA0):
             self._take_status(reply.value, commanding)
         elif request == read_request(0x24) and commanding and reply.value != self._state_on:

@@ -42,12 +42,16 @@ class AsciiDriveSettings(Section):
         Serial port, such as ``/dev/ttyUSB0``.
     counts_per_turn : float
         Encoder counts for one turn of the joint, gear included.
+    torque_nm_per_a : float
+        Torque at the joint for an ampere of the motor, gear included, positive; 0 where the current
+        is not read. Reading it makes a cycle longer.
     """
 
     port: str
     counts_per_turn: float = Field(gt=0.0, le=1e9, json_schema_extra={"unit": "counts"})
     baud: Literal[9600, 19200, 38400, 57600, 115200] = 115200
     sign: Literal[1, -1] = 1
+    torque_nm_per_a: float = quantity(0.0, "N·m/A", 0.0, 1e5)
     angle_offset_deg: float = quantity(0.0, "deg", -360.0, 360.0)
     mode: Literal["moves", "velocity"] = "moves"
     external_watchdog: bool = False
@@ -57,6 +61,11 @@ class AsciiDriveSettings(Section):
     deceleration_deg_s2: float = quantity(7000.0, "deg/s²", 0.0, 100_000.0, above=True)
     lost_s: float = quantity(0.1, "s", 0.01, 2.0)
     jump_deg: float = quantity(2.0, "deg", 0.0, 90.0, above=True)
+
+    @property
+    def current_registers(self) -> tuple[int, ...]:
+        """Return what is read for the torque of the motor: nothing, or its current."""
+        return (0x0C,) if self.torque_nm_per_a else ()
 
     @property
     def lock_names(self) -> tuple[str, ...]:
@@ -279,7 +288,8 @@ class AsciiTalk:
         commands: tuple[str, ...] = (set_request(0xCA, -100_000), set_request(0xCB, 100_000), "t 0")
         if self._settings.mode == "velocity":
             commands = (set_request(0x2F, 0),)
-        cycle = (*commands, read_request(0x32), read_request(0x18), read_request(0xA0))
+        asked = (0x32, 0x18, *self._settings.current_registers, 0xA0)
+        cycle = (*commands, *map(read_request, asked))
         taken_s = []
         for _ in range(MEASURED_CYCLES):
             began_s = now()
@@ -290,7 +300,7 @@ class AsciiTalk:
         line.drop()
         self.set(0xCB, 0)
         # Never shorter than the time that the characters take.
-        replies = len(commands) * len("ok\r") + 3 * len("v -1234567\r")
+        replies = len(commands) * len("ok\r") + len(asked) * len("v -1234567\r")
         sent = sum(len(request) + 1 for request in cycle)
         return max(MARGIN * median(taken_s), line_time_s(sent + replies, self._settings.baud))
 

@@ -44,7 +44,7 @@ def test_the_modelled_torque_is_shown_when_all_of_j_b_k_are():
     assert session_state(replace(found, live=one_not), progress)["modelled"] is False
 
 
-def test_a_piece_of_time_is_thirteen_numbers_with_angles_in_degrees():
+def test_a_piece_of_time_is_fifteen_numbers_with_angles_in_degrees():
     def values(names, first):
         return {name: np.array([first + k]) for k, name in enumerate(names)}
 
@@ -56,8 +56,8 @@ def test_a_piece_of_time_is_thirteen_numbers_with_angles_in_degrees():
         0,
         values(AT_ONCE, 21.0),
     )
-    expected = [7, 1, math.degrees(2), math.degrees(3), 4]
-    expected += [11, math.degrees(12), math.degrees(13), 14, math.degrees(21), 22, 23, 24]
+    expected = [7, 1, math.degrees(2), math.degrees(3), 4, 5]
+    expected += [11, math.degrees(12), math.degrees(13), 14, 15, math.degrees(21), 22, 23, 24]
     sent = np.frombuffer(points(traces, modelled=True), "<f8")
     np.testing.assert_allclose(sent, expected)
     hidden = np.frombuffer(points(traces, modelled=False), "<f8")

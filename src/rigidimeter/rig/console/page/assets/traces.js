@@ -1,26 +1,29 @@
 // What the operator's page draws: the live signals, and those of a recorded epoch with their spectra.
 "use strict";
 window.rigTraces = (() => {
-  const WINDOW_S = 10, PIECE = 13;  // numbers for each piece of time, see `points` of the server
-  const PANES = ["torque [N·m]", "angle [deg]", "velocity command [deg/s]", "perturbation [N·m]"];
+  const WINDOW_S = 10, PIECE = 15;  // numbers for each piece of time, see `points` of the server
+  const PANES = ["torque [N·m]", "angle [deg]", "velocity command [deg/s]", "perturbation [N·m]", "drive's torque [N·m]"];
+  const PERTURBATION = 3, DRIVE = 4;
   const DASHES = [[], [8, 4], [2, 3]];  // lines are told apart by their dashes too
   const TITLE_PX = 22, TIME_AXIS_PX = 52, FONT = "14px system-ui", LABEL = { labelFont: FONT, labelSize: 20 };
   const $ = (id) => document.getElementById(id);
   const colour = (name) => getComputedStyle(document.body).getPropertyValue(name).trim();
-  let data, band, loop, fresh = false, plots = [], task = "", epoch = null, epochPlots = [], epochWidth = 0;
+  let data, band, loop, fresh = false, driven = false, plots = [], task = "", epoch = null, epochPlots = [], epochWidth = 0;
 
-  function clear() { data = [[], [], [], [], []]; band = [[], [], []]; loop = [[], [], []]; fresh = true; }
+  function clear() { data = [[], [], [], [], [], []]; band = [[], [], []]; loop = [[], [], []]; fresh = true; }
 
   function samples(buffer) {
     const numbers = new Float64Array(buffer), number = (at) => (Number.isFinite(numbers[at]) ? numbers[at] : null);
     for (let at = 0; at < numbers.length; at += PIECE) {
       const time = numbers[at];
       data[0].push(time, time);
-      for (let k = 1; k < 5; k++) data[k].push(number(at + k), number(at + 4 + k));
-      for (let k = 0; k < 3; k++) band[k].push(k ? number(at + 10 + k) : time);
-      if (number(at + 9) === null || number(at + 10) === null) continue;  // a rest
+      for (let k = 1; k < 6; k++) data[k].push(number(at + k), number(at + 5 + k));
+      for (let k = 0; k < 3; k++) band[k].push(k ? number(at + 12 + k) : time);
+      const reports = number(at + 1 + DRIVE) !== null;
+      if (reports && !driven) { driven = true; plot(); }  // only of a drive that measures its torque
+      if (number(at + 11) === null || number(at + 12) === null) continue;  // a rest
       if (loop[0].length && time - loop[0][loop[0].length - 1] > 0.5) loop = [[], [], []];  // another epoch
-      for (let k = 0; k < 3; k++) loop[k].push(k ? number(at + 8 + k) : time);
+      for (let k = 0; k < 3; k++) loop[k].push(k ? number(at + 10 + k) : time);
     }
     for (const columns of [data, band, loop]) {
       const times = columns[0], from = times[times.length - 1] - WINDOW_S;
@@ -29,6 +32,11 @@ window.rigTraces = (() => {
       if (old) for (const one of columns) one.splice(0, old);
     }
     fresh = true;
+  }
+
+  function newest(values) {
+    const value = values.length ? values[values.length - 1] : null;
+    return value === null ? "" : `: ${value.toFixed(2)}`;
   }
 
   function axes(x, y, size) {
@@ -63,8 +71,13 @@ window.rigTraces = (() => {
       made.rig = { columns, timed };
       plots.push(made);
     };
-    const titles = cyclic ? PANES.slice(0, 3) : PANES;
-    titles.forEach((title, at) => add(pane($("panes"), title), () => [data[0], data[at + 1]], [{}], cyclic && at === 2));
+    const shown = [0, 1, 2, PERTURBATION, DRIVE].filter((at) => (at === PERTURBATION ? !cyclic : at !== DRIVE || driven));
+    const last = shown[shown.length - 1];
+    for (const at of shown) {
+      const made = pane($("panes"), PANES[at]), torque = at === 0 || at === DRIVE;
+      add(made, () => [data[0], data[at + 1]], [{}], cyclic && at === last);
+      if (torque) plots[plots.length - 1].rig.said = () => { made.firstChild.textContent = PANES[at] + newest(data[at + 1]); };
+    }
     if (cyclic) plots.push(loopPlot(pane($("panes"), "torque [N·m] over angle [deg], last 10 s", "pane loop")));
     else {
       const at = pane($("panes"), "band torque [N·m]: "), said = document.createElement("span");
@@ -131,7 +144,10 @@ window.rigTraces = (() => {
   function draw() {
     if (fresh && document.body.dataset.view === "during" && !document.hidden) {
       fresh = false;
-      for (const one of plots) one.setData(one.rig.columns());
+      for (const one of plots) {
+        one.setData(one.rig.columns());
+        if (one.rig.said) one.rig.said();
+      }
       window.rigDrawnS = data[0].length ? data[0][data[0].length - 1] : null;
     }
     requestAnimationFrame(draw);
