@@ -5,6 +5,7 @@ real loop on the virtual rig, at 1 kHz with five panes live. Each stop is a sess
 
 click       from the time stamp of the pointer event in the browser to the first recorded tick with
             the cause and a velocity command of zero
+watching    the same, of a page that only watches
 freeze      from SIGSTOP to all renderers of the browser to the first recorded tick with the cause,
             and to the first with a velocity command of zero
 behind      from the newest sample on the screen to now, looked at by the page
@@ -92,14 +93,17 @@ def stopped_s(
     return float(samples["time_s"][latched][0]), float(samples["time_s"][at_rest][0])
 
 
-def click(page: Page, console: Console, measured: dict[str, list[float]]) -> None:
-    """Click on the emergency stop once."""
+def click(
+    page: Page, console: Console, measured: dict[str, list[float]], watching: Page | None = None
+) -> None:
+    """Click on the emergency stop once, of the page in control or of one that watches."""
     origin_s = begin(page, measured, console)
-    page.evaluate(NOTE_CLICK)
-    page.locator("#emergency").click()
-    clicked_s = monotonic_s(page.evaluate("window.clickedS"))
+    on = watching or page
+    on.evaluate(NOTE_CLICK)
+    on.locator("#emergency").click()
+    clicked_s = monotonic_s(on.evaluate("window.clickedS"))
     _, zero_s = stopped_s(console, Cause.EMERGENCY_STOP, measured)
-    measured["click"].append(origin_s + zero_s - clicked_s)
+    measured["watching" if watching else "click"].append(origin_s + zero_s - clicked_s)
     page.wait_for_function("document.body.dataset.view === 'after'")
 
 
@@ -136,7 +140,7 @@ def row(name: str, values: list[float]) -> str:
 
 def stops(clicks: int, freezes: int) -> None:
     """Measure how soon the page stops the arm, and print a table."""
-    names = ("click", "frozen, cause", "frozen, zero", "behind", "server", "left out", "lost")
+    names = ("click", "watching", "frozen, cause", "frozen, zero", "behind", "server", "left out", "lost")
     measured: dict[str, list[float]] = {name: [] for name in names}
     with tempfile.TemporaryDirectory() as name:
         console = Console(Path(name), protocol=PROTOCOL)
@@ -145,6 +149,10 @@ def stops(clicks: int, freezes: int) -> None:
                 page = open_page(opened, console)
                 for _ in range(clicks):
                     click(page, console, measured)
+                watching = open_page(opened, console)
+                for _ in range(clicks):
+                    click(page, console, measured, watching)
+                watching.close()
                 for _ in range(freezes):
                     freeze(opened, page, console, measured)
         finally:  # also of a study that was ended early

@@ -139,7 +139,7 @@ def test_a_session_from_the_form_to_its_end(console, chromium):
     page.get_by_text("may be 1.500 or 1500").wait_for()
     fill(page, "prbs_amplitude", "1,1")
     start(page, operator=MARKUP)
-    other.get_by_text("this page watches: it can stop and nothing else").wait_for()
+    other.get_by_text("watching: it can only stop").wait_for()
     other.locator("#emergency:enabled").wait_for()
     assert other.locator("[data-order=abort]").is_disabled()
     other.close()
@@ -245,7 +245,7 @@ def test_a_page_that_watches_stops_the_arm_also_while_that_in_control_is_frozen(
     page, other = open_page(chromium, desk), open_page(chromium, desk)
     start(page)
     page.wait_for_function(RUNS)
-    other.get_by_text("this page watches").wait_for()
+    other.get_by_text("watching: it can only stop").wait_for()
     other.evaluate(NOTE_CLICK)
     if frozen:  # for a time in which its silence does not stop the arm yet
         page.evaluate("setTimeout(() => { for (const t = Date.now() + 300; Date.now() < t;); }, 0)")
@@ -323,7 +323,7 @@ LOUDEST = """async () => {
 
 def test_the_button_of_the_form_plays_both_tones_and_allows_them(console, chromium):
     page = open_page(chromium, console())
-    page.get_by_text("no tones: click anywhere").wait_for()
+    page.get_by_text("no tones yet: click").wait_for()
     page.get_by_role("button", name="Test the tones").click()
     state, heard = page.evaluate(LOUDEST)
     assert state == "running"

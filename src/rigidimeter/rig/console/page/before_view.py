@@ -155,7 +155,7 @@ class BeforeView:
                     label="Task",
                 ).classes("entry")
                 task.on_value_change(lambda event, k=k: self._change(f"task{k}", event.value))
-                self._input(Field(f"condition{k}", "ProcessCondition, or its code"))
+                self._input(Field(f"condition{k}", "Condition, or its code"))
                 self._input(Field(f"epochs{k}", "Epochs"))
         with ui.row():
             if len(blocks) < MAX_BLOCKS:

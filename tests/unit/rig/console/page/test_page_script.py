@@ -142,7 +142,7 @@ def test_a_page_that_watches_offers_the_stop_and_sends_it(
     operator: Operator, state: dict[str, Any], press: Callable[[Page], object]
 ) -> None:
     operator.told(state, control=False)
-    assert "this page watches" in operator.page.locator("#role").inner_text()
+    assert "watching: it can only stop" in operator.page.locator("#role").inner_text()
     assert operator.page.locator("#emergency").is_enabled()
     press(operator.page)
     assert operator.sent() == EMERGENCY
@@ -206,7 +206,7 @@ def test_cautions_are_silenced_for_one_session_and_stops_never(operator: Operato
 def test_a_page_without_tones_says_so(operator: Operator) -> None:
     operator.page.evaluate("window.rigTones.allowed = false")
     operator.told()
-    assert operator.page.locator("#tones").inner_text().startswith("no tones: click")
+    assert operator.page.locator("#tones").inner_text().startswith("no tones yet: click")
 
 
 def test_a_lost_connection_is_heard_once_while_something_runs(operator: Operator) -> None:

@@ -55,7 +55,7 @@
     const { session, finished, starting, checking, alarms } = message.state;
     runs = !!(session || checking || starting);
     $("take").hidden = control;
-    show("role", control ? "" : "this page watches: it can stop and nothing else");
+    show("role", control ? "" : "watching: it can only stop");
     $("emergency").disabled = !runs;
     hear(alarms);
     if (!session) hush(false);
@@ -119,7 +119,7 @@
     if (alarmed && alarms.stop > alarmed.stop) tones.stop();
     else if (alarmed && alarms.caution > alarmed.caution && !silent) tones.caution();
     alarmed = alarms;
-    show("tones", !tones.allowed ? "no tones: click anywhere, or press a key" : silent ? "cautions are silent" : "");
+    show("tones", !tones.allowed ? "no tones yet: click" : silent ? "cautions are silent" : "");
   }
   function hush(on) {
     silent = on;
