@@ -140,7 +140,16 @@ def row(name: str, values: list[float]) -> str:
 
 def stops(clicks: int, freezes: int) -> None:
     """Measure how soon the page stops the arm, and print a table."""
-    names = ("click", "watching", "frozen, cause", "frozen, zero", "behind", "server", "left out", "lost")
+    names = (
+        "click",
+        "watching",
+        "frozen, cause",
+        "frozen, zero",
+        "behind",
+        "server",
+        "left out",
+        "lost",
+    )
     measured: dict[str, list[float]] = {name: [] for name in names}
     with tempfile.TemporaryDirectory() as name:
         console = Console(Path(name), protocol=PROTOCOL)

@@ -369,6 +369,29 @@ def test_what_was_typed_and_not_read_goes_to_nobody(after):
     os.close(near)
 
 
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_view_of_lines_rings_a_terminal_and_no_file(person, tmp_path, terminal):
+    person.tty.__exit__()
+    typed, ours = os.pipe()
+    name = os.ttyname(person.near) if terminal else tmp_path / "out"
+    with open(name, "w") as screen, os.fdopen(typed) as keyboard:
+        view = LineView(keyboard, screen, PLAN, lambda: person.now_s)
+        stopped = RUNNING._replace(state=State.FAULTED, cause=int(Cause.TORQUE_TOO_HIGH))
+        for state in (RUNNING, stopped, stopped):
+            person.status.show_loop(state)
+            view(person.shared)
+        os.write(ours, b"c\n")
+        view(person.shared)
+        person.now_s += 2.0
+        view(person.shared)
+        screen.flush()
+        seen = person.sees() if terminal else (tmp_path / "out").read_bytes()
+    os.close(ours)
+    assert person.orders() == []
+    assert seen.count(BELL.encode()) == (1 if terminal else 0)
+    assert b"cautions silent | " in seen
+
+
 def test_without_a_terminal_there_are_lines(tmp_path, monkeypatch):
     far, near = pty.openpty()
     with os.fdopen(near, "r+b", buffering=0) as raw, (tmp_path / "out").open("w") as file:

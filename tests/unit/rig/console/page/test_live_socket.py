@@ -24,6 +24,7 @@ from rigidimeter.rig.acquisition.processes import (
     SharedSupervision,
     shared_memory,
 )
+from rigidimeter.rig.console import Alarm
 from rigidimeter.rig.console.page import (
     ORDERS,
     LiveSockets,
@@ -259,6 +260,40 @@ def test_a_page_is_there_by_its_beat_and_may_be_away_once_it_said_so(operator):
     operator.sends("leave")
     assert presence.seen_ns(later_ns, still=True) == later_ns
     assert presence.seen_ns(later_ns, still=False) == beat_ns
+
+
+def heard(sockets):
+    """Return how many stops and cautions a page is told of."""
+    page = OpenPage(None, "page")
+    sockets._pages = {page}
+    sockets._send_state()
+    return json.loads(page.waiting[-1])["state"]["alarms"]
+
+
+def test_a_session_that_did_not_run_or_ended_badly_is_heard_once(tmp_path):
+    state = ServerState(Place(tmp_path, Settings(), "defaults"))
+    sockets = LiveSockets(state)
+    assert heard(sockets) == {"stop": 0, "caution": 0}
+    for outcome, stops in (("not run", 1), ("success", 1), ("fail", 2), ("abort", 3)):
+        state.over(tmp_path, outcome, ("why",))
+        assert heard(sockets) == {"stop": stops, "caution": 0}, outcome
+        assert heard(sockets) == {"stop": stops, "caution": 0}, outcome
+
+
+def test_what_is_heard_of_a_session_that_runs_is_counted_for_all_pages(operator, tmp_path):
+    """Of a stop that was heard the end is not heard again; of one that was only a hold it is."""
+    sockets, state = operator.sockets, operator.state
+    attached = sockets._attached
+    attached.state, attached.running = dict, None
+    attached.heard, attached.stopped = Alarm.CAUTION, False
+    assert heard(sockets) == {"stop": 0, "caution": 1}
+    attached.heard = Alarm.STOP
+    for stopped, stops in ((False, 2), (True, 3)):
+        sockets._attached, attached.stopped = attached, stopped
+        heard(sockets)
+        sockets._attached = None
+        state.over(tmp_path, "fail", ("why",))
+        assert heard(sockets)["stop"] == stops
 
 
 class Socket:
