@@ -204,7 +204,7 @@ def test_a_dead_sensor_is_caught_and_the_record_says_so(
     can_bench.misbehave("torque", "silent")
     out = can_bench.rig.with_name("dead.json")
     with pytest.raises(UserError, match="not fit for a person: a check failed: devices read back"):
-        command(can_bench.rig, None, "A. Weber", True, None, None, out, None)
+        command(can_bench.rig, None, "A. Weber", True, None, None, out, None, again=False)
     assert "FAIL" in capsys.readouterr().out
     record = read_record(out)
     assert record.signed_by == "A. Weber"

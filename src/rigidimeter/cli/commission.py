@@ -14,7 +14,8 @@ from rigidimeter.cli.terminal_tables import Table, show
 from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    pass
+    from rigidimeter.core.settings import Settings
+    from rigidimeter.rig.devices import RigFile
 
 
 def commission(
@@ -44,6 +45,10 @@ def commission(
         "Only compare a CANopen drive's EDS. With what the rig file writes, or with the driver's "
         "defaults without one; nothing is connected.",
     ),
+    again: bool = OPTIONS.flag(
+        "--again",
+        "Only repeat what another program, computer or kernel asks for. The record stays.",
+    ),
 ) -> None:
     """Check a new rig with nobody in it, before its first run.
 
@@ -53,10 +58,14 @@ def commission(
     spring or a weight similar to a relaxed arm to the joint. On hardware a person must be present,
     and sign.
 
+    The record belongs to the program, the computer and its kernel. When one of them is another,
+    `run` and `check` name the checks to repeat, and `--again` repeats them.
+
     \b
     For example:
       rigidimeter commission --rig RIG.toml --signed-by "A. Weber"
       rigidimeter commission --rig RIG.toml --known-torque-nm 2
+      rigidimeter commission --rig RIG.toml --again --signed-by "A. Weber"
       rigidimeter commission --eds drive.eds
     """
     from datetime import UTC, datetime
@@ -86,6 +95,9 @@ def commission(
             f"{rig}: is real hardware; somebody must check that nobody's arm is in it and "
             "answer, so leave out --yes"
         )
+    if again:
+        _repeat(rigfile, chosen, path, signed_by, yes=yes)
+        return
     asked = operator(yes=yes, known_torque_nm=known_torque, known_angle_deg=known_angle)
     with claimed(rigfile, chosen, path, "commission again", asked) as setup:
         found = commission_rig(
@@ -106,6 +118,49 @@ def commission(
     what = "this emulated rig, with nobody in it" if found.emulated else "this rig"
     days = chosen.commissioning.validity_days
     echo(f"Valid for {what}, its devices and this controller, for {days:g} day{'s' * (days != 1)}.")
+
+
+def _repeat(
+    rigfile: RigFile, settings: Settings, record: Path, signed_by: str, *, yes: bool
+) -> None:
+    """Repeat the checks that are asked for, and write them beside the commissioning record."""
+    from datetime import UTC, datetime
+
+    from rigidimeter.cli.rig_checks import claimed, operator, table
+    from rigidimeter.rig.commissioning import (
+        check_record,
+        differences,
+        parts_to_repeat,
+        program_identity,
+        repeat_checks,
+        repeated_path,
+        write_repeated,
+    )
+
+    commissioned = check_record(rigfile, None, settings, path=record, repeated=False)
+    before, now = commissioned.identity, program_identity(rigfile)
+    if not parts_to_repeat(before, now):
+        echo("Nothing to repeat: program, computer and kernel are those of the record.")
+        return
+    for line in differences(before, now):
+        echo(f"{line[0].upper()}{line[1:]}.", err=True)
+    path = repeated_path(rigfile.path)
+    asked = operator(yes=yes)
+    with claimed(rigfile, settings, path, "repeat the checks", asked) as setup:
+        found = repeat_checks(
+            setup,
+            rigfile,
+            commissioned,
+            lambda facts: check_record(rigfile, facts, settings, path=record, repeated=False),
+            made_utc=datetime.now(UTC).isoformat(timespec="seconds"),
+            signed_by=signed_by,
+        )
+    write_repeated(path, found)
+    show([table(found.checks)])
+    echo(f"Record: {path}")
+    if found.objection:
+        raise UserError(f"{rigfile.path}: not fit for a person: {found.objection}")
+    echo("Valid for this program, computer and kernel, as long as the commissioning record.")
 
 
 def _compare_eds(eds: Path, rig: Path | None) -> None:

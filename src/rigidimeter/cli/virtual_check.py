@@ -72,7 +72,7 @@ def virtual_check(setup: Setup) -> DailyRecord:
     commissioned = CommissioningRecord(NAME, "", {}, {}, (), numbers, __version__, now)
     return daily_check(
         setup,
-        cast("RigFile", SimpleNamespace(name=NAME, digest="")),
+        cast("RigFile", SimpleNamespace(name=NAME, digest="", devices={})),
         lambda _: commissioned,
         compared=Compared(),
         made_utc=now,

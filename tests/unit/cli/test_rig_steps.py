@@ -23,6 +23,7 @@ from rigidimeter.rig.commissioning import (
     RigCheck,
     covered,
     daily_path,
+    program_identity,
     record_path,
     write_daily,
     write_record,
@@ -57,6 +58,7 @@ def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         software="0.1",
         made_utc=(NOW - timedelta(days=2)).isoformat(),
         signed_by="A. Weber",
+        identity=program_identity(RigFile(path, "rig", {}, "abc")),
     )
     write_record(record_path(path), commissioned)
     checked = DailyRecord(
@@ -70,6 +72,7 @@ def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         validity_h=24.0,
         software="0.1",
         made_utc=(NOW - timedelta(hours=1)).isoformat(),
+        identity=commissioned.identity,
     )
     write_daily(daily_path(path), checked)
     return path

@@ -35,9 +35,24 @@ from rigidimeter.rig.commissioning.inertia_fit import (
     torque_answer,
 )
 from rigidimeter.rig.commissioning.live_readings import HEADING, LiveReading, live_readings
+from rigidimeter.rig.commissioning.program_identity import (
+    boot_clock,
+    program_identity,
+    sources_digest,
+)
+from rigidimeter.rig.commissioning.repeated_checks import (
+    EVERY_PART,
+    IDENTITY,
+    RepeatedChecks,
+    differences,
+    parts_to_repeat,
+    read_repeated,
+    repeated_path,
+    write_repeated,
+)
 from rigidimeter.rig.commissioning.response import fit_arm, following, velocity_per_angle
 from rigidimeter.rig.commissioning.sealed_record import digest
-from rigidimeter.rig.commissioning.sequence import commission_rig
+from rigidimeter.rig.commissioning.sequence import commission_rig, repeat_checks
 from rigidimeter.rig.commissioning.static_tests import BRAKING, NOISE
 from rigidimeter.rig.commissioning.stopping import watchdog_checks
 from rigidimeter.rig.commissioning.torque_checks import KnownInertia, delay_check, gain_check

@@ -20,7 +20,10 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import plain_values
 from rigidimeter.core.settings import Settings, with_new_names
 from rigidimeter.rig.commissioning.checks import RigCheck
+from rigidimeter.rig.commissioning.program_identity import program_identity
+from rigidimeter.rig.commissioning.repeated_checks import require_repeated
 from rigidimeter.rig.commissioning.sealed_record import (
+    AHEAD,
     RecordKind,
     digest,
     read_sealed,
@@ -103,6 +106,9 @@ class CommissioningRecord:
         Who answers for it.
     emulated : bool
         Whether no device of it is one of hardware.
+    identity : mapping
+        Program, computer and kernel, as `program_identity` returned them; empty in records of
+        older versions.
     """
 
     rig_name: str
@@ -115,6 +121,7 @@ class CommissioningRecord:
     made_utc: str
     signed_by: str = ""
     emulated: bool = False
+    identity: Mapping[str, str] = field(default_factory=dict)
     schema: str = field(default=KIND.schema)
 
     @property
@@ -186,7 +193,10 @@ def read_record(path: Path) -> CommissioningRecord:
 
 
 def _values(record: CommissioningRecord) -> dict[str, Any]:
-    return {**asdict(record), "passed": record.passed}
+    values = {**asdict(record), "passed": record.passed}
+    if not record.identity:  # the seal of an older record is that of its own keys
+        del values["identity"]
+    return values
 
 
 def _record(values: dict[str, Any]) -> CommissioningRecord:
@@ -240,6 +250,8 @@ def check_record(
     *,
     now_utc: datetime | None = None,
     path: Path | None = None,
+    identity: Mapping[str, str] | None = None,
+    repeated: bool = True,
 ) -> CommissioningRecord:
     """Return the record if it holds for this rig, these devices and these settings, today.
 
@@ -255,6 +267,10 @@ def check_record(
         Today, where that is not the clock's.
     path : Path, optional
         The record, where it does not lie beside the rig file.
+    identity : mapping, optional
+        Of program and computer, where it is not that of this moment.
+    repeated : bool
+        Whether checks must have been repeated where program or computer is another.
 
     Raises
     ------
@@ -277,7 +293,7 @@ def check_record(
     valid = f"a record holds for {days:g} day{'s' * (days != 1)}"
     today = now_utc or datetime.now(UTC)
     age = today - datetime.fromisoformat(record.made_utc)
-    if age < timedelta(days=-1):
+    if age < -AHEAD:
         raise UserError(
             f"{path}: is of {record.made_utc[:10]}, which is still to come, and {valid} "
             f"from then; set the computer's clock right, or {again}"
@@ -286,6 +302,9 @@ def check_record(
         raise UserError(f"{path}: is of {record.made_utc[:10]}, and {valid}; {again}")
     before, _ = with_new_names(record.covered, str(path))
     _same_controller(path, before, plain_values(covered(settings)))
+    if repeated:
+        now = program_identity(rigfile) if identity is None else identity
+        require_repeated(rigfile.path, path, record.identity, now, record.digest)
     return record
 
 

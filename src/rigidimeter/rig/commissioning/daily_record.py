@@ -18,7 +18,14 @@ from rigidimeter.core.settings import RigSettings, Settings, changed_settings
 from rigidimeter.model import DriveModel
 from rigidimeter.rig.commissioning.checks import RigCheck
 from rigidimeter.rig.commissioning.commissioning_record import CommissioningRecord
-from rigidimeter.rig.commissioning.sealed_record import RecordKind, read_sealed, write_sealed
+from rigidimeter.rig.commissioning.program_identity import boot_clock, program_identity
+from rigidimeter.rig.commissioning.repeated_checks import differences
+from rigidimeter.rig.commissioning.sealed_record import (
+    AHEAD,
+    RecordKind,
+    read_sealed,
+    write_sealed,
+)
 from rigidimeter.rig.commissioning.torque_checks import DELAY, PRECISION, SIGN
 from rigidimeter.rig.devices import RigFile
 from rigidimeter.rig.guard import answer_limits
@@ -26,9 +33,6 @@ from rigidimeter.rig.guard import answer_limits
 KIND = RecordKind(
     "rigidimeter.check/1", "daily check", "rigidimeter check RIG.toml", "check the rig again"
 )
-AHEAD = timedelta(minutes=10)
-"""So much may the clock have been set back since a check was made."""
-
 FLOOR_SHARE = 0.5
 """Of what the reference inertia shows, below which a sensor in a session is not believed."""
 
@@ -85,6 +89,12 @@ class DailyRecord:
         Version of rigidimeter.
     made_utc : str
         ISO 8601.
+    identity : mapping
+        Program, computer and kernel, as `program_identity` returned them.
+    boot_id : str
+        Of the start of the computer; empty where it has no such name.
+    boot_s : float
+        Seconds from it to the check, on a clock that nobody can set.
     """
 
     rig_name: str
@@ -97,6 +107,9 @@ class DailyRecord:
     validity_h: float
     software: str
     made_utc: str
+    identity: Mapping[str, str] = field(default_factory=dict)
+    boot_id: str = ""
+    boot_s: float = 0.0
     schema: str = field(default=KIND.schema)
 
     @property
@@ -164,6 +177,8 @@ def require_daily_check(
     *,
     settings_path: Path | None = None,
     now_utc: datetime | None = None,
+    identity: Mapping[str, str] | None = None,
+    boot: tuple[str, float] | None = None,
 ) -> DailyRecord:
     """Return the daily check if it holds for this rig as it was commissioned, now.
 
@@ -178,6 +193,10 @@ def require_daily_check(
         Their file, for the command in a refusal.
     now_utc : datetime, optional
         The time, where it is not the clock's.
+    identity : mapping, optional
+        Of program and computer, where it is not that of this moment.
+    boot : tuple of (str, float), optional
+        As `boot_clock` returns it, where it is not that of this moment.
 
     Raises
     ------
@@ -203,8 +222,19 @@ def require_daily_check(
         raise UserError(
             f"{path}: {of}, which is still to come; set the computer's clock right, or {again}"
         )
+    valid = f"a daily check holds for {hours:g} h"
     if age > timedelta(hours=hours):
-        raise UserError(f"{path}: {of}, and a daily check holds for {hours:g} h; {again}")
+        raise UserError(f"{path}: {of}, and {valid}; {again}")
+    boot_id, boot_s = boot_clock() if boot is None else boot
+    passed_h = (boot_s - record.boot_s) / 3600.0
+    if boot_id and boot_id == record.boot_id and passed_h > hours:
+        raise UserError(
+            f"{path}: {of}, and by the time since the computer started {passed_h:.3g} h have "
+            f"passed since, so its clock was set back; {valid}; {again}"
+        )
+    now = program_identity(rigfile) if identity is None else identity
+    if record.identity != now:
+        raise UserError(f"{path}: {'; '.join(differences(record.identity, now))}; {again}")
     return record
 
 

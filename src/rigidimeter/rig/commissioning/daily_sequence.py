@@ -26,6 +26,7 @@ from rigidimeter.rig.commissioning.first_steps import (
 )
 from rigidimeter.rig.commissioning.inertia_fit import TorqueAnswer, quick_motion, torque_answer
 from rigidimeter.rig.commissioning.motion_tests import COMPLETED, swing, swing_checks
+from rigidimeter.rig.commissioning.program_identity import boot_clock, program_identity
 from rigidimeter.rig.commissioning.static_tests import facts_checks
 from rigidimeter.rig.commissioning.torque_checks import (
     NO_ANSWER,
@@ -145,6 +146,7 @@ def daily_check(
     reference = compared.reference
     if answer is not None and passed:
         reference = compared.after(answer, digest, made_utc)
+    boot_id, boot_s = boot_clock()
     return DailyRecord(
         rig_name=rigfile.name,
         rig_digest=rigfile.digest,
@@ -156,6 +158,9 @@ def daily_check(
         validity_h=setup.limits.daily_validity_h,
         software=software,
         made_utc=made_utc,
+        identity=program_identity(rigfile),
+        boot_id=boot_id,
+        boot_s=boot_s,
     )
 
 

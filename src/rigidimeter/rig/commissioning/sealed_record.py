@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
@@ -35,6 +35,9 @@ class Dated(Protocol):
 
 
 Record = TypeVar("Record", bound=Dated)
+
+AHEAD = timedelta(minutes=10)
+"""So much may the clock have been set back since a record was made."""
 
 
 def digest(values: Mapping[str, Any]) -> str:

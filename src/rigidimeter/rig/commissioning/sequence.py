@@ -16,7 +16,7 @@ question waits for its answer.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rigidimeter.core.settings import Settings
@@ -46,12 +46,27 @@ from rigidimeter.rig.commissioning.motion_tests import (
     swing_checks,
     torque_sign,
 )
+from rigidimeter.rig.commissioning.program_identity import program_identity
+from rigidimeter.rig.commissioning.repeated_checks import (
+    BOUNDS,
+    EVERY_PART,
+    STEPS,
+    STOP,
+    SWING,
+    WATCHDOG,
+    RepeatedChecks,
+    differences,
+    parts_to_repeat,
+)
 from rigidimeter.rig.commissioning.static_tests import facts_checks
 from rigidimeter.rig.commissioning.stopping import emergency_stop_checks, watchdog_checks
 from rigidimeter.rig.commissioning.trials import Setup, require_no_power
 from rigidimeter.rig.devices import RigFile
 from rigidimeter.rig.devices.base import DeviceError
 from rigidimeter.rig.guard import Cause
+
+KNOWN_TORQUE = "known torque"
+"""A part that is not repeated: neither program nor computer changes a weight."""
 
 
 def commission_rig(
@@ -98,7 +113,79 @@ def commission_rig(
         software=software,
         made_utc=made_utc,
         signed_by=signed_by,
+        identity=program_identity(rigfile),
     )
+
+
+def repeat_checks(
+    setup: Setup,
+    rigfile: RigFile,
+    commissioned: CommissioningRecord,
+    approve: Callable[[Mapping[str, Any]], object],
+    *,
+    made_utc: str,
+    signed_by: str = "",
+) -> RepeatedChecks:
+    """Try again what another program or computer asks for; what is found is returned.
+
+    The rig is connected, tried and closed, whatever happens.
+
+    Parameters
+    ----------
+    setup : Setup
+    rigfile : RigFile
+        Which the rig was built from.
+    commissioned : CommissioningRecord
+        That holds for it, but for program and computer.
+    approve : callable
+        Takes the facts of the devices, or refuses them with a `UserError`, which passes through.
+    made_utc, signed_by : str
+        For the record.
+    """
+    rig, found, now = setup.rig, CheckResults(), program_identity(rigfile)
+    parts = parts_to_repeat(commissioned.identity, now)
+    name = "devices read back"
+    try:
+        rig.connect()
+        facts = rig.configure()
+        approve(facts)
+        name = "devices answer"
+        _try_again(setup, found, facts, parts)
+    except DeviceError as error:
+        found.checks.append(yes(name, False, "refused", "as commissioned", str(error)))
+    finally:
+        rig.close()
+    return RepeatedChecks(
+        rig_name=rigfile.name,
+        rig_digest=rigfile.digest,
+        commissioning_digest=commissioned.digest,
+        identity=now,
+        differences=differences(commissioned.identity, now),
+        parts=parts,
+        checks=tuple(found.checks),
+        numbers=found.finite_numbers,
+        made_utc=made_utc,
+        signed_by=signed_by,
+        emulated=rigfile.emulated,
+    )
+
+
+def _try_again(
+    setup: Setup, found: CheckResults, facts: Mapping[str, Any], parts: Sequence[str]
+) -> None:
+    limits = setup.limits
+    found.checks += facts_checks(facts, setup.settings)
+    at_rest(setup, found, limits.idle_s)
+    require_no_power(setup)
+    if power_allowed(setup, found, _POWER.format(limits=limits)):
+        _with_power(setup, found, facts, parts)
+
+
+_POWER = (
+    "a spring, or a weight like a relaxed arm's, is fastened to the joint. The drive will get "
+    "power and move it by up to {limits.swing_deg:g} deg at {limits.swing_speed_deg_s:g} deg/s. "
+    "The emergency stop is at hand. Go on?"
+)
 
 
 def _try_all(setup: Setup, found: CheckResults, facts: Mapping[str, Any]) -> None:
@@ -117,22 +204,31 @@ def _try_all(setup: Setup, found: CheckResults, facts: Mapping[str, Any]) -> Non
         )
     )
     found.checks.append(known_angle(setup))
-    if not power_allowed(
-        setup,
-        found,
-        "a spring, or a weight like a relaxed arm's, is fastened to the joint. The drive will get "
-        f"power and move it by up to {limits.swing_deg:g} deg at {limits.swing_speed_deg_s:g} "
-        "deg/s. The emergency stop is at hand. Go on?",
-    ):
-        return
-    if not (small_move(setup, found, SETTLE_S) and _swing(setup, found) and _steps(setup, found)):
+    if power_allowed(setup, found, _POWER.format(limits=limits)):
+        _with_power(setup, found, facts, (*EVERY_PART, KNOWN_TORQUE))
+
+
+def _with_power(
+    setup: Setup, found: CheckResults, facts: Mapping[str, Any], parts: Sequence[str]
+) -> None:
+    """Try a small move, then these parts, nothing after what went wrong."""
+    moved = small_move(setup, found, SETTLE_S)
+    moved = moved and (SWING not in parts or _swing(setup, found))
+    moved = moved and (STEPS not in parts or _steps(setup, found))
+    if not moved:
         found.refrain("the motions went wrong; put that right first")
         return
-    found.checks.append(known_torque(setup))
-    found.checks += bound_checks(setup)
-    operator.say("Watchdog: nothing is written for a while; the drive must stop by itself.")
-    found.checks += watchdog_checks(setup, facts["drive"]["watchdog_s"])
-    found.checks += emergency_stop_checks(setup)
+    if KNOWN_TORQUE in parts:
+        found.checks.append(known_torque(setup))
+    if BOUNDS in parts:
+        found.checks += bound_checks(setup)
+    if WATCHDOG in parts:
+        setup.operator.say(
+            "Watchdog: nothing is written for a while; the drive must stop by itself."
+        )
+        found.checks += watchdog_checks(setup, facts["drive"]["watchdog_s"])
+    if STOP in parts:
+        found.checks += emergency_stop_checks(setup)
 
 
 def _swing(setup: Setup, found: CheckResults) -> bool:

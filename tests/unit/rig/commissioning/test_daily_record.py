@@ -29,6 +29,7 @@ from rigidimeter.rig.commissioning import (
 from rigidimeter.rig.devices import RigFile
 
 NOW = datetime(2026, 3, 1, 12, 0, tzinfo=UTC)
+HERE = {"version": "0.1", "guard_sources": "a", "host": "rig-pc", "kernel": "6.1", "governor": ""}
 COMMISSIONED: Any = SimpleNamespace(digest="of the commissioning")
 
 
@@ -51,15 +52,17 @@ def record(rigfile: RigFile) -> DailyRecord:
         validity_h=24.0,
         software="0.1",
         made_utc=made_utc,
+        identity=HERE,
+        boot_id="a",
+        boot_s=100.0,
     )
     write_daily(daily_path(rigfile.path), record)
     return record
 
 
 def require(rigfile: RigFile, settings: Settings | None = None, **options: Any) -> DailyRecord:
-    return require_daily_check(
-        rigfile, COMMISSIONED, settings or Settings(), **{"now_utc": NOW, **options}
-    )
+    held: dict[str, Any] = {"now_utc": NOW, "identity": HERE, "boot": ("a", 100.0), **options}
+    return require_daily_check(rigfile, COMMISSIONED, settings or Settings(), **held)
 
 
 def rewritten(rigfile: RigFile, record: DailyRecord, **changes: Any) -> None:
@@ -207,3 +210,24 @@ def test_a_reaction_time_too_short_for_the_drive_as_it_was_measured_is_refused(
 ) -> None:
     with pytest.raises(UserError, match=r"rig, as measured: .*reaction_time_s = 0.02"):
         as_measured(Settings(), measured(10.0), record)
+
+
+def test_a_clock_that_was_set_back_by_a_day_does_not_renew_a_check(
+    rigfile: RigFile, record: DailyRecord
+) -> None:
+    """28 h after it, the clock on the wall says 4: the time since the computer started tells."""
+    assert require(rigfile, boot=("a", 100.0 + 23.9 * 3600.0)) == record
+    with pytest.raises(UserError, match=r"28 h have passed since, so its clock was set back"):
+        require(rigfile, boot=("a", 100.0 + 28.0 * 3600.0))
+    # After another start nothing is known but the clock on the wall.
+    assert require(rigfile, boot=("b", 100.0 + 28.0 * 3600.0)) == record
+    rewritten(rigfile, record, boot_id="")
+    assert require(rigfile, boot=("", 100.0 + 28.0 * 3600.0)).passed
+
+
+def test_a_check_belongs_to_a_program_and_a_computer(rigfile: RigFile, record: DailyRecord) -> None:
+    with pytest.raises(UserError, match=r"the kernel was 6\.1 and is now 6\.2; with nobody in the"):
+        require(rigfile, identity={**HERE, "kernel": "6.2"})
+    rewritten(rigfile, record, identity={})
+    with pytest.raises(UserError, match="does not say under which program and on which computer"):
+        require(rigfile)

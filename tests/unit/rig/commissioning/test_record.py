@@ -32,6 +32,7 @@ from rigidimeter.rig.commissioning import (
 from rigidimeter.rig.devices import RigFile
 
 TODAY = datetime(2026, 3, 1, tzinfo=UTC)
+HERE = {"version": "0.1", "guard_sources": "a", "host": "rig-pc", "kernel": "6.1", "governor": ""}
 FACTS: dict[str, Any] = {
     "torque_sensor": {
         "model": "Net F/T",
@@ -68,13 +69,14 @@ def record(rigfile: RigFile) -> CommissioningRecord:
         software="0.1",
         made_utc="2026-01-01T12:00:00+00:00",
         signed_by="A. Weber",
+        identity=HERE,
     )
     write_record(record_path(rigfile.path), record)
     return record
 
 
 def check(rigfile: RigFile, facts: Any = FACTS, settings: Settings | None = None) -> Any:
-    return check_record(rigfile, facts, settings or Settings(), now_utc=TODAY)
+    return check_record(rigfile, facts, settings or Settings(), now_utc=TODAY, identity=HERE)
 
 
 def changed(role: str, key: str, value: Any) -> Any:
