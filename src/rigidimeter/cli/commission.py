@@ -77,7 +77,7 @@ def commission(
     from rigidimeter.rig.devices import load_rig
 
     if eds is not None:
-        _compare_eds(eds, rig)
+        _compare_eds(eds, rig, load_settings(settings))
         return
     if rig is None:
         raise UserError("name the rig file with --rig RIG.toml, or a drive's EDS with --eds FILE")
@@ -163,17 +163,20 @@ def _repeat(
     echo("Valid for this program, computer and kernel, as long as the commissioning record.")
 
 
-def _compare_eds(eds: Path, rig: Path | None) -> None:
-    from rigidimeter.rig.devices import Cia402Settings, compare_eds, load_rig
+def _compare_eds(eds: Path, rig: Path | None, settings: Settings) -> None:
+    from rigidimeter.rig.devices import Cia402Settings, compare_eds, drive_bounds, load_rig
 
     chosen: object = Cia402Settings()
     if rig is not None:
         _, chosen = load_rig(rig).devices["drive"]
     if not isinstance(chosen, Cia402Settings):
         raise UserError(f'{rig}: its drive has no EDS; --eds is for driver = "cia402"')
-    found = compare_eds(eds, chosen)
+    found = compare_eds(eds, chosen, drive_bounds(settings))
     rows = [("ok" if row.fits else "FAIL", row.label, row.found, row.needed) for row in found]
     show([Table(("", "object", "the drive", "the driver"), rows, "=<<<", indent=0)])
+    for row in found:
+        if row.lost and not row.lost.startswith("nothing"):
+            echo(f"Without {row.label}: {row.lost}.")
     wrong = [row.label for row in found if not row.fits]
     if wrong:
         raise UserError(f"{eds}: does not fit: {', '.join(wrong)}")

@@ -6,11 +6,14 @@ import pytest
 
 from rigidimeter.cli.commission import commission
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.settings import parse_settings
 from rigidimeter.rig.devices import (
     Cia402Settings,
     Object,
+    bound_objects,
     compare_eds,
     displayed_mode,
+    drive_bounds,
     objects,
     read_back,
     write_object,
@@ -25,7 +28,7 @@ MEASURED = ((0x6041, 2), (0x6064, 4), (0x606C, 4))
 MAPPING = range(0x1600, 0x1B00)
 
 
-def eds(tmp_path, settings=None, without=(), **changes):
+def eds(tmp_path, settings=None, without=(), held=(), **changes):
     """Write the EDS of a drive with all that the driver needs, but for the changes.
 
     `changes` are keys of a section, by index and sub-index as in o1016_1.
@@ -34,7 +37,7 @@ def eds(tmp_path, settings=None, without=(), **changes):
     entries = {(o.index, o.subindex): o for o in objects(settings)}
     read = [Object("", 0x1000, 0, 4, 0), Object("", 0x1018, 1, 4, 0), displayed_mode(settings)]
     read += [Object("", *settings.axis(index), size, 0) for index, size in MEASURED]
-    entries.update({(o.index, o.subindex): o for o in read})
+    entries.update({(o.index, o.subindex): o for o in (*read, *held)})
     text, named = "[DeviceInfo]\nBaudRate_1000=1\n\n", set()
     for (index, subindex), entry in sorted(entries.items()):
         if index in without or (index, subindex) in without:
@@ -66,11 +69,23 @@ def wrong(path, settings=None):
 def test_a_drive_with_all_objects_fits(tmp_path, capsys):
     path = eds(tmp_path, without=(0x607F, (0x1400, 5), 0x1401, 0x1803))
     assert wrong(path) == {}
-    commission(None, eds=path)
+    commission(None, None, eds=path)
     shown = capsys.readouterr().out
     assert "max profile velocity (0x607F:00)" in shown
     assert "optional" in shown
     assert "Every object fits." in shown
+    assert "Without max profile velocity (0x607F:00): a target that this program" in shown
+    assert "Without max torque (0x6072:00): between two ticks the drive gives all the" in shown
+
+
+def test_bounds_of_another_size_do_not_fit(tmp_path):
+    settings, bounds = Cia402Settings(), drive_bounds(parse_settings({}))
+    path = eds(tmp_path, held=bound_objects(settings, bounds), o6072_0={"DataType": "0x7"})
+    found = {row.label: row for row in compare_eds(path, settings, bounds)}
+    assert {label: row.found for label, row in found.items() if not row.fits} == {
+        "max torque (0x6072:00)": "32 bits"
+    }
+    assert found["max slippage (0x60F8:00)"].fits
 
 
 @pytest.mark.parametrize(
@@ -92,7 +107,7 @@ def test_what_does_not_fit_is_named(tmp_path, without, changes, label, found):
     said = wrong(eds(tmp_path, without=without, **changes))
     assert any(label in name and found in text for name, text in said.items()), said
     with pytest.raises(UserError, match=r"drive\.eds: does not fit: "):
-        commission(None, eds=tmp_path / "drive.eds")
+        commission(None, None, eds=tmp_path / "drive.eds")
 
 
 TORQUE = {
@@ -125,7 +140,7 @@ def rows(path, **settings):
 def test_a_drive_that_reports_its_torque_has_it_in_the_velocity_frame(tmp_path):
     found = rows(with_torque(eds(tmp_path)))
     assert all(row.fits for row in found.values())
-    assert found["0x6077:00 in a frame"] == ("0x6077:00 in a frame", True, "16 bits", "16 bits")
+    assert found["0x6077:00 in a frame"][:4] == ("0x6077:00 in a frame", True, "16 bits", "16 bits")
     assert "velocity frame's entry 2 (0x1A01:02)" in found
     assert "0x6077:00 in a frame" not in rows(tmp_path / "drive.eds", reads_torque=False)
 
@@ -143,7 +158,7 @@ def test_a_drive_that_reports_its_torque_has_it_in_the_velocity_frame(tmp_path):
 def test_a_drive_without_its_torque_fits_and_says_what_lacks(tmp_path, change, label, found):
     path = with_torque(eds(tmp_path), **change)
     assert wrong(path) == {}
-    assert rows(path)[label] == (label, True, found, "optional")
+    assert rows(path)[label][:4] == (label, True, found, "optional")
     assert "0x6077:00 in a frame" not in rows(path) or label == "0x6077:00 in a frame"
 
 
@@ -179,7 +194,7 @@ def test_a_file_that_is_no_eds_is_refused_in_one_sentence(tmp_path, text):
     path = tmp_path / "other.txt"
     path.write_text(text)
     with pytest.raises(UserError, match=r"other\.txt: (is no EDS|cannot be read as an EDS)"):
-        commission(None, eds=path)
+        commission(None, None, eds=path)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252"])
@@ -200,7 +215,7 @@ def test_an_eds_that_is_not_there_is_no_damaged_one(tmp_path):
 
 def test_a_rig_file_or_an_eds_is_needed():
     with pytest.raises(UserError, match=r"--rig RIG\.toml, or a drive's EDS with --eds FILE"):
-        commission(None, eds=None)
+        commission(None, None, eds=None)
 
 
 class Drive:

@@ -35,6 +35,7 @@ from rigidimeter.rig.devices.bounds import (
     DriveBounds,
     Tight,
 )
+from rigidimeter.rig.devices.cia402.drive_torque import torque_objects
 from rigidimeter.rig.devices.cia402.sdo_transfers import read_object, write_object
 from rigidimeter.rig.devices.cia402.setup import (
     MAX_PROFILE_VELOCITY,
@@ -68,11 +69,10 @@ class Wanted(NamedTuple):
 
 def read_only(settings: Cia402Settings) -> tuple[Object, Object, Object]:
     """Return the objects of `DriveSays`, in its order."""
-    rated = Object("motor rated torque in mN·m", *settings.axis(0x6076), 4, 0, optional=True)
     offset = Object("home offset", *settings.axis(0x607C), 4, 0, signed=True, optional=True)
     return (
         Object("position actual value", *settings.axis(0x6064), 4, 0, signed=True),
-        replace(rated, lost="the bound of the torque, and the drive's torque as a second witness"),
+        torque_objects(settings)[0],
         replace(offset, lost="nothing: then it is zero"),
     )
 
@@ -152,9 +152,11 @@ def _torque(
     settings: Cia402Settings, bounds: DriveBounds, says: DriveSays, tight: Tight | None
 ) -> Wanted:
     def alternatives(thousandths: int) -> tuple[tuple[Object, ...], ...]:
+        torque = _optional(settings, "max torque", 0x6072, 2, thousandths, TORQUE)
+        current = _optional(settings, "max current", 0x6073, 2, thousandths, TORQUE)
         return (
-            (_optional(settings, "max torque", 0x6072, 2, thousandths, TORQUE),),
-            (_optional(settings, "max current", 0x6073, 2, thousandths, TORQUE),),
+            (replace(torque, lost=f"{torque.lost} (0x6073 will do)"),),
+            (replace(current, lost=f"{current.lost} (0x6072 is used where it is there)"),),
         )
 
     if settings.reflected_inertia_kg_m2 == 0.0:

@@ -10,6 +10,7 @@ Both objects are optional, and so is room for the torque in the velocity frame.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from rigidimeter.rig.devices.cia402.sdo_transfers import read_object
@@ -21,9 +22,11 @@ FACT = "drive's torque"
 
 def torque_objects(settings: Cia402Settings) -> tuple[Object, Object]:
     """Return rated and actual torque; read, never written."""
+    rated = Object("motor rated torque", *settings.axis(0x6076), 4, 0, optional=True)
+    actual = Object("actual torque", *settings.axis(0x6077), 2, 0, signed=True, optional=True)
     return (
-        Object("motor rated torque", *settings.axis(0x6076), 4, 0, optional=True),
-        Object("actual torque", *settings.axis(0x6077), 2, 0, signed=True, optional=True),
+        replace(rated, lost="the drive's torque as a second witness, and the bound of the torque"),
+        replace(actual, lost="the drive's torque as a second witness of the torque sensor"),
     )
 
 

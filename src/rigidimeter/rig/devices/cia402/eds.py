@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import TABLE_BYTES, read_bytes
+from rigidimeter.rig.devices.bounds import DriveBounds
+from rigidimeter.rig.devices.cia402.drive_bounds import bound_objects
 from rigidimeter.rig.devices.cia402.drive_torque import FACT, torque_entries, torque_objects
 from rigidimeter.rig.devices.cia402.sdo_transfers import library
 from rigidimeter.rig.devices.cia402.setup import (
@@ -22,21 +24,30 @@ from rigidimeter.rig.devices.cia402.setup import (
     Cia402Settings,
     Object,
     displayed_mode,
+    inputs,
     objects,
 )
 
 
 class EdsMatch(NamedTuple):
-    """One object: its name and address, whether it fits, what the EDS says, what must be."""
+    """One object: its name and address, whether it fits, what the EDS says, what must be.
+
+    `lost` is what is lost without it, where it is optional and not there.
+    """
 
     label: str
     fits: bool
     found: str
     needed: str
+    lost: str = ""
 
 
-def compare_eds(path: Path, settings: Cia402Settings) -> list[EdsMatch]:
+def compare_eds(
+    path: Path, settings: Cia402Settings, bounds: DriveBounds | None = None
+) -> list[EdsMatch]:
     """Compare an EDS with what the driver writes, reads and maps with these settings.
+
+    Bounds are compared too where they are given.
 
     Raises
     ------
@@ -66,7 +77,11 @@ def compare_eds(path: Path, settings: Cia402Settings) -> list[EdsMatch]:
     last = {(entry.index, entry.subindex): entry for entry in objects(settings, lacking is None)}
     found = [_written(entry, described) for entry in last.values()]
     found += [] if lacking is None else [lacking]
-    found += [_read(entry, described) for entry in (IDENTITY[0], displayed_mode(settings))]
+    if bounds is not None:
+        held = (o for o in bound_objects(settings, bounds) if (o.index, o.subindex) not in last)
+        found += [_written(entry, described) for entry in held]
+    read = (IDENTITY[0], displayed_mode(settings), inputs(settings))
+    found += [_read(entry, described) for entry in read]
     return found + [
         _mapped(entry, described)
         for entry in last.values()
@@ -86,7 +101,8 @@ def _lacking_torque(described: Any, settings: Cia402Settings) -> EdsMatch | None
         _mapped(entry, described) for entry in entries if entry.subindex and _free(entry, described)
     ]
     first = next((match for match in needed if not match.fits), None)
-    return first and first._replace(fits=True, needed="optional")
+    lost = torque_objects(settings)[1].lost
+    return first and first._replace(fits=True, needed="optional", lost=lost)
 
 
 def _free(entry: Object, described: Any) -> bool:
@@ -108,7 +124,8 @@ def _variable(described: Any, index: int, subindex: int) -> Any:
 
 def _missing(entry: Object, described: Any) -> EdsMatch:
     found = "no such sub-index" if entry.index in described else "no such object"
-    return EdsMatch(entry.label, entry.optional, found, "optional" if entry.optional else "needed")
+    needed = "optional" if entry.optional else "needed"
+    return EdsMatch(entry.label, entry.optional, found, needed, entry.lost)
 
 
 def _read(entry: Object, described: Any) -> EdsMatch:

@@ -302,14 +302,16 @@ def _message(
     fixed = partial(Object, fixed=True)
     identifier = fixed(f"{name}'s identifier", index, 1, 4, id_, mask=~NO_REMOTE_REQUEST)
     count = fixed(f"{name}'s number of entries", index + 0x200, 0, 1, len(entries))
+    more_room = partial(fixed, optional=True, lost="what the drive measures beside the velocity")
+    entry_of = [fixed if k <= (needed or k) else more_room for k in range(1, len(entries) + 1)]
     return (
         replace(identifier, value=INVALID | id_),
         fixed(f"{name}'s transmission type", index, 2, 1, transmission),
         *more,
         replace(count, value=0),
         *(
-            fixed(f"{name}'s entry {k}", index + 0x200, k, 4, e, optional=k > (needed or k))
-            for k, e in enumerate(entries, 1)
+            make(f"{name}'s entry {k}", index + 0x200, k, 4, e)
+            for k, (make, e) in enumerate(zip(entry_of, entries, strict=True), 1)
         ),
         count,
         identifier,
