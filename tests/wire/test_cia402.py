@@ -107,12 +107,12 @@ PASSED_ON = {
 }
 
 
-BOUNDS = {"bound sleeps", "wrong bound"}
+BOUNDS, BUTTON = {"bound sleeps", "wrong bound"}, {"press button", "stop inputs"}
 
 
 def test_every_misbehaviour_has_its_test():
-    # Those of torque and bounds in files of their own.
-    others = {"ignores quick stop", "short emergency", "torque frozen", *BOUNDS, "stop inputs"}
+    # Those of torque, bounds and button in files of their own.
+    others = {"ignores quick stop", "short emergency", "torque frozen", *BOUNDS, *BUTTON}
     assert set(CIA402_MISBEHAVIOURS) == {*CAUSES, *REFUSED, *PASSED_ON, *others}
 
 

@@ -67,6 +67,9 @@ A_PERSON_TELLS = (
 )
 """Checks without which nobody is put into a rig of hardware; an emulated one holds no person."""
 
+HAND_HELD = "hand-held stop"
+"""The check of a stop that only some rigs have; needed where the rig file names one."""
+
 VOLATILE = {"status", "bias", "cycle_s", "latched_faults_before"}
 """Values that devices report and that change without meaning another calibration."""
 
@@ -139,6 +142,9 @@ class CommissioningRecord:
         """What must be passed and was not tried, or not even possible."""
         settled = {check.name for check in self.checks if check.outcome in ("passed", "failed")}
         needed = MUST_PASS if self.emulated else (*MUST_PASS, *A_PERSON_TELLS)
+        there = {check.name for check in self.checks}
+        if HAND_HELD in there and not self.emulated:  # a stop that is fitted and was never pressed
+            needed = (*needed, HAND_HELD)
         lacking = [name for name in needed if name not in settled]
         stable = any(name.startswith("stability with") for name in settled)
         return tuple(lacking if stable else [*lacking, "stability"])

@@ -59,7 +59,11 @@ from rigidimeter.rig.commissioning.repeated_checks import (
     parts_to_repeat,
 )
 from rigidimeter.rig.commissioning.static_tests import facts_checks
-from rigidimeter.rig.commissioning.stopping import emergency_stop_checks, watchdog_checks
+from rigidimeter.rig.commissioning.stopping import (
+    emergency_stop_checks,
+    hand_held_checks,
+    watchdog_checks,
+)
 from rigidimeter.rig.commissioning.trials import Setup, require_no_power
 from rigidimeter.rig.devices import RigFile
 from rigidimeter.rig.devices.base import DeviceError
@@ -229,6 +233,7 @@ def _with_power(
         found.checks += watchdog_checks(setup, facts["drive"]["watchdog_s"])
     if STOP in parts:
         found.checks += emergency_stop_checks(setup)
+        found.checks += hand_held_checks(setup, facts)
 
 
 def _swing(setup: Setup, found: CheckResults) -> bool:

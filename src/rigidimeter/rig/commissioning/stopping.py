@@ -8,12 +8,15 @@ until an operator agrees; and so after the emergency stop, when it is released.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from rigidimeter.core.units import rad_from_deg
 from rigidimeter.rig.acquisition import ControlLoop, control_modes
 from rigidimeter.rig.commissioning.checks import RigCheck, below, impossible, untried, yes
+from rigidimeter.rig.commissioning.commissioning_record import HAND_HELD
 from rigidimeter.rig.commissioning.manual_checks import ask_operator
 from rigidimeter.rig.commissioning.motion_tests import smooth_motion
 from rigidimeter.rig.commissioning.trials import (
@@ -41,6 +44,10 @@ RESTART = "stays stopped after the watchdog"
 AGAIN = "comes back after confirmation"
 STOP, POWER = "emergency stop", "hardware enable drops the power"
 RELEASE = "stays stopped after the release"
+BUTTON = "button_bit"
+"""The fact of a drive that has a hand-held stop."""
+
+HAND_HELD_RELEASE = "stays stopped after the hand-held stop"
 
 
 def watchdog_checks(setup: Setup, watchdog_s: float | None) -> list[RigCheck]:
@@ -134,6 +141,33 @@ def emergency_stop_checks(setup: Setup) -> list[RigCheck]:
         return [*checks, *none_of((RELEASE,), "the operator did not release it")]
     drop_old_samples(setup)
     return [*checks, _stayed(RELEASE, _command_stopped_rig(setup))]
+
+
+def hand_held_checks(setup: Setup, facts: Mapping[str, Any]) -> list[RigCheck]:
+    """Let somebody press the hand-held stop in the drive's inputs, where the rig file names one."""
+    if BUTTON not in facts["drive"]["values"]:
+        return []
+    operator, wait_s = setup.operator, setup.limits.emergency_stop_wait_s
+    limit = "an emergency stop"
+    if not operator.present:
+        return [untried(HAND_HELD, limit)]
+    if not operator.ask(
+        f"Hand-held stop: after you agree the drive has power for {wait_s:g} s and stands still; "
+        "press the button in the person's hand within that time. Ready?"
+    ):
+        return [impossible(HAND_HELD, limit, "the operator did not agree to it")]
+    result = trial(setup, lambda loop: control_modes.hold(loop, wait_s))
+    words = result.cause.sentence if result.cause is not Cause.NONE else f"nothing in {wait_s:g} s"
+    remedy = "check the button's wiring, button_bit and button_pressed_level of [drive]"
+    seen = result.cause is Cause.EMERGENCY_STOP
+    checks = [yes(HAND_HELD, seen, words, limit, remedy)]
+    moved = f"at most {MAX_DEG:g} deg"
+    if not seen:
+        return [*checks, impossible(HAND_HELD_RELEASE, moved, "the button was not seen")]
+    if not operator.ask("Release the button, and keep hands off the joint. Released?"):
+        return [*checks, impossible(HAND_HELD_RELEASE, moved, "the operator did not release it")]
+    drop_old_samples(setup)
+    return [*checks, _stayed(HAND_HELD_RELEASE, _command_stopped_rig(setup))]
 
 
 def _command_stopped_rig(setup: Setup) -> Readings:

@@ -231,7 +231,7 @@ class Cia402Emulator:
         if index == 0x6041:
             return statusword(self._servo.phase) | self._servo.bound_bits()
         if index == 0x60FD:
-            return self.inputs
+            return self.inputs & ~1 if "press button" in self._servo.wrong else self.inputs
         if index == 0x6072 and "wrong bound" in self._servo.wrong:
             return int(self._servo.wrong["wrong bound"])
         if index == 0x6061:

@@ -43,6 +43,7 @@ CIA402_MISBEHAVIOURS = {
     "wrong watchdog": "accepts the heartbeat watchdog but uses another (value: in ms)",
     "ignores quick stop": "keeps moving after a quick-stop command",
     "wrong bound": "takes a bound of the torque but keeps another (value: in thousandths)",
+    "press button": "opens bit 0 of its digital inputs, as a hand-held stop does",
     "stop inputs": "stops sending its digital inputs",
     "bound sleeps": "takes a bound and does not obey it (value: its object, 0 for all of them)",
 }

@@ -124,6 +124,7 @@ class FakeDrive:
         values = {
             "cycle_s": self._now(),
             "braking_rad_s2": self._faults.get("braking_rad_s2", 120.0),
+            "button_bit": self._faults.get("button_bit"),
         }
         known = {name: value for name, value in values.items() if value is not None}
         return DeviceFacts("fake drive", "D1", 1e4, watchdog_s, known)
@@ -159,6 +160,9 @@ class FakeDrive:
         self._live()
         angle, velocity = self._arm.motion()
         scale = self._faults.get("angle_scale", 1.0)
+        if self._on and self._now() >= self._faults.get("button_at_s", math.inf):
+            self._halt()
+            self._status, self._cause = 9, Cause.EMERGENCY_STOP
         status, cause = self._status, self._cause
         if self._on and self._now() >= self._faults.get("given_up_s", math.inf):
             cause = Cause.DRIVE_STATE

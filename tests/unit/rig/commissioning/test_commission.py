@@ -210,6 +210,33 @@ def test_a_drive_that_says_nothing_is_watched_in_motion(commissioned: Any) -> No
     assert "watchdog" in failed(commissioned(deaf_watchdog=True, **quiet))
 
 
+@pytest.mark.parametrize("works", [True, False])
+def test_a_hand_held_stop_is_pressed_where_the_rig_file_names_one(
+    commissioned: Any, works: bool
+) -> None:
+    def presses(question: str, world: Any) -> bool:
+        if question.startswith("Hand-held stop") and works:
+            world.faults["button_at_s"] = world.time.now() + 1.0
+        if question.startswith("Release the button"):
+            world.faults.pop("button_at_s", None)
+        return at_hand(question, world)
+
+    record = commissioned(ask=presses, button_bit=0)
+    checks = {check.name: check.outcome for check in record.checks}
+    assert checks["hand-held stop"] == ("passed" if works else "failed")
+    assert record.passed is works
+    released = checks["stays stopped after the hand-held stop"]
+    assert released == ("passed" if works else "not possible here")
+    assert "hand-held stop" not in {check.name for check in commissioned().checks}
+
+
+def test_a_hand_held_stop_that_nobody_pressed_is_missing_on_hardware(commissioned: Any) -> None:
+    record = commissioned(present=False, button_bit=0, emulated=True)
+    assert record.passed
+    assert "hand-held stop" in record.not_tried
+    assert "hand-held stop" in commissioned(present=False, button_bit=0).missing
+
+
 @pytest.mark.parametrize(
     ("after_s", "reported", "stopped"),
     [(0.15, True, True), (0.25, False, True), (0.35, False, False)],
