@@ -46,6 +46,8 @@ SIGNALS, LOOP, RECORDER, RECORDS, CONSOLE = (
     )
 )
 PAGE, SERVER_STATE = "rig/console/page/live_socket.py", "rig/console/page/server_state.py"
+ACCESS, TOKEN = "rig/console/page/access.py", "rig/console/page/page_token.py"
+KEYS, ALARMS = "rig/console/stop_keys.py", "rig/console/alarms.py"
 STEP, WATCH, LIMITS = "rig/guard/step.py", "rig/guard/watch.py", "rig/guard/limits.py"
 AGREEMENT, CONTACT = "rig/guard/agreement.py", "rig/guard/contact.py"
 CONSISTENCY, ANSWER = "rig/guard/consistency.py", "rig/guard/torque_answer.py"
@@ -556,6 +558,30 @@ HAND_MADE = tuple(
             "a page that only looks keeps the arm moving",
         ),
         (PAGE, "            presence.gone(page.secret)\n", "", "a page that is gone keeps control"),
+        (
+            ACCESS,
+            'sum(name == b"host" for name, _ in scope["headers"]) != 1',
+            "False",
+            "a request may have two Host headers",
+        ),
+        (ACCESS, 'not scope["path"].startswith("/")', "False", "an address of another server"),
+        (
+            ACCESS,
+            'f"http://{host}".lower()',
+            'f"{origin.partition(":")[0]}://{host}".lower()',
+            "any scheme",
+        ),
+        (ACCESS, "(*self._names, reached)", '("*",)', "any name is this computer's"),
+        (ACCESS, "if self._token and not same_token", "if False and not same_token", "no token"),
+        (TOKEN, "0o600", "0o644", "others read the token"),
+        (TOKEN, "mode & 0o077", "mode & 0o007", "a group reads the token"),
+        (TOKEN, "not token and not is_loopback(host)", "False", "no token on a network"),
+        (KEYS, 'return " " in text or "e" in text', "return False", "no key stops"),
+        (KEYS, "    with tty:\n", "    if tty.__enter__():\n", "the terminal is not given back"),
+        (KEYS, "return os.tcgetpgrp(keys) == os.getpgrp()", "return True", "keys of a shell"),
+        (ALARMS, "if self._halted > before:", "if False:", "no stop is heard"),
+        (ALARMS, "and self._halted == GOES_ON", "and False", "no caution is heard"),
+        (ALARMS, "return HELD if facts.held else STOPPED", "return HELD", "a stop after a hold"),
         (SERVER_STATE, "still=self._still", "still=True", "the arm moves on without a page"),
     )
 )

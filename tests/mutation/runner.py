@@ -107,6 +107,10 @@ BY_HAND = {
     "rig/acquisition/processes/supervisor.py": _WATCHED,
     "rig/console/page/server_state.py": ("rig/console/page/test_presence.py",),
     "rig/console/page/live_socket.py": ("rig/console/page/test_live_socket.py",),
+    "rig/console/page/access.py": ("rig/console/page/test_access.py",),
+    "rig/console/page/page_token.py": ("rig/console/page/test_page_token.py",),
+    "rig/console/stop_keys.py": ("rig/console/test_stop_keys.py",),
+    "rig/console/alarms.py": ("rig/console/test_alarms.py",),
 }
 """The same of modules in which only the faults made by hand are looked for."""
 

@@ -92,6 +92,18 @@ def test_without_a_terminal_it_is_said_that_no_key_works(tmp_path):
     StopKeys(None).ring()
 
 
+def test_keys_of_another_program_are_left_to_it(person, monkeypatch):
+    with stop_keys(person.keyboard) as stop:
+        person.press(b"e")
+        monkeypatch.setattr(os, "tcgetpgrp", lambda _: os.getpgrp() + 1)  # Ctrl-Z, then bg
+        assert not stop.pressed()
+        monkeypatch.setattr(os, "tcgetpgrp", lambda _: os.getpgrp())  # fg
+        assert stop.pressed()
+    monkeypatch.setattr(os, "tcgetpgrp", lambda _: os.getpgrp() + 1)
+    with stop_keys(person.keyboard) as stop:
+        assert stop.help == NO_KEYS
+
+
 BEHIND = """
 import os, pty, sys, time
 from rigidimeter.rig.console import NO_KEYS, stop_keys

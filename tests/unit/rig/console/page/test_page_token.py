@@ -53,3 +53,11 @@ def test_what_is_no_file_is_refused_by_name(tmp_path):
     ):
         with pytest.raises(UserError, match=f"{name}: .*({why})"):
             token_in(tmp_path / name)
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.0.7", "lab"])
+def test_no_token_is_for_the_loopback_alone(host):
+    for own in ("127.0.0.1", "::1", "localhost"):
+        require_token("", own)
+    with pytest.raises(UserError, match=f"--no-token: whoever reaches {host} "):
+        require_token("", host)
