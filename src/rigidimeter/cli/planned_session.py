@@ -33,9 +33,15 @@ from rigidimeter.rig.acquisition.processes import (
     SessionMemory,
     supervise,
 )
-from rigidimeter.rig.commissioning import as_measured, check_record, require_daily_check
+from rigidimeter.rig.commissioning import (
+    CommissioningRecord,
+    as_measured,
+    check_record,
+    record_path,
+    require_daily_check,
+)
 from rigidimeter.rig.console import SessionPlan, new_folder, next_steps, resume_command
-from rigidimeter.rig.devices import load_rig
+from rigidimeter.rig.devices import STOP_LOW, MotionRange, RigFile, load_rig, range_of
 
 Console = Callable[[SessionMemory], object]
 
@@ -69,6 +75,18 @@ class PlannedSession:
         """Return the plan as consoles take it, with the codes of a blinded session."""
         codes = codes_of(self.about)
         return SessionPlan(self.settings, self.protocol.epochs, self.done, codes, virtual)
+
+    @property
+    def motion_range(self) -> MotionRange | None:
+        """The range of motion of the person, as it was entered for this session."""
+        return range_of(self.about.get("range"), str(self.source or "the session"))
+
+    def within(self, entered: MotionRange | None) -> PlannedSession:
+        """Return the session within a range, where one was entered."""
+        if entered is None:
+            return self
+        entered = replace(entered, subject=str(self.about.get("subject", "")))
+        return replace(self, about={**self.about, "range": entered.facts()})
 
     def blinded(self) -> PlannedSession:
         """Return the session with codes for its conditions, which one that has them keeps."""
@@ -135,7 +153,40 @@ def checked_rig(planned: PlannedSession, rig: Path | None) -> PlannedSession:
     commissioned = check_record(rigfile, None, settings)
     today = require_daily_check(rigfile, commissioned, settings, settings_path=planned.source)
     rigfile.claim().close()
-    return replace(planned, settings=as_measured(settings, commissioned, today))
+    planned = replace(planned, settings=as_measured(settings, commissioned, today))
+    _require_range(planned, rigfile, commissioned)
+    return planned
+
+
+def _require_range(
+    planned: PlannedSession, rigfile: RigFile, commissioned: CommissioningRecord
+) -> None:
+    """Refuse a rig of hardware without the range of motion of the person, or with a wrong one."""
+    found, where = planned.motion_range, rigfile.path
+    if found is None:
+        if rigfile.emulated:
+            return
+        raise UserError(
+            f"{where}: is hardware, so the range of motion of this person is needed: lead the arm "
+            "through it with --lead-range, or give it on the drive's scale with --range-deg LOW "
+            "HIGH; on the page enter it in the form"
+        )
+    subject = str(planned.about.get("subject", ""))
+    if found.subject != subject:
+        raise UserError(
+            f"{where}: this is the range of motion of {found.subject or 'nobody'}, and "
+            f"the subject is {subject or 'not named'}; lead this person's arm through its range"
+        )
+    echo(found.words[:1].upper() + found.words[1:] + ".", err=True)
+    if rigfile.emulated and STOP_LOW not in commissioned.numbers:
+        return  # nobody was there to lead it to its stops
+    if not rigfile.absolute_angle:
+        raise UserError(
+            f"{where}: does not say absolute_angle = true, and without it a range of motion may "
+            "mean another place after the drive's power was off; use an absolute encoder, or home "
+            "the drive whenever it is switched on, and then say so in the rig file"
+        )
+    found.require_inside(commissioned.numbers, str(record_path(where)))
 
 
 def run_planned(
@@ -148,6 +199,7 @@ def run_planned(
 ) -> Ended:
     """Run a session that was checked, to its end."""
     home_rad = planned.continues.get("origin_rad") if rig is not None else None
+    range_rad = planned.motion_range.range_rad if planned.motion_range is not None else None
     recording = RecordingPlan(
         out,
         planned.settings,
@@ -158,7 +210,7 @@ def run_planned(
         about=planned.about,
     )
     return supervise(
-        partial(run_loop, planned.settings, planned.protocol, rig, home_rad),
+        partial(run_loop, planned.settings, planned.protocol, rig, home_rad, range_rad),
         recording,
         realtime=realtime,
         console=console,

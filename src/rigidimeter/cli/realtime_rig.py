@@ -25,6 +25,7 @@ def run_loop(
     protocol: Protocol,
     rig_path: Path | None,
     home_rad: float | None,
+    range_rad: tuple[float, float] | None,
     side: LoopSide,
 ) -> None:
     """Run a session; the target of the loop's process.
@@ -37,6 +38,8 @@ def run_loop(
         RIG.toml; the virtual rig if not given.
     home_rad : float or None
         Where the joint stood, on the drive's scale, when the session began that this one continues.
+    range_rad : tuple of float or None
+        The range of motion of the person, on the drive's scale.
     side : LoopSide
         Rings, shared status and what prepares the process.
     """
@@ -45,7 +48,7 @@ def run_loop(
     clock = DeadlineClock()
     if rig_path is None:
         rig, new_joint = virtual_rig(settings, protocol)
-        _run(settings, protocol, rig, new_joint, clock, side, lambda _: ())
+        _run(settings, protocol, rig, new_joint, clock, side, lambda _: (), range_rad)
         return
     # What is slow to load is loaded before the sensor's samples flow.
     from rigidimeter.rig.commissioning import check_record, require_daily_check
@@ -61,9 +64,9 @@ def run_loop(
         return commissioned.not_tried
 
     with rigfile.claim() as lock:
-        bounds = drive_bounds(settings)
+        bounds = drive_bounds(settings, range_rad)
         rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, home, lock, bounds)
-        _run(settings, protocol, rig, lambda _: {}, clock, side, approve)
+        _run(settings, protocol, rig, lambda _: {}, clock, side, approve, range_rad)
 
 
 def _run(
@@ -74,6 +77,7 @@ def _run(
     clock: DeadlineClock,
     side: LoopSide,
     approve: Callable[[Mapping[str, Any]], Sequence[str]],
+    range_rad: tuple[float, float] | None,
 ) -> None:
     """Set up the rig and run; `approve` refuses it or says which checks were never made."""
     from rigidimeter.rig.acquisition import run_session
@@ -100,6 +104,7 @@ def _run(
             zero_first=True,
             state_changed=side.sink.state_changed,
             watch=side.sink.watch,
+            range_rad=range_rad,
         )
     finally:
         rig.close()

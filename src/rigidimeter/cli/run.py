@@ -40,6 +40,14 @@ def run(
         "Show codes in place of conditions. For an examiner who may see the screen; also with "
         "`estimate --blinded`.",
     ),
+    range_deg: tuple[float, float] | None = RUN.option(
+        "--range-deg LOW HIGH",
+        "Range of motion of this person, on the drive's scale. Hardware needs it or --lead-range.",
+    ),
+    lead_range: bool = RUN.flag(
+        "--lead-range",
+        "Lead the arm to both ends of its range by hand, without power, before the session.",
+    ),
     host: str = HOST,
     port: int = PORT,
     token_file: Path | None = TOKEN_FILE,
@@ -56,7 +64,7 @@ def run(
     \b
     For example:
       rigidimeter run --out session
-      rigidimeter run protocol.toml --rig rig.toml --out session
+      rigidimeter run protocol.toml --rig rig.toml --lead-range --out session
       rigidimeter run --resume session --rig rig.toml --out session-2
     """
     from rigidimeter.cli.attendance import attendance
@@ -68,6 +76,7 @@ def run(
         require_packages,
         run_planned,
     )
+    from rigidimeter.cli.range_entry import entered_range
     from rigidimeter.rig.acquisition.processes import Realtime, complete_left
     from rigidimeter.rig.console import discard_typed, terminal_view
 
@@ -95,6 +104,7 @@ def run(
             raise UserError("the program was stopped before a session was run")
         conclude(led, out, rig, nwb=False)
         return
+    planned = planned.within(entered_range(range_deg, rig, planned.settings, lead=lead_range))
     planned = checked_rig(planned, rig)
     attended, confirmed = attendance(rig, unattended=unattended, confirm=confirm)
     shown = planned.shown(virtual=rig is None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from dataclasses import asdict
@@ -18,7 +19,7 @@ from rigidimeter.core.settings import parse_settings
 from rigidimeter.planning import plan
 from rigidimeter.rig.acquisition.processes import Realtime
 from rigidimeter.rig.console.page import Place, ServerState, StartRequest
-from rigidimeter.rig.devices import Home, RigFile, load_rig
+from rigidimeter.rig.devices import STOP_HIGH, STOP_LOW, Home, RigFile, load_rig
 
 RIG = """
 home_deg = 10.0
@@ -50,18 +51,19 @@ def _own_locks(tmp_path_factory, monkeypatch):
 @pytest.fixture
 def seen(monkeypatch):
     """Run the loop's target in this process up to where the rig is made; keep what was told."""
-    seen = SimpleNamespace(home=None, continues=None)
+    seen = SimpleNamespace(home=None, continues=None, about=None, bounds=None)
 
-    def build(_, now, tick_rate_hz, home=None, lock=None):
-        seen.home = home
+    def build(_, now, tick_rate_hz, home=None, lock=None, bounds=None):
+        seen.home, seen.bounds = home, bounds
         raise BuiltError
 
     def supervise(target, recording, **_):
-        seen.continues = recording.continues
+        seen.continues, seen.about = recording.continues, recording.about
         target(SimpleNamespace())
 
     monkeypatch.setattr(RigFile, "build", build)
-    commissioned = SimpleNamespace(rig_name="rig", numbers={})
+    numbers = {STOP_LOW: -45.0, STOP_HIGH: 90.0}
+    seen.commissioned = commissioned = SimpleNamespace(rig_name="rig", numbers=numbers)
     monkeypatch.setattr("rigidimeter.cli.planned_session.check_record", lambda *_: commissioned)
     monkeypatch.setattr(
         "rigidimeter.cli.planned_session.require_daily_check", lambda *_, **__: CHECKED
@@ -74,35 +76,96 @@ def seen(monkeypatch):
 def resume(tmp_path, rigidimeter):
     """Go on with a session that noted this origin, on a rig whose file names another home."""
 
-    def run(origin_rad):
+    def run(origin_rad, *options, about=None, rig_text=f"absolute_angle = true\n{RIG}"):
         settings = parse_settings({})
         epochs = plan(settings.protocol, settings.prbs, settings.sinusoid, 1).epochs
         planned = [asdict(epoch) for epoch in epochs]
-        writer = SessionWriter(tmp_path / "s", settings, planned, {}, virtual=False)
+        writer = SessionWriter(
+            tmp_path / "s", settings, planned, {}, virtual=False, about=about or {}
+        )
         if origin_rad is not None:
             writer.event("rig_enabled", time_s=0.0, origin_rad=origin_rad)
         writer.close(0.0, "abort", "aborted by the operator")
         rig = tmp_path / "rig.toml"
-        rig.write_text(RIG)
-        with pytest.raises(BuiltError):
-            rigidimeter(
-                *("run", "--resume", tmp_path / "s", "--rig", rig, "--out", tmp_path / "n"),
-                *("--unattended", "--confirm", "nobody in the rig"),
-            )
+        rig.write_text(rig_text)
+        return rigidimeter(
+            *("run", "--resume", tmp_path / "s", "--rig", rig, "--out", tmp_path / "n"),
+            *("--unattended", "--confirm", "nobody in the rig", *options),
+        )
 
     return run
 
 
 def test_the_home_is_where_the_session_began(seen, resume):
-    resume(0.25)
+    with pytest.raises(BuiltError):
+        resume(0.25, *RANGE)
     assert seen.home == Home(0.25, HOME_TOLERANCE_RAD)
     assert seen.continues["origin_rad"] == 0.25
 
 
 def test_a_session_that_began_nowhere_leaves_the_home_to_the_rig_file(seen, resume):
-    resume(None)
+    with pytest.raises(BuiltError):
+        resume(None, *RANGE)
     assert seen.home is None
     assert "origin_rad" not in seen.continues
+
+
+RANGE = ("--range-deg", "-30", "60")
+
+
+def test_a_range_that_is_typed_goes_to_the_record_and_to_the_drive(seen, resume):
+    with pytest.raises(BuiltError):
+        resume(0.25, *RANGE, about={"subject": "S01"})
+    assert seen.about["range"] == {
+        "low_deg": -30.0,
+        "high_deg": 60.0,
+        "how": "typed",
+        "subject": "S01",
+    }
+    assert seen.bounds.range_rad == pytest.approx((math.radians(-30.0), math.radians(60.0)))
+
+
+def test_a_session_goes_on_within_its_own_range_and_says_whose_it_is(seen, resume, capsys):
+    kept = {"low_deg": -20.0, "high_deg": 50.0, "how": "led by hand", "subject": "S01"}
+    with pytest.raises(BuiltError):
+        resume(0.25, about={"subject": "S01", "range": kept})
+    assert seen.about["range"] == kept
+
+
+@pytest.mark.parametrize(
+    ("options", "about", "rig_text", "told"),
+    [
+        ((), {}, None, "is hardware, so the range of motion of this person is needed"),
+        (("--range-deg", "60", "-30"), {}, None, "must go from a lower to a higher angle"),
+        (("--range-deg", "-44", "60"), {}, None, "must be inside -42 to 87 deg"),
+        ((*RANGE, "--lead-range"), {}, None, "two ways to say one thing"),
+        (RANGE, {}, RIG, "does not say absolute_angle = true"),
+        ((), {"range": {"low_deg": 1.0}}, None, "in its manifest cannot be read"),
+        (
+            (),
+            {
+                "subject": "S02",
+                "range": {"low_deg": -20.0, "high_deg": 50.0, "how": "typed", "subject": "S01"},
+            },
+            None,
+            "range of motion of S01, and the subject is S02",
+        ),
+    ],
+)
+def test_hardware_is_refused_without_a_range_that_holds(
+    seen, resume, options, about, rig_text, told
+):
+    more = {} if rig_text is None else {"rig_text": rig_text}
+    ended = resume(0.25, *options, about=about, **more)
+    assert ended.status != 0
+    assert told in " ".join(ended.err.split())
+    assert seen.bounds is None
+
+
+def test_a_record_without_the_angles_of_the_stops_is_refused(seen, resume):
+    seen.commissioned.numbers.clear()
+    ended = resume(0.25, *RANGE)
+    assert "has no angles of the mechanical stops" in " ".join(ended.err.split())
 
 
 EMULATED = """
@@ -202,7 +265,8 @@ def test_a_rig_that_was_not_checked_today_is_refused_with_the_command_to_type(
     tmp_path, monkeypatch, rigidimeter
 ):
     monkeypatch.setattr("rigidimeter.cli.planned_session.supervise", None)
-    commissioned = SimpleNamespace(rig_name="rig", numbers={})
+    numbers = {STOP_LOW: -45.0, STOP_HIGH: 90.0}
+    seen.commissioned = commissioned = SimpleNamespace(rig_name="rig", numbers=numbers)
     monkeypatch.setattr("rigidimeter.cli.planned_session.check_record", lambda *_: commissioned)
     rig, protocol = tmp_path / "rig.toml", tmp_path / "protocol.toml"
     rig.write_text(RIG)
@@ -218,7 +282,8 @@ def test_a_rig_that_another_uses_is_refused_before_any_process_starts(
     tmp_path, monkeypatch, rigidimeter
 ):
     monkeypatch.setattr("rigidimeter.cli.planned_session.supervise", None)
-    commissioned = SimpleNamespace(rig_name="rig", numbers={})
+    numbers = {STOP_LOW: -45.0, STOP_HIGH: 90.0}
+    seen.commissioned = commissioned = SimpleNamespace(rig_name="rig", numbers=numbers)
     monkeypatch.setattr("rigidimeter.cli.planned_session.check_record", lambda *_: commissioned)
     monkeypatch.setattr(
         "rigidimeter.cli.planned_session.require_daily_check", lambda *_, **__: CHECKED

@@ -35,6 +35,7 @@ from rigidimeter.rig.guard import (
     guard_limits,
     guard_state,
     released,
+    within_range,
 )
 
 ROUNDED = 1.0 + 1e-6
@@ -168,6 +169,9 @@ def replay(
     rate_hz, loop = settings.rig.tick_rate_hz, settings.loop
     stall_ticks = loop.stall_s * rate_hz
     limits, agreement = guard_limits(settings), consistency_limits(settings)
+    for event in events:  # the range of motion of the person, from where the joint began
+        if event.get("event") == "rig_enabled" and event.get("range_rad"):
+            limits = within_range(limits, *event["range_rad"])
     guard, consistency = guard_state(limits), consistency_state(agreement)
     knows_cause, knows_reported = "cause" in recorded, "reported_cause" in recorded
     latched_s = {event.get("time_s") for event in events if event.get("event") == "guard_latched"}

@@ -25,6 +25,7 @@ from rigidimeter.rig.acquisition.control_modes import (
     skip_passed_ticks,
 )
 from rigidimeter.rig.acquisition.controller_run import ControllerRun
+from rigidimeter.rig.acquisition.range_of_motion import keep_within, motion_beyond
 from rigidimeter.rig.acquisition.run_states import (
     Command,
     Phase,
@@ -91,6 +92,7 @@ def run_session(
     zero_first: bool = False,
     state_changed: Callable[[Run], None] = lambda _: None,
     watch: Callable[[ControlLoop], None] = lambda _: None,
+    range_rad: tuple[float, float] | None = None,
 ) -> SessionResult:
     """Run every epoch of a protocol with its rest.
 
@@ -118,6 +120,8 @@ def run_session(
         Called whenever the run changes its state.
     watch : callable
         Called once with the loop, before its first tick; whoever shows it may look at it.
+    range_rad : tuple of float, optional
+        The range of motion of the person, on the drive's own scale.
     """
     run = ControllerRun(settings, rig, clock, sink, progress, supervision, state_changed)
     watch(run.loop)
@@ -142,9 +146,14 @@ def run_session(
         # A device may take long to come up. The clock is not set back for that: it is the drivers'
         # clock too, and their heartbeats would cease meanwhile.
         skip_passed_ticks(run.loop)
+        ends_rad = keep_within(run.loop, range_rad, rig.origin_rad)
         if zero_first:
-            sink.event("rig_enabled", time_s=run.loop.time_s, origin_rad=rig.origin_rad)
-        if not zero_first or _zero_sensor(session):
+            enabled = {"time_s": run.loop.time_s, "origin_rad": rig.origin_rad}
+            sink.event("rig_enabled", **enabled, range_rad=ends_rad)
+        why = motion_beyond(run.loop, settings, (angle_rad, velocity_rad_s)) if ends_rad else ""
+        if why:
+            run.outcome, run.reason = "fail", why
+        elif not zero_first or _zero_sensor(session):
             _run_epochs(session)
         run.conclude(len(queue))
     except KeyboardInterrupt:

@@ -35,6 +35,7 @@ from rigidimeter.rig.commissioning.inertia_fit import (
     torque_answer,
 )
 from rigidimeter.rig.commissioning.live_readings import HEADING, LiveReading, live_readings
+from rigidimeter.rig.commissioning.manual_checks import lead_range
 from rigidimeter.rig.commissioning.program_identity import (
     boot_clock,
     program_identity,

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from rigidimeter.core.errors import UserError
 from rigidimeter.rig.commissioning.checks import (
     RigCheck,
     impossible,
@@ -27,10 +28,12 @@ from rigidimeter.rig.commissioning.trials import (
     require_no_power,
     trial,
 )
+from rigidimeter.rig.devices import LED, STOP_HIGH, STOP_LOW, MotionRange
+from rigidimeter.rig.devices.motion_range import LEAST_DEG
 
 SETTLE_S = 0.5
 KNOWN_ANGLE_S = 1.0
-ANGLE, TORQUE = "known angle", "known torque"
+ANGLE, TORQUE, STOPS = "known angle", "known torque", "mechanical stops"
 
 
 def ask_operator(operator: Operator, name: str, question: str, remedy: str) -> RigCheck:
@@ -39,6 +42,76 @@ def ask_operator(operator: Operator, name: str, question: str, remedy: str) -> R
         return untried(name, "yes")
     good = operator.ask(question)
     return yes(name, good, "yes" if good else "no", "yes", remedy)
+
+
+def mechanical_stops(setup: Setup, *, emulated: bool) -> tuple[RigCheck, dict[str, float]]:
+    """Read where the joint is at both mechanical stops, led there by hand, without power.
+
+    Returns
+    -------
+    check : RigCheck
+        Whether the operator says that they are there, and the angles differ. Where the rig is
+        emulated there may be nothing to lead: the operator's word is enough.
+    angles : dict
+        Both angles on the drive's scale in deg; empty where they could not be read.
+    """
+    if not setup.operator.present:
+        return untried(STOPS, "yes"), {}
+    ends_deg = _led_to_both_ends(setup, "its way")
+    good = ends_deg is not None and setup.operator.ask(
+        "Lead it back to where it was. Did mechanical stops end its way on both sides, where a "
+        "person's arm still bears it?"
+    )
+    if not good or ends_deg is None:
+        return yes(STOPS, False, "no", "yes", _FIT_STOPS), {}
+    low_deg, high_deg = ends_deg
+    if high_deg - low_deg > LEAST_DEG:
+        found = f"{low_deg:.1f} and {high_deg:.1f} deg"
+        return yes(STOPS, True, found, "yes", ""), {STOP_LOW: low_deg, STOP_HIGH: high_deg}
+    if emulated:
+        return yes(STOPS, True, "yes", "yes", ""), {}
+    return yes(STOPS, False, f"{low_deg:.1f} and {high_deg:.1f} deg", "yes", _NOT_LED), {}
+
+
+def lead_range(setup: Setup) -> MotionRange:
+    """Return the range through which a person's arm was led by hand, without power.
+
+    The rig is connected, read and closed, whatever happens; the drive gets no power.
+
+    Raises
+    ------
+    UserError
+        If the operator did not lead it, or both ends were read at one place.
+    """
+    rig = setup.rig
+    try:
+        rig.connect()
+        rig.configure()
+        setup.operator.say(
+            "The range of motion of this person, without power. Lead the arm slowly, by hand, no "
+            "farther than the person bears it without pain or resistance."
+        )
+        ends_deg = _led_to_both_ends(setup, "the range of this person")
+        if ends_deg is None:
+            raise UserError("the range of motion was not led; nothing was run")
+        setup.operator.ask("Lead the arm back to where the session begins. Done?")
+    finally:
+        rig.close()
+    return MotionRange(*ends_deg, how=LED)
+
+
+def _led_to_both_ends(setup: Setup, what: str) -> tuple[float, float] | None:
+    """Return the angles at both ends in deg on the drive's scale; None if they were not led to."""
+    require_no_power(setup)
+    found: list[float] = []
+    for end in ("one end", "the other end"):
+        if not setup.operator.ask(
+            f"Without power: lead the joint by hand to {end} of {what}, and keep it there until "
+            "the next question. Is it there?"
+        ):
+            return None
+        found.append(math.degrees(setup.rig.origin_rad + _angle_rad(setup)))
+    return min(found), max(found)
 
 
 def known_angle(setup: Setup) -> RigCheck:
@@ -83,6 +156,8 @@ def known_torque(setup: Setup) -> RigCheck:
     return within_tolerance(TORQUE, value, "N·m", known_nm, percent, _WRONG_SCALE)
 
 
+_FIT_STOPS = "fit them; the position limit of the software believes the encoder and is none"
+_NOT_LED = "the joint was read at one place: lead it to each end, and keep it there"
 _WRONG_SCALE = (
     "sign, units or calibration in the rig file are wrong; nothing inside the rig can show this "
     "but such a comparison"

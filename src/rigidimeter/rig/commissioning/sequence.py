@@ -36,7 +36,12 @@ from rigidimeter.rig.commissioning.first_steps import (
     power_allowed,
     small_move,
 )
-from rigidimeter.rig.commissioning.manual_checks import ask_operator, known_angle, known_torque
+from rigidimeter.rig.commissioning.manual_checks import (
+    ask_operator,
+    known_angle,
+    known_torque,
+    mechanical_stops,
+)
 from rigidimeter.rig.commissioning.motion_tests import (
     ANGLE_PER_COMMAND,
     COMPLETED,
@@ -101,7 +106,7 @@ def commission_rig(
         rig.connect()
         facts = rig.configure()
         name, limit = "devices answer", "throughout"
-        _try_all(setup, found, facts)
+        _try_all(setup, found, facts, emulated=rigfile.emulated)
     except DeviceError as error:
         found.checks.append(yes(name, False, "refused", limit, str(error)))
     finally:
@@ -192,21 +197,17 @@ _POWER = (
 )
 
 
-def _try_all(setup: Setup, found: CheckResults, facts: Mapping[str, Any]) -> None:
+def _try_all(
+    setup: Setup, found: CheckResults, facts: Mapping[str, Any], *, emulated: bool
+) -> None:
     operator, limits = setup.operator, setup.limits
     found.checks += facts_checks(facts, setup.settings)
     at_rest(setup, found, limits.idle_s)
     # By hand, without power: the mechanical stops and a known angle.
     require_no_power(setup)
-    found.checks.append(
-        ask_operator(
-            operator,
-            "mechanical stops",
-            "Without power: lead the joint to both ends by hand, and back. Do mechanical stops end "
-            "its way on both sides, where a person's arm still bears it?",
-            "fit them; the position limit of the software believes the encoder and is none",
-        )
-    )
+    stops, stop_angles = mechanical_stops(setup, emulated=emulated)
+    found.checks.append(stops)
+    found.numbers.update(stop_angles)
     found.checks.append(known_angle(setup))
     if power_allowed(setup, found, _POWER.format(limits=limits)):
         _with_power(setup, found, facts, (*EVERY_PART, KNOWN_TORQUE))

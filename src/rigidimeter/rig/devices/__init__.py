@@ -77,6 +77,15 @@ from rigidimeter.rig.devices.cia402.state_words import (
 )
 from rigidimeter.rig.devices.composed import ComposedRig, Home
 from rigidimeter.rig.devices.enable_line import SerialEnableLine
+from rigidimeter.rig.devices.motion_range import (
+    LED,
+    STOP_HIGH,
+    STOP_LOW,
+    STOP_MARGIN_DEG,
+    TYPED,
+    MotionRange,
+    range_of,
+)
 from rigidimeter.rig.devices.rig_lock import RigLock, lock_path
 from rigidimeter.rig.devices.rigfile import RigFile, load_rig
 from rigidimeter.rig.devices.simulated import SimulatedRig

@@ -24,6 +24,7 @@ from rigidimeter.rig.devices.base import (
 )
 from rigidimeter.rig.devices.bounds import BoundFound, Tight
 from rigidimeter.rig.devices.enable_line import EnableLine
+from rigidimeter.rig.devices.motion_range import require_within
 from rigidimeter.rig.guard import REACTIONS, Cause
 
 ATTEMPTS, ATTEMPT_S = 50, 0.002
@@ -75,6 +76,9 @@ class ComposedRig:
         Where the joint must be to be enabled.
     identified : callable
         Called with the facts of the devices by role as soon as they are read; may refuse them.
+    range_rad : tuple of float, optional
+        The range of motion of the person, on the drive's scale: the joint must be within it to be
+        enabled.
     """
 
     def __init__(
@@ -85,7 +89,9 @@ class ComposedRig:
         line: EnableLine | None = None,
         home: Home | None = None,
         identified: Callable[[Mapping[str, DeviceFacts]], None] = lambda _: None,
+        range_rad: tuple[float, float] | None = None,
     ) -> None:
+        self._range_rad = range_rad
         self._sensor, self._drive, self._line, self._home = sensor, drive, line, home
         self._tick_rate_hz, self._identified = tick_rate_hz, identified
         self._bias_nm = 0.0
@@ -138,6 +144,8 @@ class ComposedRig:
             self._origin_rad = self._fresh_angle_rad(time.monotonic() - began_s)
             if self._home is not None:
                 self._home.check(self._origin_rad)
+            if self._range_rad is not None:
+                require_within(self._range_rad, self._origin_rad)
         except BaseException:  # also when interrupted: the drive may have power by now
             self.disable()
             raise

@@ -3,6 +3,7 @@
     name = "elbow rig, room 12"
     home_deg = 0.0             # where the joint must be to be enabled, on the drive's scale
     home_tolerance_deg = 3.0
+    absolute_angle = true      # the drive's angle means the same place after its power was off
 
     [torque_sensor]
     driver = "ati-rdt"
@@ -63,6 +64,7 @@ METHODS: Mapping[str, tuple[str, ...]] = {
 REQUIRED = ("torque_sensor", "drive")
 HOME: Mapping[str, float | None] = {"home_deg": None, "home_tolerance_deg": 3.0}
 """Keys of the initial position, with their defaults."""
+ABSOLUTE = "absolute_angle"
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,8 @@ class RigFile:
         Hash of the contents: a commissioning record is valid for one digest.
     home : Home or None
         Where the joint must be to be enabled.
+    absolute_angle : bool
+        Whether the drive's angle means the same place after its power was off.
     """
 
     path: Path
@@ -86,6 +90,7 @@ class RigFile:
     devices: Mapping[str, tuple[type[Any], Any]]
     digest: str
     home: Home | None = None
+    absolute_angle: bool = False
 
     @property
     def emulated(self) -> bool:
@@ -148,6 +153,7 @@ class RigFile:
             made.get("enable_line"),
             home or self.home,
             take_serials,
+            bounds.range_rad if bounds is not None else None,
         )
 
 
@@ -160,11 +166,10 @@ def load_rig(path: Path) -> RigFile:
         If the file cannot be read, or names a device, a driver or a value that does not exist.
     """
     values = read_toml(path)
-    unknown = sorted(set(values) - set(DRIVERS) - {"name", *HOME})
+    unknown = sorted(set(values) - set(DRIVERS) - {"name", ABSOLUTE, *HOME})
     if unknown:
-        raise UserError(
-            f"{path}: unknown key {unknown[0]}; known are name, {', '.join((*HOME, *DRIVERS))}"
-        )
+        known = ", ".join(("name", *HOME, ABSOLUTE, *DRIVERS))
+        raise UserError(f"{path}: unknown key {unknown[0]}; known are {known}")
     missing = [role for role in REQUIRED if role not in values]
     if missing:
         raise UserError(f"{path}: has no [{missing[0]}] table, which names a driver")
@@ -172,8 +177,11 @@ def load_rig(path: Path) -> RigFile:
     name = values.get("name", path.stem)
     if not isinstance(name, str):
         raise UserError(f"{path}: name must be text, got {name!r}")
+    absolute = values.get(ABSOLUTE, False)
+    if not isinstance(absolute, bool):
+        raise UserError(f"{path}: {ABSOLUTE} must be true or false, got {absolute!r}")
     digest = hashlib.sha256(repr(sorted_values(values)).encode()).hexdigest()
-    return RigFile(path, name, devices, digest, _home(path, values))
+    return RigFile(path, name, devices, digest, _home(path, values), absolute)
 
 
 def _home(path: Path, values: Mapping[str, Any]) -> Home | None:

@@ -203,7 +203,10 @@ Commissioned = Callable[..., CommissioningRecord]
 
 
 def at_hand(question: str, world: World) -> bool:
-    """Agree to everything, and press and release the emergency stop when told to."""
+    """Agree to everything, lead the joint to its stops, press and release the emergency stop."""
+    for end, angle_rad in (("one end", 0.75), ("the other end", -0.5), ("back to where", 0.0)):
+        if end in question:
+            world.arm.place(angle_rad)
     if question.startswith("Emergency"):
         world.faults["pressed_at_s"] = world.time.now() + 1.0
     if question.startswith("Release"):

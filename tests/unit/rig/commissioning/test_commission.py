@@ -12,7 +12,7 @@ from rigidimeter.core.settings import Settings, SubjectSettings, changed_setting
 from rigidimeter.planning import prbs_nm
 from rigidimeter.rig.acquisition import ControlLoop, NoSupervision, SimulatedClock, perturb
 from rigidimeter.rig.commissioning import A_PERSON_TELLS, as_measured
-from rigidimeter.rig.devices import SimulatedRig
+from rigidimeter.rig.devices import STOP_HIGH, STOP_LOW, SimulatedRig
 from rigidimeter.rig.guard import Cause
 
 
@@ -105,6 +105,29 @@ def test_an_operator_who_says_no_fails_the_check(commissioned: Any, words: str, 
     assert failed(commissioned(ask=ask, emulated=True)) == [name]
 
 
+def test_the_angles_of_both_stops_are_kept_on_the_drives_scale(commissioned: Any) -> None:
+    record = commissioned(delay_s=0.0)
+    found = next(check for check in record.checks if check.name == "mechanical stops")
+    assert found.words == "-28.6 and 43.0 deg"
+    assert record.numbers[STOP_LOW] == pytest.approx(math.degrees(-0.5), abs=0.01)
+    assert record.numbers[STOP_HIGH] == pytest.approx(math.degrees(0.75), abs=0.01)
+
+
+def test_stops_that_were_read_at_one_place_fail_where_there_is_something_to_lead(
+    commissioned: Any,
+) -> None:
+    def ask(question: str, world: Any) -> bool:
+        return "end" in question or at_hand(question, world)
+
+    record = commissioned(ask=ask)
+    assert failed(record) == ["mechanical stops"]
+    assert "read at one place" in record.objection
+    assert STOP_LOW not in record.numbers
+    emulated = commissioned(ask=ask, emulated=True)
+    assert failed(emulated) == []
+    assert STOP_LOW not in emulated.numbers
+
+
 def test_a_drive_must_brake_as_the_guard_counts_on(commissioned: Any, settings: Any) -> None:
     assert failed(commissioned(braking_rad_s2=60.0)) == ["braking of the drive"]
     record = commissioned(braking_rad_s2=None)
@@ -173,11 +196,11 @@ def test_nothing_moves_without_consent(commissioned: Any) -> None:
     moved: list[float] = []
 
     def ask(question: str, world: Any) -> bool:
-        moved.append(world.arm.motion()[0])
-        return question.startswith("Without power")
+        moved.append(world.arm.motion()[1])
+        return at_hand(question, world) and "Nobody's arm" not in question
 
     record = commissioned(ask=ask)
-    assert moved == [0.0, 0.0]
+    assert moved == [0.0] * 4
     assert failed(record) == []
     assert not record.passed
     assert "watchdog" in record.missing
@@ -267,7 +290,10 @@ def test_the_emergency_stop_is_seen_and_its_release_restarts_nothing(
 
 
 def test_an_emergency_stop_that_does_nothing_fails(commissioned: Any) -> None:
-    assert failed(commissioned(ask=lambda *_: True)) == ["emergency stop"]
+    def ask(question: str, world: Any) -> bool:
+        return question.startswith(("Emergency", "Release")) or at_hand(question, world)
+
+    assert failed(commissioned(ask=ask)) == ["emergency stop"]
 
 
 def test_a_driver_that_gives_up_is_no_emergency_stop(commissioned: Any) -> None:
@@ -276,7 +302,8 @@ def test_a_driver_that_gives_up_is_no_emergency_stop(commissioned: Any) -> None:
     def ask(question: str, world: Any) -> bool:
         if question.startswith("Emergency"):
             world.faults["given_up_s"] = world.time.now() + 1.0
-        return True
+            return True
+        return at_hand(question, world)
 
     assert failed(commissioned(ask=ask)) == ["emergency stop"]
 

@@ -26,6 +26,7 @@ from rigidimeter.rig.console.page.session_form import (
     MAX_BLOCKS,
     METADATA,
     NOTE,
+    RANGE,
     SETTINGS,
     STIMULATION,
     YES,
@@ -81,6 +82,9 @@ class BeforeView:
         )
         with ui.row().classes("w-full"):
             for one in (*METADATA, NOTE):
+                self._input(one)
+        with ui.row().classes("w-full"):
+            for one in RANGE:
                 self._input(one)
         self._blocks()
         with ui.row().classes("w-full items-start"):

@@ -24,6 +24,7 @@ from rigidimeter.rig.console.page.form_values import (
     parse_name,
     parse_number,
 )
+from rigidimeter.rig.devices import MotionRange
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,12 @@ class Field:
 
 METADATA = (Field("subject", "Subject (code)"), Field("operator", "Operator"))
 NOTE = Field("note", "Note on the session")
+RANGE = (
+    Field("range_low", "Range of motion: lower end, drive's scale", "deg"),
+    Field("range_high", "Range of motion: upper end, drive's scale", "deg"),
+    Field("range_of", "Range of motion: of whom (code)"),
+)
+"""Of this person, for this session: never kept, and taken for the subject that it names alone."""
 
 SETTINGS = (
     Field("prbs_amplitude", "PRBS: amplitude", "N·m", "prbs.amplitude_nm"),
@@ -67,8 +74,10 @@ STIMULATION = (
 BLINDED, YES = "blinded", "yes"
 """The box that hides conditions behind codes, and what it holds where it is ticked."""
 
-_OF_THE_SESSION = (*(one.key for one in (*METADATA, NOTE, *STIMULATION)), BLINDED)
+_OF_THE_SESSION = (*(one.key for one in (*METADATA, NOTE, *RANGE, *STIMULATION)), BLINDED)
 """Fields that no protocol fills."""
+
+_NEVER_KEPT = {one.key for one in RANGE}
 
 MAX_BLOCKS = 12
 """To which blocks can be added; a protocol may have more."""
@@ -132,7 +141,7 @@ def restored_form(stored: Any, settings: Settings) -> dict[str, str]:
     found = {
         key: value
         for key, value in stored.items()
-        if isinstance(value, str) and len(value) <= LONGEST_VALUE
+        if isinstance(value, str) and len(value) <= LONGEST_VALUE and key not in _NEVER_KEPT
     }
     if found.get("protocol") != form["protocol"]:
         return form | {key: value for key, value in found.items() if key in _OF_THE_SESSION}
@@ -184,6 +193,8 @@ def read_form(form: Mapping[str, str], base: Settings) -> EnteredSession:
         "note": read("note", parse_line, "note"),
         "blinded": form.get(BLINDED) == YES,
     }
+    if any(form.get(one.key, "").strip() for one in RANGE):
+        about["range"] = read("range_low", _range, form, about["subject"], errors)
     stimulation: dict[str, Any] = {}
     for one in STIMULATION:
         text = form.get(one.key, "").strip()
@@ -243,6 +254,24 @@ def _numbers(text: str, what: str) -> list[float]:
             f"{before}; {behind}; write it with a point or a semicolon"
         )
     return [parse_number(part, what) for part in parts]
+
+
+def _range(
+    low: str, form: Mapping[str, str], subject: str | None, errors: dict[str, str]
+) -> dict[str, Any] | None:
+    """Return the range of motion that was entered; what is wrong with its other fields is said."""
+    of_whom = form.get("range_of", "").strip()
+    if of_whom != (subject or ""):
+        errors["range_of"] = (
+            f"range of motion: entered for {of_whom or 'nobody'}, and the subject is "
+            f"{subject or 'not named'}; lead this person's arm through its range and enter that"
+        )
+    try:
+        high_deg = parse_number(form.get("range_high", ""), "upper end")
+    except UserError as error:
+        errors["range_high"] = str(error)
+        return None
+    return MotionRange(parse_number(low, "lower end"), high_deg, subject=of_whom).facts()
 
 
 def _needed(text: str, what: str) -> str:

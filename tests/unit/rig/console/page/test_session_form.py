@@ -109,3 +109,41 @@ def test_settings_are_the_same_as_a_file(tmp_path):
     path = tmp_path / "protocol.toml"
     path.write_text(toml_text(dump_settings(settings)))
     assert load_settings(path) == settings
+
+
+RANGE = {"range_low": "-30", "range_high": "60,5", "range_of": "S01"}
+
+
+def test_a_range_of_motion_is_of_the_subject_that_is_named(form):
+    assert "range" not in read_form(form, BASE).about
+    entered = read_form(form | RANGE, BASE)
+    assert entered.errors == {}
+    assert entered.about["range"] == {
+        "low_deg": -30.0,
+        "high_deg": 60.5,
+        "how": "typed",
+        "subject": "S01",
+    }
+    of_another = read_form(form | RANGE | {"subject": "S02"}, BASE).errors
+    assert of_another.keys() == {"range_of"}
+    assert "entered for S01, and the subject is S02" in of_another["range_of"]
+
+
+@pytest.mark.parametrize(
+    ("entered", "keys"),
+    [
+        ({"range_low": ""}, {"range_low"}),
+        ({"range_high": "x"}, {"range_high"}),
+        ({"range_of": ""}, {"range_of"}),
+        ({"range_low": "70"}, {"range_low"}),
+    ],
+)
+def test_a_range_of_motion_is_whole_or_not_at_all(form, entered, keys):
+    assert read_form(form | RANGE | entered, BASE).errors.keys() == keys
+
+
+def test_a_range_of_motion_is_never_kept(form):
+    """A page that is loaded for the next person shows no range of the one before."""
+    kept = restored_form(form | RANGE, BASE)
+    assert [kept[key] for key in RANGE] == ["", "", ""]
+    assert kept["subject"] == "S01"
