@@ -200,7 +200,7 @@ _POWER = (
 def _try_all(
     setup: Setup, found: CheckResults, facts: Mapping[str, Any], *, emulated: bool
 ) -> None:
-    operator, limits = setup.operator, setup.limits
+    limits = setup.limits
     found.checks += facts_checks(facts, setup.settings)
     at_rest(setup, found, limits.idle_s)
     # By hand, without power: the mechanical stops and a known angle.
