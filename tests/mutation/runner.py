@@ -31,7 +31,7 @@ _RUN = tuple(
     f"rig/acquisition/test_{name}.py"
     for name in (
         *("tick", "late_ticks", "ramp", "modes", "session_run", "session_end", "zeroing"),
-        *("controller_run", "orders", "loop_and_session", "stop_report"),
+        *("controller_run", "orders", "loop_and_session", "stop_report", "compared_torques"),
     )
 )
 _STEP = tuple(f"rig/guard/test_{name}.py" for name in ("step", "position_limit", "following"))

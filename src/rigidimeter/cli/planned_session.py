@@ -37,11 +37,13 @@ from rigidimeter.rig.commissioning import (
     CommissioningRecord,
     as_measured,
     check_record,
+    model_of_today,
     record_path,
     require_daily_check,
 )
 from rigidimeter.rig.console import SessionPlan, new_folder, next_steps, resume_command
 from rigidimeter.rig.devices import STOP_LOW, MotionRange, RigFile, load_rig, range_of
+from rigidimeter.rig.guard import DriveModel
 
 Console = Callable[[SessionMemory], object]
 
@@ -62,6 +64,9 @@ class PlannedSession:
         What the operator said of subject, condition and stimulation.
     source : Path or None
         The file of the settings.
+    drive_model : DriveModel or None
+        What commissioning found of the drive's side; None before the rig is checked, and where
+        the guard does not compare the torque sensor with the drive's own torque.
     """
 
     settings: Settings
@@ -70,6 +75,7 @@ class PlannedSession:
     done: int = 0
     about: Mapping[str, Any] = field(default_factory=dict)
     source: Path | None = None
+    drive_model: DriveModel | None = None
 
     def shown(self, *, virtual: bool) -> SessionPlan:
         """Return the plan as consoles take it, with the codes of a blinded session."""
@@ -148,12 +154,17 @@ def checked_rig(planned: PlannedSession, rig: Path | None) -> PlannedSession:
         If the rig was not commissioned or not checked, or another program has it.
     """
     if rig is None:
-        return planned
+        # Imported late: it loads what only a check needs.
+        from rigidimeter.cli.virtual_check import measured_drive_side
+
+        return replace(planned, drive_model=measured_drive_side(planned.settings))
     rigfile, settings = load_rig(rig), planned.settings
     commissioned = check_record(rigfile, None, settings)
     today = require_daily_check(rigfile, commissioned, settings, settings_path=planned.source)
     rigfile.claim().close()
-    planned = replace(planned, settings=as_measured(settings, commissioned, today))
+    model = model_of_today(commissioned.numbers, today.numbers)
+    measured = as_measured(settings, commissioned, today)
+    planned = replace(planned, settings=measured, drive_model=model)
     _require_range(planned, rigfile, commissioned)
     return planned
 
@@ -210,7 +221,15 @@ def run_planned(
         about=planned.about,
     )
     return supervise(
-        partial(run_loop, planned.settings, planned.protocol, rig, home_rad, range_rad),
+        partial(
+            run_loop,
+            planned.settings,
+            planned.protocol,
+            rig,
+            home_rad,
+            range_rad,
+            drive_model=planned.drive_model,
+        ),
         recording,
         realtime=realtime,
         console=console,

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rigidimeter.rig.acquisition import DeadlineClock
     from rigidimeter.rig.acquisition.processes import LoopSide
     from rigidimeter.rig.devices.base import Rig
+    from rigidimeter.rig.guard import DriveModel
 
 HOME_TOLERANCE_RAD = 0.05
 """A session is continued from where it began, within 3 deg."""
@@ -27,6 +28,7 @@ def run_loop(
     home_rad: float | None,
     range_rad: tuple[float, float] | None,
     side: LoopSide,
+    drive_model: DriveModel | None = None,
 ) -> None:
     """Run a session; the target of the loop's process.
 
@@ -42,13 +44,16 @@ def run_loop(
         The range of motion of the person, on the drive's scale.
     side : LoopSide
         Rings, shared status and what prepares the process.
+    drive_model : DriveModel, optional
+        Of the drive's side; without it the guard does not compare the torque sensor with the
+        drive's own torque.
     """
     from rigidimeter.rig.acquisition import DeadlineClock
 
     clock = DeadlineClock()
     if rig_path is None:
         rig, new_joint = virtual_rig(settings, protocol)
-        _run(settings, protocol, rig, new_joint, clock, side, lambda _: (), range_rad)
+        _run(settings, protocol, rig, new_joint, clock, side, lambda _: (), range_rad, drive_model)
         return
     # What is slow to load is loaded before the sensor's samples flow.
     from rigidimeter.rig.commissioning import check_record, require_daily_check
@@ -66,7 +71,7 @@ def run_loop(
     with rigfile.claim() as lock:
         bounds = drive_bounds(settings, range_rad)
         rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, home, lock, bounds)
-        _run(settings, protocol, rig, lambda _: {}, clock, side, approve, range_rad)
+        _run(settings, protocol, rig, lambda _: {}, clock, side, approve, range_rad, drive_model)
 
 
 def _run(
@@ -78,6 +83,7 @@ def _run(
     side: LoopSide,
     approve: Callable[[Mapping[str, Any]], Sequence[str]],
     range_rad: tuple[float, float] | None,
+    drive_model: DriveModel | None,
 ) -> None:
     """Set up the rig and run; `approve` refuses it or says which checks were never made."""
     from rigidimeter.rig.acquisition import run_session
@@ -105,6 +111,7 @@ def _run(
             state_changed=side.sink.state_changed,
             watch=side.sink.watch,
             range_rad=range_rad,
+            drive_model=drive_model,
         )
     finally:
         rig.close()

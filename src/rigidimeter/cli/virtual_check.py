@@ -14,6 +14,7 @@ from rigidimeter.core.units import rad_from_deg
 from rigidimeter.core.version import __version__
 from rigidimeter.rig.commissioning import (
     BRAKING,
+    PUT_ON,
     CommissioningRecord,
     Compared,
     DailyRecord,
@@ -21,11 +22,14 @@ from rigidimeter.rig.commissioning import (
     Setup,
     Timebase,
     daily_check,
+    drive_side_of,
 )
 from rigidimeter.rig.devices import RigFile, SimulatedRig
 from rigidimeter.rig.devices.base import Reading, Rig
+from rigidimeter.rig.guard import DriveModel
 
 NAME = "virtual rig"
+LOAD_NM = 2.0
 
 
 class _VirtualRig:
@@ -46,6 +50,10 @@ class _VirtualRig:
         self._reads += elapsed_ticks
         return self._rig.read(elapsed_ticks)
 
+    def load(self, torque_nm: float) -> None:
+        """Put a torque on the joint, toward positive angles."""
+        self._rig.load_nm = torque_nm
+
     def configure(self) -> Mapping[str, Any]:
         """Return facts of a drive that brakes and stops by itself as the settings need."""
         guard, watchdog_s = self._settings.guard, 2.0 * self._settings.loop.stall_s
@@ -59,6 +67,22 @@ def virtual_setup(settings: Settings, operator: Operator) -> Setup:
     rig = _VirtualRig(settings)
     time = Timebase(rig.now_s, lambda deadline_s: deadline_s)
     return Setup(cast("Rig", rig), settings, time, operator)
+
+
+def measured_drive_side(settings: Settings) -> DriveModel | None:
+    """Return what commissioning finds of the virtual drive's side; None if it reports no torque.
+
+    A weight of `LOAD_NM` is put on the joint when that is asked for.
+    """
+    rig = _VirtualRig(settings)
+
+    def ask(question: str) -> bool:
+        rig.load(LOAD_NM if question.startswith(PUT_ON) else 0.0)
+        return True
+
+    time = Timebase(rig.now_s, lambda deadline_s: deadline_s)
+    operator = Operator(ask, known_torque_nm=LOAD_NM)
+    return drive_side_of(Setup(cast("Rig", rig), settings, time, operator))
 
 
 def virtual_check(setup: Setup) -> DailyRecord:

@@ -47,8 +47,9 @@ class CommissioningSettings(Section):
 
     `swing_deg` and `swing_speed_deg_s` are of the slow known motion, `nudge_deg` of the smaller one
     before it, `step_deg_s` of the quick small velocity steps. The known torque is held for
-    `known_torque_s` by hand. Everything else that is compared is a limit of the guard, of the
-    zeroing or of the margins.
+    `known_torque_s` by hand. For the friction of the drive the joint is moved by `wide_deg`, at
+    most 0.8 times the position limit, at up to `wide_speed_deg_s`. Everything else that is compared
+    is a limit of the guard, of the zeroing or of the margins.
 
     Of the daily check: `daily_rest_s` is listened without power and held with it, then the joint
     moves for `daily_motion_s` at up to `daily_speed_deg_s`. The inertia found is compared within
@@ -66,6 +67,8 @@ class CommissioningSettings(Section):
     scale_tolerance_percent: float = quantity(2.0, "%", 0.1, 20.0)
     known_tolerance_percent: float = quantity(5.0, "%", 0.1, 20.0)
     known_torque_s: float = quantity(3.0, "s", 0.5, 60.0)
+    wide_deg: float = quantity(20.0, "deg", 1.0, 90.0)
+    wide_speed_deg_s: float = quantity(60.0, "deg/s", 1.0, 200.0)
     min_rate_percent: float = quantity(90.0, "%", 10.0, 100.0)
     lost_percent: float = quantity(0.1, "%", 0.0, 10.0)
     max_watchdog_s: float = quantity(0.5, "s", 0.01, 5.0)

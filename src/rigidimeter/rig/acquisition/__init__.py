@@ -41,6 +41,7 @@ from rigidimeter.rig.acquisition.tick import (
     latched_tick,
     run_ticks,
     set_admittance,
+    zero_torque,
 )
 from rigidimeter.rig.acquisition.zeroing import (
     MIN_ZEROING_SAMPLES,

@@ -20,7 +20,7 @@ from rigidimeter.rig.acquisition.stop_report import StopReport
 from rigidimeter.rig.acquisition.supervision import NoSupervision, Sink, Supervision
 from rigidimeter.rig.acquisition.tick import ControlLoop
 from rigidimeter.rig.devices.base import Rig
-from rigidimeter.rig.guard import Cause, Reaction
+from rigidimeter.rig.guard import Cause, DriveModel, Reaction
 
 
 class ControllerRun:
@@ -38,6 +38,8 @@ class ControllerRun:
         Where orders and causes from other processes come from; nobody if not given.
     state_changed : callable
         Called whenever the run changes its state.
+    drive_model : DriveModel, optional
+        What commissioning found of the drive's side.
 
     Attributes
     ----------
@@ -59,6 +61,7 @@ class ControllerRun:
         progress: Callable[[float], None],
         supervision: Supervision | None,
         state_changed: Callable[[Run], None],
+        drive_model: DriveModel | None = None,
     ) -> None:
         self._controller = settings.controller
         self._rig, self._sink = rig, sink
@@ -73,6 +76,7 @@ class ControllerRun:
             self._supervision,
             self._take_order,
             self._latched,
+            drive_model,
         )
         self.run = Run()
         self.open_epoch: int | None = None

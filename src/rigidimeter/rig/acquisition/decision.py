@@ -17,7 +17,7 @@ from rigidimeter.rig.guard import (
     guard_step,
 )
 
-STALLED = int(Cause.STALLED)
+STALLED, _NO_CAUSE = int(Cause.STALLED), int(Cause.NONE)
 
 
 def decide(
@@ -34,6 +34,7 @@ def decide(
     torque_age_s: float,
     reported: int,
     elapsed_ticks: int,
+    apart: int = _NO_CAUSE,
 ) -> tuple[GuardState, ConsistencyState, float, int]:
     """Return what guard and laws of agreement remember, the velocity that may be sent, and a limit.
 
@@ -51,6 +52,8 @@ def decide(
         The `Cause` that the loop or a device reports.
     elapsed_ticks : int
         Ticks since the decision before.
+    apart : int
+        The `Cause` that the comparison with the drive's own torque found.
     """
     if reported == STALLED:
         # A drive with a watchdog has stopped by now, and a ramp down from the velocity before
@@ -79,7 +82,7 @@ def decide(
         torque_age_s,
         reported,
         elapsed_ticks,
-        disagreement,
+        disagreement if disagreement != _NO_CAUSE else apart,
     )
     return guard, consistency, allowed_rad_s, limited
 

@@ -28,14 +28,19 @@ from rigidimeter.core.settings import Settings
 from rigidimeter.rig.acquisition.decision import decide, late_cause, stronger
 from rigidimeter.rig.guard import (
     Cause,
+    DriveModel,
     Limited,
     Reaction,
     consistency_limits,
     consistency_state,
+    drive_torque_limits,
+    drive_torque_state,
+    drive_torque_step,
     guard_limits,
     guard_state,
     released,
     within_range,
+    zeroed,
 )
 
 ROUNDED = 1.0 + 1e-6
@@ -60,6 +65,7 @@ _INPUTS = (
     *("tick", "time_s", "lateness_s", "velocity_request_rad_s", "perturbation_nm", "torque_nm"),
     *("angle_rad", "velocity_rad_s", "motion_time_s", "torque_time_s"),
     *("velocity_command_rad_s", "limited", "cause", "reported_cause"),
+    *("drive_torque_nm", "drive_torque_time_s"),
 )
 _NONE = int(Cause.NONE)
 
@@ -173,6 +179,13 @@ def replay(
         if event.get("event") == "rig_enabled" and event.get("range_rad"):
             limits = within_range(limits, *event["range_rad"])
     guard, consistency = guard_state(limits), consistency_state(agreement)
+    torques = drive_torque_limits(settings, _drive_model(events))
+    compared = drive_torque_state(torques)
+    zeroings = [
+        (float(event["time_s"]), float(event["bias_nm"]))
+        for event in events
+        if event.get("event") == "sensor_zeroed" and not event.get("refused")
+    ]
     knows_cause, knows_reported = "cause" in recorded, "reported_cause" in recorded
     latched_s = {event.get("time_s") for event in events if event.get("event") == "guard_latched"}
     halted_s = min(
@@ -193,7 +206,7 @@ def replay(
     first_tick = -1
     for row in zip(*(columns[name].tolist() for name in _INPUTS), strict=True):
         tick, time_s, lateness_s, request, perturbation_nm, torque_nm, angle, velocity = row[:8]
-        motion_s, torque_s, sent, limited, cause, reported = row[8:]
+        motion_s, torque_s, sent, limited, cause, reported, drive_nm, drive_s = row[8:]
         missed, late = 0, _NONE
         if lateness_s >= 1.0 / rate_hz:
             missed, in_a_row = int(lateness_s * rate_hz), in_a_row + 1
@@ -215,6 +228,20 @@ def replay(
             guard = released(guard)
         due_s = tick / rate_hz
         before = guard.cause
+        while zeroings and due_s >= zeroings[0][0]:
+            torques = zeroed(torques, zeroings.pop(0)[1])
+        compared, apart_cause = drive_torque_step(
+            torques,
+            compared,
+            torque_nm,
+            due_s - torque_s,
+            angle,
+            velocity,
+            due_s - motion_s,
+            drive_nm,
+            due_s - drive_s,
+            missed + 1,
+        )
         guard, consistency, allowed, limit = decide(
             limits,
             agreement,
@@ -229,6 +256,7 @@ def replay(
             due_s - torque_s,
             stronger(late, reported),
             missed + 1,
+            apart_cause,
         )
         ticks += 1
         if reported != _NONE:
@@ -272,6 +300,14 @@ def _smallest_step(sent_rad_s: NDArray[np.float64]) -> float:
     return float(steps.min()) if steps.size else 0.0
 
 
+def _drive_model(events: Sequence[Mapping[str, Any]]) -> DriveModel | None:
+    """Return the model of the drive's side that the session went by."""
+    for event in events:
+        if event.get("event") == "drive_model":
+            return DriveModel(*(float(event[name]) for name in DriveModel._fields))
+    return None
+
+
 def _not_run(recorded: Collection[str]) -> list[str]:
     """Return which laws did not run."""
     not_run = []
@@ -281,5 +317,9 @@ def _not_run(recorded: Collection[str]) -> list[str]:
         not_run.append(
             "of two causes that loop and devices reported the second is not known: the record does "
             "not name it"
+        )
+    if "drive_torque_nm" not in recorded:
+        not_run.append(
+            "the torque sensor is not compared with the drive's torque: that was not recorded"
         )
     return not_run

@@ -36,10 +36,10 @@ from rigidimeter.rig.acquisition.run_states import (
 )
 from rigidimeter.rig.acquisition.session_end import end_session
 from rigidimeter.rig.acquisition.supervision import Sink, Supervision
-from rigidimeter.rig.acquisition.tick import ControlLoop
+from rigidimeter.rig.acquisition.tick import ControlLoop, zero_torque
 from rigidimeter.rig.acquisition.zeroing import bias_and_noise, motion_objection
 from rigidimeter.rig.devices.base import Reading, Rig
-from rigidimeter.rig.guard import Cause, why_ended
+from rigidimeter.rig.guard import Cause, DriveModel, why_ended
 
 BeforeEpoch = Callable[[PlannedEpoch], Mapping[str, Any]]
 
@@ -93,6 +93,7 @@ def run_session(
     state_changed: Callable[[Run], None] = lambda _: None,
     watch: Callable[[ControlLoop], None] = lambda _: None,
     range_rad: tuple[float, float] | None = None,
+    drive_model: DriveModel | None = None,
 ) -> SessionResult:
     """Run every epoch of a protocol with its rest.
 
@@ -122,8 +123,13 @@ def run_session(
         Called once with the loop, before its first tick; whoever shows it may look at it.
     range_rad : tuple of float, optional
         The range of motion of the person, on the drive's own scale.
+    drive_model : DriveModel, optional
+        What commissioning found of the drive's side; without it the guard does not compare the
+        torque sensor with the drive's own torque. The session records it.
     """
-    run = ControllerRun(settings, rig, clock, sink, progress, supervision, state_changed)
+    run = ControllerRun(
+        settings, rig, clock, sink, progress, supervision, state_changed, drive_model
+    )
     watch(run.loop)
     queue, rate_hz = deque(protocol.epochs), settings.rig.tick_rate_hz
     angle_rad, velocity_rad_s = sinusoid(settings.sinusoid, rate_hz)
@@ -140,6 +146,8 @@ def run_session(
         velocity_rad_s.tolist(),
     )
     sink.event("session_started", time_s=0.0)
+    if drive_model is not None:
+        sink.event("drive_model", **drive_model._asdict())
     try:
         run.change_state(after(run.run, Command.START))
         rig.enable()
@@ -334,5 +342,5 @@ def _zero_sensor(session: _Session) -> bool:
     if why:
         run.outcome, run.reason = "fail", why
         return False
-    session.rig.zero(bias_nm)
+    zero_torque(session.run.loop, bias_nm)
     return True

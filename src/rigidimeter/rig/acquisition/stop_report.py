@@ -21,13 +21,17 @@ from rigidimeter.rig.guard import (
     SHOWN_MEMORY_S,
     SQUARED_S,
     SUMMED_S,
+    WINDOW_S,
     WRONG_GAIN,
     WRONG_SHARE,
     Cause,
     ConsistencyLimits,
     ConsistencyState,
+    DriveTorqueLimits,
+    DriveTorqueState,
     GuardLimits,
     GuardState,
+    allowed_nm,
     larger_gain,
     outside,
 )
@@ -36,7 +40,8 @@ from rigidimeter.rig.guard import (
 class Latched(NamedTuple):
     """The tick at which the guard latched.
 
-    `late_in_a_row` counts late ticks up to this one. `measured` is what was found outside of the
+    `late_in_a_row` counts late ticks up to this one. `torques` and `compared` are of the comparison
+    with the drive's own torque. `measured` is what was found outside of the
     loop: seconds of silence or of suspension, or samples that wait; NaN where nothing was.
     """
 
@@ -49,6 +54,8 @@ class Latched(NamedTuple):
     elapsed_ticks: int
     late_in_a_row: int
     measured: float
+    torques: DriveTorqueLimits
+    compared: DriveTorqueState
 
 
 class Found(NamedTuple):
@@ -247,6 +254,13 @@ def _silent(latched: Latched) -> Found:
     return Found(shown_nm, needed_nm, "N·m", SHOWN_MEMORY_S, setting, at_least=True)
 
 
+def _apart(latched: Latched) -> Found:
+    steps, model = latched.compared.steps, latched.torques.model
+    slope_nm = abs(steps.slope_nm2) / math.sqrt(steps.model_nm2) if steps.model_nm2 > 0.0 else 0.0
+    value_nm = max(steps.size_nm, slope_nm)
+    return Found(value_nm, allowed_nm(model, steps.own_nm2), "N·m", WINDOW_S)
+
+
 def _seldom(latched: Latched) -> Found:
     means = latched.consistency.means
     share = max(means.torque_old, means.motion_old)
@@ -312,6 +326,7 @@ _FOUND: dict[Cause, Callable[[Latched], Found]] = {
     Cause.MOVED_AT_REST: _moved,
     Cause.VELOCITY_WRONG: _velocity,
     Cause.TORQUE_SILENT: _silent,
+    Cause.TORQUE_DISAGREES: _apart,
     Cause.SELDOM_FRESH: _seldom,
     Cause.DEADLINES_MISSED: _missed,
     Cause.STALLED: _stalled,

@@ -34,12 +34,17 @@ from rigidimeter.rig.acquisition.supervision import NoSupervision, Supervision
 from rigidimeter.rig.devices.base import Reading, Rig
 from rigidimeter.rig.guard import (
     Cause,
+    DriveModel,
     Limited,
     Reaction,
     consistency_limits,
     consistency_state,
+    drive_torque_limits,
+    drive_torque_state,
+    drive_torque_step,
     guard_limits,
     guard_state,
+    zeroed,
 )
 
 REST = -1
@@ -88,6 +93,9 @@ class ControlLoop:
         Takes an order of the operator; returns whether the stretch that runs ends now.
     latched : callable
         Takes what a stop or a hold says, and when the tick was at which the guard latched.
+    drive_model : DriveModel, optional
+        What commissioning found of the drive's side; without it the guard does not compare the
+        torque sensor with the drive's own torque.
     """
 
     inertia_kg_m2: float
@@ -105,6 +113,7 @@ class ControlLoop:
         supervision: Supervision | None = None,
         take_order: Callable[[Order], bool] = lambda _: False,
         latched: Callable[[StopReport, float], None] = lambda _, __: None,
+        drive_model: DriveModel | None = None,
     ) -> None:
         controller = settings.controller
         self.rig, self.clock, self.record = rig, clock, record
@@ -120,11 +129,13 @@ class ControlLoop:
         self.tracking_gain_per_s = controller.tracking_gain_per_s
         self.lowpass: Biquad = butterworth_lowpass(controller.torque_cutoff_hz, self.rate_hz)
         self.limits, self.agreement = guard_limits(settings), consistency_limits(settings)
+        self.torques = drive_torque_limits(settings, drive_model)
         self.perturbation_scale = 1.0
         set_admittance(self, controller.inertia_kg_m2, controller.damping_nm_s_rad)
         # What a tick changes.
         self.filtered = BiquadState()
         self.guard, self.consistency = guard_state(self.limits), consistency_state(self.agreement)
+        self.compared = drive_torque_state(self.torques)
         self.tick = self.until_tick = 0
         self.elapsed_ticks = 1
         self.late_in_a_row = 0
@@ -183,6 +194,12 @@ def set_admittance(loop: ControlLoop, inertia_kg_m2: float, damping_nm_s_rad: fl
     ]
 
 
+def zero_torque(loop: ControlLoop, bias_nm: float) -> None:
+    """Subtract a bias from every torque from now on."""
+    loop.rig.zero(bias_nm)
+    loop.torques = zeroed(loop.torques, bias_nm)
+
+
 def ticks_late(loop: ControlLoop) -> int:
     """Wait for the tick that is due, and return how many whole ticks late that is."""
     return math.floor(loop.clock.wait_until(loop.time_s) * loop.rate_hz) - loop.tick
@@ -238,6 +255,8 @@ def latched_tick(loop: ControlLoop, sample: Sample) -> Latched:
         loop.elapsed_ticks,
         loop.late_in_a_row,
         loop.supervision.measured,
+        loop.torques,
+        loop.compared,
     )
 
 
@@ -268,6 +287,18 @@ def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: i
     # A loop that stood still comes first: the drive's own watchdog follows from it.
     reported = stronger(stronger(late, reading.cause), from_outside)
     was_cut = loop.guard.reaction
+    loop.compared, apart = drive_torque_step(
+        loop.torques,
+        loop.compared,
+        torque_nm,
+        due_s - torque_s,
+        angle,
+        velocity,
+        due_s - motion_s,
+        reading.drive_torque_nm,
+        due_s - reading.drive_torque_time_s,
+        loop.elapsed_ticks,
+    )
     loop.guard, loop.consistency, allowed, limited = decide(
         loop.limits,
         loop.agreement,
@@ -282,6 +313,7 @@ def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: i
         due_s - torque_s,
         reported,
         loop.elapsed_ticks,
+        apart,
     )
     # The guard has counted this tick. Where one of the calls below fails, what follows is due at
     # the next tick: the velocity may change by one tick's worth only once a tick.

@@ -25,6 +25,13 @@ from rigidimeter.rig.commissioning.daily_record import (
     write_daily,
 )
 from rigidimeter.rig.commissioning.daily_sequence import FIRST, NEW, Compared, daily_check
+from rigidimeter.rig.commissioning.drive_side_checks import (
+    WITNESS,
+    drive_side_of,
+    unseen_nm,
+    witness_check,
+)
+from rigidimeter.rig.commissioning.drive_side_fit import model_in, model_of_today
 from rigidimeter.rig.commissioning.first_steps import ZeroFound, zero_check
 from rigidimeter.rig.commissioning.inertia_fit import (
     FREQUENCIES_HZ,
@@ -35,7 +42,7 @@ from rigidimeter.rig.commissioning.inertia_fit import (
     torque_answer,
 )
 from rigidimeter.rig.commissioning.live_readings import HEADING, LiveReading, live_readings
-from rigidimeter.rig.commissioning.manual_checks import lead_range
+from rigidimeter.rig.commissioning.manual_checks import PUT_ON, lead_range
 from rigidimeter.rig.commissioning.program_identity import (
     boot_clock,
     program_identity,

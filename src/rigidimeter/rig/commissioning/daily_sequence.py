@@ -17,6 +17,7 @@ from typing import Any
 from rigidimeter.rig.commissioning.checks import yes
 from rigidimeter.rig.commissioning.commissioning_record import CommissioningRecord
 from rigidimeter.rig.commissioning.daily_record import DailyRecord, ReferenceInertia, objection
+from rigidimeter.rig.commissioning.drive_side_checks import daily_drive_check
 from rigidimeter.rig.commissioning.first_steps import (
     CheckResults,
     at_rest,
@@ -211,6 +212,8 @@ def _try(
     if not found.checks[-1].passed:
         return answer
     found.checks.append(precision_check(answer))
+    moves = [swung.readings, result.readings]
+    daily_drive_check(setup, found, commissioned.numbers, moves)
     known = compared.known(commissioned.digest)
     if known is not None:
         found.checks.append(gain_check(answer, known, settings))

@@ -8,6 +8,7 @@ beforehand answers for none of them.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,10 +20,13 @@ from rigidimeter.rig.commissioning.checks import (
     within_tolerance,
     yes,
 )
+from rigidimeter.rig.commissioning.motion_tests import swing
 from rigidimeter.rig.commissioning.trials import (
     Operator,
+    Readings,
     Setup,
     drop_old_samples,
+    follow_stretch,
     hold_stretch,
     listen,
     require_no_power,
@@ -34,6 +38,8 @@ from rigidimeter.rig.devices.motion_range import LEAST_DEG
 SETTLE_S = 0.5
 KNOWN_ANGLE_S = 1.0
 ANGLE, TORQUE, STOPS = "known angle", "known torque", "mechanical stops"
+PUT_ON = "Put a torque of"
+"""So begins what asks for the known torque."""
 
 
 def ask_operator(operator: Operator, name: str, question: str, remedy: str) -> RigCheck:
@@ -131,29 +137,46 @@ def known_angle(setup: Setup) -> RigCheck:
     return within_tolerance(ANGLE, turned_deg, "deg", wanted_deg, percent, _WRONG_SCALE)
 
 
-def known_torque(setup: Setup) -> RigCheck:
-    """Compare a torque put on by hand; the drive holds against it, so it reads the opposite."""
+class Loaded(NamedTuple):
+    """The same slow swing without and with a known torque on the joint."""
+
+    without: Readings
+    loaded: Readings
+
+
+def known_torque(setup: Setup) -> tuple[RigCheck, Loaded | None]:
+    """Compare a torque put on by hand; the drive holds against it, so it reads the opposite.
+
+    Where the drive reports a torque of its own, the joint is moved a little both times.
+    """
     operator, limits = setup.operator, setup.limits
     known_nm, percent = operator.known_torque_nm, limits.known_tolerance_percent
     limit = f"as known ± {percent:g} %"
     if known_nm is None:
-        return impossible(TORQUE, limit, "give --known-torque-nm to compare with")
+        return impossible(TORQUE, limit, "give --known-torque-nm to compare with"), None
     if not operator.present:
-        return untried(TORQUE, limit)
-    before = trial(setup, hold_stretch(SETTLE_S)).readings.torque_nm
+        return untried(TORQUE, limit), None
+    swung = math.isfinite(setup.rig.read().drive_torque_nm)
+    velocity = swing(setup.settings, limits.swing_deg, limits.swing_speed_deg_s, 1)
+    after = [follow_stretch(velocity, setup.rate_hz)] if swung else []
+    before = trial(setup, hold_stretch(SETTLE_S), *after).readings
     require_no_power(setup)
     held_s = limits.known_torque_s
+    lasts_s = held_s + SETTLE_S + (len(velocity) / setup.rate_hz if swung else 0.0)
+    moves = f" and move by {limits.swing_deg:g} deg" if swung else ""
     if not operator.ask(
-        f"Put a torque of {known_nm:g} N·m on the joint, toward positive angles, and keep it for "
-        f"{held_s + SETTLE_S:g} s after you agree; the drive will hold against it. Ready?"
+        f"{PUT_ON} {known_nm:g} N·m on the joint, toward positive angles, and keep it for "
+        f"{lasts_s:.2g} s after you agree; the drive will hold against it{moves}. Ready?"
     ):
-        return impossible(TORQUE, limit, "the operator did not agree to it")
-    readings = trial(setup, hold_stretch(SETTLE_S + held_s)).readings
+        return impossible(TORQUE, limit, "the operator did not agree to it"), None
+    loaded = trial(setup, hold_stretch(SETTLE_S + held_s), *after).readings
     require_no_power(setup)
-    late = readings.torque_nm[readings.time_s > SETTLE_S]
-    value = -float(np.nanmedian(late) - np.nanmedian(before)) if len(late) else math.nan
+    held = (loaded.time_s > SETTLE_S) & (loaded.time_s < SETTLE_S + held_s)
+    late, early = loaded.torque_nm[held], before.torque_nm[before.time_s < SETTLE_S]
+    value = -float(np.nanmedian(late) - np.nanmedian(early)) if len(late) else math.nan
     operator.ask("Take the torque off again. Done?")
-    return within_tolerance(TORQUE, value, "N·m", known_nm, percent, _WRONG_SCALE)
+    check = within_tolerance(TORQUE, value, "N·m", known_nm, percent, _WRONG_SCALE)
+    return check, Loaded(before, loaded) if swung and check.passed else None
 
 
 _FIT_STOPS = "fit them; the position limit of the software believes the encoder and is none"

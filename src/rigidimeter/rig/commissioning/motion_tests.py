@@ -61,14 +61,18 @@ def swing(settings: Settings, amplitude_deg: float, speed_deg_s: float, cycles: 
     return np.concatenate([smooth_motion(distance, speed_rad_s, tick_s) for distance in distances])
 
 
-def steps(settings: Settings) -> Array:
-    """Return pseudo-random velocity steps in rad/s, one a tick, that end where they began."""
+def steps(settings: Settings, step_deg_s: float | None = None) -> Array:
+    """Return pseudo-random velocity steps in rad/s, one a tick, that end where they began.
+
+    They are of `commissioning.step_deg_s` if no other size is given.
+    """
     ticks = max(1, round(STEP_S * settings.rig.tick_rate_hz))
     once = np.repeat(np.array(STEPS), ticks)
     pair = np.concatenate([once, -once])
     limits = settings.commissioning
     times = max(1, round(limits.steps_s * settings.rig.tick_rate_hz / len(pair)))
-    return rad_from_deg(limits.step_deg_s) * np.tile(pair, times)
+    step_deg_s = limits.step_deg_s if step_deg_s is None else step_deg_s
+    return rad_from_deg(step_deg_s) * np.tile(pair, times)
 
 
 def small_move_check(result: TrialResult, settings: Settings) -> RigCheck:

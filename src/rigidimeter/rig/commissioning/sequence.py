@@ -4,7 +4,7 @@
     by hand, without power       mechanical stops, a known angle
     a small move                 does it move at all as told
     a swing, and quick steps     directions, scales, delays, bandwidth, margins
-    a known torque               by hand
+    a known torque               by hand; then wide moves for the drive's own torque
     bounds in the drive          each tightened, in a slow move
     silence                      watchdog
     emergency stop
@@ -28,6 +28,7 @@ from rigidimeter.rig.commissioning.commissioning_record import (
     covered,
     stable_facts,
 )
+from rigidimeter.rig.commissioning.drive_side_checks import drive_side_checks
 from rigidimeter.rig.commissioning.first_steps import (
     SETTLE_S,
     CheckResults,
@@ -224,7 +225,9 @@ def _with_power(
         found.refrain("the motions went wrong; put that right first")
         return
     if KNOWN_TORQUE in parts:
-        found.checks.append(known_torque(setup))
+        known, loaded = known_torque(setup)
+        found.checks.append(known)
+        drive_side_checks(setup, found, loaded)
     if BOUNDS in parts:
         found.checks += bound_checks(setup)
     if WATCHDOG in parts:

@@ -132,7 +132,8 @@ class Readings(NamedTuple):
     """Readings, one a tick, as arrays of the same length.
 
     `time_s` is when the tick ran, `lateness_s` how late. `sent_rad_s` is what was in force after
-    the tick. `cause` holds what the devices reported at each tick.
+    the tick. `cause` holds what the devices reported at each tick. The drive's own torque is NaN
+    where it reports none.
     """
 
     time_s: Array
@@ -144,6 +145,8 @@ class Readings(NamedTuple):
     motion_time_s: Array
     sent_rad_s: Array
     cause: NDArray[np.int64]
+    drive_torque_nm: Array = np.empty(0)
+    drive_torque_time_s: Array = np.empty(0)
 
 
 @dataclass(frozen=True)
@@ -169,6 +172,7 @@ class _Shifted:
         return reading._replace(
             torque_time_s=reading.torque_time_s - self._origin_s,
             motion_time_s=reading.motion_time_s - self._origin_s,
+            drive_torque_time_s=reading.drive_torque_time_s - self._origin_s,
         )
 
     def write(self, velocity_rad_s: float) -> float:
@@ -261,7 +265,8 @@ def listen(
         now_s = time.wait_until(due_s)
         reading = rig.read()
         sent = rig.write(write_rad_s) if write_rad_s is not None else 0.0
-        rows.append((now_s, now_s - due_s, *reading[:5], sent, reading.cause))
+        drive = reading.drive_torque_nm, reading.drive_torque_time_s
+        rows.append((now_s, now_s - due_s, *reading[:5], sent, reading.cause, *drive))
         if until(reading):
             break
     return _readings(rows)
@@ -312,10 +317,12 @@ def stopped_for(cause: Cause) -> str:
 _OF_SAMPLE = attrgetter(
     *("time_s", "lateness_s", "torque_nm", "torque_time_s", "angle_rad", "velocity_rad_s"),
     *("motion_time_s", "velocity_command_rad_s", "cause"),
+    *("drive_torque_nm", "drive_torque_time_s"),
 )
 """The values of `Readings`, in its order."""
 
 
 def _readings(rows: Sequence[tuple[float, ...]]) -> Readings:
-    *columns, cause = np.array(rows, dtype=np.float64).reshape(-1, len(Readings._fields)).T
-    return Readings._make([*columns, cause.astype(np.int64)])
+    columns = np.array(rows, dtype=np.float64).reshape(-1, len(Readings._fields)).T
+    found = Readings._make(columns)
+    return found._replace(cause=found.cause.astype(np.int64))

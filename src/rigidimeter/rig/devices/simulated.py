@@ -89,6 +89,7 @@ class SimulatedRig:
         self._command = 0.0
         self._enabled = False
         self._bias_nm = 0.0
+        self.load_nm = 0.0  # what hands or a weight put on the joint, toward positive angles
         self._voluntary_before = self._voluntary_now = 0.0
         self._set_subject(subject)
 
@@ -188,7 +189,7 @@ class SimulatedRig:
         before = self._state
         if self._tick > 0:
             self._voluntary_before = self._voluntary_now
-            self._voluntary_now = next(self._voluntary)
+            self._voluntary_now = next(self._voluntary) + self.load_nm
             self._state = drive_step(self._full_tick, before, self._command)
         if self._settings.drive_side.reports_torque:
             self._drive_torques_nm.append(self._drive_torque_nm())

@@ -20,9 +20,9 @@ from rigidimeter.rig.guard.consistency import (
 )
 from rigidimeter.rig.guard.contact import ContactState, contact_state, contact_step
 from rigidimeter.rig.guard.drive_torque import (
+    LEAST_SHARE,
     PRESLIDING_RAD,
     SETTLED_S,
-    SHARE,
     SLIPS_RAD_S,
     TIMES_SCATTER,
     WINDOW_S,
@@ -30,6 +30,7 @@ from rigidimeter.rig.guard.drive_torque import (
     DriveTorqueLimits,
     DriveTorqueState,
     Terms,
+    allowed_nm,
     beyond,
     drive_torque_limits,
     drive_torque_state,

@@ -18,8 +18,9 @@ time. Over the last half second
     slope   Σ e m / √(n Σ m²)                    a gain: with e = (g − 1) m it is g − 1 times the
                                                  root mean square of m
 
-each may be 4 times the scatter that it had in `commission`, and `SHARE` of the drive's own torques.
-The scatter is of what the model leaves out: friction that varies with the angle, torques in steps.
+may each be 4 times the scatter of e that `commission` measured: a constant part, of friction that
+varies with the angle, and a share of the drive's own torques. A slope scatters by no more than e,
+and by as much where the subject's torque goes with the error.
 
 The model is `commission`'s. Without it, or without a torque of the drive, nothing is found. A step
 only adds, multiplies, divides, compares and takes square roots; it knows nothing of the controller.
@@ -56,17 +57,18 @@ PRESLIDING_RAD = 0.006
 """A drive that turned back slips after so much, whatever its friction was before."""
 
 TIMES_SCATTER = 4.0
-SHARE = 0.02
-"""Of the drive's own torques: a motor's torque constant falls by 0.1 % a kelvin, and a motor that
-works warms by 20."""
+LEAST_SHARE = 0.005
+"""Of the drive's own torques, four times which is 2 %: a motor's torque constant falls by 0.1 % a
+kelvin, and a motor that works warms by 20."""
 
 _NO_CAUSE = int(Cause.NONE)
 
 
 class DriveModel(NamedTuple):
-    """What `commission` found of the drive's side: a, α, J_d, F_c, D and c, and the two scatters.
+    """What `commission` found of the drive's side: a, α/a, J_d, F_c, D and c, and the scatter of e.
 
-    Where a scatter is infinite the law is off.
+    The scatter is `scatter_nm` and `scatter_share` of the drive's own torques. Where `scatter_nm`
+    is infinite the law is off.
     """
 
     scale: float = 1.0
@@ -75,8 +77,8 @@ class DriveModel(NamedTuple):
     friction_nm: float = 0.0
     damping_nm_s_rad: float = 0.0
     zero_nm: float = 0.0
-    size_scatter_nm: float = math.inf
-    slope_scatter_nm: float = math.inf
+    scatter_nm: float = math.inf
+    scatter_share: float = 0.0
 
 
 class DriveTorqueLimits(NamedTuple):
@@ -197,6 +199,8 @@ def drive_torque_step(
         Ticks since the step before.
     """
     cause = _NO_CAUSE
+    if limits.model.scatter_nm == math.inf:
+        return state, cause
     if elapsed_ticks > limits.mean_of_ticks and state.readings > 0:
         state, cause = means_ended(
             limits, state
@@ -365,10 +369,8 @@ def one_step(
         own += (drives_nm2 - float(row[3])) * share
         row[0], row[1], row[2] = abs(e), e * by_drive_nm, by_drive_nm * by_drive_nm
         row[3] = drives_nm2
-        drives_nm = SHARE * math.sqrt(max(own, 0.0))
-        most_size = TIMES_SCATTER * model.size_scatter_nm + drives_nm
-        most_slope = TIMES_SCATTER * model.slope_scatter_nm + drives_nm
-        if size > most_size or slope * slope > most_slope * most_slope * square:
+        most = allowed_nm(model, own)
+        if size > most or slope * slope > most * most * square:
             cause = int(Cause.TORQUE_DISAGREES)
     after = StepsState(
         window,
@@ -386,6 +388,12 @@ def one_step(
         own,
     )
     return after, cause
+
+
+def allowed_nm(model: DriveModel, own_nm2: float) -> float:
+    """Return what either statistic may be, with the drive's own torques of that mean square."""
+    share = max(model.scatter_share, LEAST_SHARE)
+    return TIMES_SCATTER * (model.scatter_nm + share * math.sqrt(max(own_nm2, 0.0)))
 
 
 def from_drive(model: DriveModel, terms: Terms) -> float:

@@ -28,6 +28,7 @@ from rigidimeter.rig.guard import (
     WRONG_GAIN,
     WRONG_SHARE,
     Cause,
+    DriveModel,
 )
 
 SETTINGS = parse_settings({"loop": {"missed_in_a_row": 4}})
@@ -69,6 +70,9 @@ def latched(cause, **changed):
         torque_old=0.3,
         motion_old=0.2,
     )
+    steps = loop.compared.steps._replace(
+        size_nm=0.3, slope_nm2=-0.2, model_nm2=0.25, own_nm2=4.0, settled_s=2.0
+    )
     found = Latched(
         SETTINGS,
         sample,
@@ -79,6 +83,8 @@ def latched(cause, **changed):
         ELAPSED,
         7,
         math.nan,
+        loop.torques._replace(model=DriveModel(scatter_nm=0.05, scatter_share=0.01)),
+        loop.compared._replace(steps=steps),
     )
     for part, fields in changed.items():
         if isinstance(fields, dict):
@@ -177,6 +183,8 @@ STALE = (1e3 * GUARD.stale_s, "ms")
                 at_least=True,
             ),
         ),
+        # The slope: 0.2/0.5 N·m is more than the size; 4 (0.05 + 0.01 · 2 N·m) are allowed.
+        (Cause.TORQUE_DISAGREES, Found(0.4, 0.28, "N·m", 0.5)),
         (Cause.SELDOM_FRESH, Found(30.0, 100.0 * OLD_SHARE, "%", AGREEMENT.old_memory_s)),
         (
             Cause.DEADLINES_MISSED,

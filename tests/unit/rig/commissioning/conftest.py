@@ -163,7 +163,7 @@ class FakeDrive:
         if self._on and self._now() >= self._faults.get("button_at_s", math.inf):
             self._halt()
             self._status, self._cause = 9, Cause.EMERGENCY_STOP
-        status, cause = self._status, self._cause
+        status, cause, faults = self._status, self._cause, self._faults
         if self._on and self._now() >= self._faults.get("given_up_s", math.inf):
             cause = Cause.DRIVE_STATE
         if "silent_watchdog" in self._faults:
@@ -174,6 +174,7 @@ class FakeDrive:
             self._now(),
             status=status,
             cause=int(cause),
+            drive_torque_nm=self._arm.drive_torque_nm() if "drive_side" in faults else math.nan,
         )
 
     def write(self, velocity_rad_s: float) -> float:
@@ -261,6 +262,7 @@ def fake_rig(rigfile: RigFile, monkeypatch: Any) -> Callable[..., FakeRig]:
             noise_sd_nm=noise_sd_nm,
             voluntary_nm=lambda _: push_nm[0],
             now=time.now,
+            drive_side=faults.get("drive_side"),
         )
         rig = ComposedRig(
             FakeSensor(arm, time.now, faults), FakeDrive(arm, time.now, faults), RATE_HZ
