@@ -70,7 +70,7 @@ def test_a_drive_that_does_not_know_what_it_sent_is_taken_to_have_sent_what_was_
 
 
 def test_each_field_of_the_record_is_the_readings_own():
-    reading = Reading(0.1, 0.0001, 0.02, 0.003, 0.0002, 11, 12, 13, 14)
+    reading = Reading(0.1, 0.0001, 0.02, 0.003, 0.0002, 11, 12, 13, 14, 0, 0.4, 0.0003)
     loop, samples = made(SETTINGS, change=lambda *_: reading, late={0: 0.0005})
     run_ticks(loop, 7, 1, lambda *_: (0.01, 0.5, 0.25))
     (s,) = samples
@@ -80,6 +80,7 @@ def test_each_field_of_the_record_is_the_readings_own():
     assert (s.angle_rad, s.velocity_rad_s, s.motion_time_s) == (0.02, 0.003, 0.0002)
     numbers = s.torque_sequence, s.torque_status, s.motion_sequence, s.motion_status, s.cause
     assert numbers == (11, 12, 13, 14, 0)
+    assert (s.drive_torque_nm, s.drive_torque_time_s) == (0.4, 0.0003)
     assert loop.tick == 1
 
 

@@ -108,7 +108,18 @@ def test_angle_and_torque_count_from_where_it_was_enabled(drive):
     reading = rig.read()
     assert rig.origin_rad == ANGLE_RAD
     assert (reading.angle_rad, reading.torque_nm) == (0.0, 1.0)
+    assert math.isnan(reading.drive_torque_nm)
+    assert math.isnan(reading.drive_torque_time_s)
     assert set(drive.written) == {0.0}
+
+
+def test_the_drives_torque_has_the_stamp_of_its_angle_and_is_not_zeroed(drive):
+    drive.read = lambda: MotionSample(ANGLE_RAD, 0.0, 0.25, drive_torque_nm=-0.75)
+    rig = ComposedRig(Sensor(), drive, 100.0)
+    rig.zero(0.5)
+    reading = rig.read()
+    assert (reading.drive_torque_nm, reading.drive_torque_time_s) == (-0.75, 0.25)
+    assert reading.torque_time_s != 0.25
     assert rig.counts == {"torque_received": 2, "drive_received": 3}
 
 

@@ -13,8 +13,10 @@ EXACT = {
 SIDE = {"friction_ripple_percent": 0.0, "torque_resolution_percent": 0.0, "torque_latency_ticks": 0}
 
 
-def readings(commands_rad_s, enable=True, seed=1, **side):
-    settings = parse_settings({"rig": {**EXACT, "drive_side": {**SIDE, **side}}})
+def readings(commands_rad_s, enable=True, seed=1, pushing_nm=0.0, **side):
+    subject = {"OFF": {"voluntary_sd_nm": pushing_nm}}
+    values = {"rig": {**EXACT, "drive_side": {**SIDE, **side}}, "subject": subject}
+    settings = parse_settings(values)
     rig = SimulatedRig(settings.rig, settings.subject["OFF"], np.random.default_rng(seed))
     if enable:
         rig.enable()
@@ -56,8 +58,10 @@ def test_it_comes_in_steps_and_one_tick_late():
 
 
 def test_without_power_the_motor_has_no_torque():
-    found = readings([0.0] * 20, enable=False)
-    assert {r.drive_torque_nm for r in found} == {0.0}
+    for enable in (True, False):
+        found = readings([0.0] * 200, enable=enable, pushing_nm=1.0)
+        assert any(abs(r.torque_nm) > 0.1 for r in found)
+        assert any(abs(r.drive_torque_nm) > 0.0 for r in found) == enable
 
 
 def test_a_drive_without_torque_says_so_and_the_facts_too():
