@@ -7,6 +7,7 @@ from tests.file_size import file_size_limit
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import (
+    SAMPLE_SCHEMA,
     SAMPLE_UNITS,
     Sample,
     SampleLog,
@@ -128,3 +129,18 @@ def test_a_schema_whose_names_are_no_text_is_damaged(tmp_path):
     content = path.read_bytes()
     path.write_bytes(content.replace(b"torque_nm", b"torque\xff\xff\xff"))
     assert read_samples(path)["torque_nm"].size == 500
+
+
+def test_a_recording_before_the_drives_torque_is_read_with_no_torque(tmp_path):
+    schema = pa.schema(list(SAMPLE_SCHEMA)[:19])
+    assert schema.names[-1] == "cause"
+    rows = [sample(k) for k in range(250)]
+    columns = [pa.array([row[i] for row in rows], kind) for i, kind in enumerate(schema.types)]
+    with pa.ipc.new_stream(str(tmp_path / "s.arrows"), schema) as stream:
+        stream.write_table(pa.Table.from_arrays(columns, schema=schema), max_chunksize=100)
+    found = read_samples(tmp_path / "s.arrows")
+    assert list(found) == list(Sample._fields)
+    np.testing.assert_array_equal(found["torque_nm"], np.arange(250) + 5.0)
+    for name in ("drive_torque_nm", "drive_torque_time_s"):
+        assert found[name].dtype == np.float64
+        assert np.isnan(found[name]).all()
