@@ -25,7 +25,9 @@ from rigidimeter.rig.commissioning.trials import (
 from rigidimeter.rig.guard import Cause
 
 EVERY_S = 0.25
-HEADING = " torque, N·m       SD    new/s  angle, deg  velocity, deg/s    new/s   lost"
+HEADING = (
+    " torque, N·m       SD    new/s  angle, deg  velocity, deg/s    new/s   lost  drive's, N·m"
+)
 
 
 class LiveReading(NamedTuple):
@@ -33,7 +35,8 @@ class LiveReading(NamedTuple):
 
     `torque_sd_nm` is the scatter within that time, `torque_hz` and `motion_hz` are new samples a
     second, `lost` counts packets that were lost, damaged or out of order since the connections were
-    opened. `cause` is what a device reported last.
+    opened. `cause` is what a device reported last. The drive's own torque is near 0 without power,
+    and NaN where it reports none.
     """
 
     torque_nm: float
@@ -44,14 +47,17 @@ class LiveReading(NamedTuple):
     motion_hz: float
     lost: int
     cause: Cause
+    drive_torque_nm: float = math.nan
 
     @property
     def words(self) -> str:
         """Its values under `HEADING`, then what a device reports."""
+        known = math.isfinite(self.drive_torque_nm)
+        drive = f"{self.drive_torque_nm:+.3f}" if known else "none"
         line = (
             f"{self.torque_nm:+12.3f}{self.torque_sd_nm:9.3f}{self.torque_hz:9.0f}"
             f"{math.degrees(self.angle_rad):+12.2f}{math.degrees(self.velocity_rad_s):+17.2f}"
-            f"{self.motion_hz:9.0f}{self.lost:7d}"
+            f"{self.motion_hz:9.0f}{self.lost:7d}{drive:>14}"
         )
         return f"{line}  {self.cause.sentence}" if self.cause is not Cause.NONE else line
 
@@ -95,6 +101,7 @@ def _live_reading(readings: Readings, lost: int) -> LiveReading:
         _new_a_second(readings.motion_time_s),
         lost,
         Cause(int(readings.cause[-1])),
+        _mean(readings.drive_torque_nm),
     )
 
 

@@ -52,6 +52,9 @@ def test_a_device_that_does_not_answer_is_named(shown):
 def test_the_values_stand_under_their_heading():
     reading = LiveReading(-1.25, 0.004, 996.0, math.radians(-171.5), 0.0, 498.0, 3, Cause.NONE)
     assert len(reading.words) == len(HEADING)
-    assert reading.words.split() == ["-1.250", "0.004", "996", "-171.50", "+0.00", "498", "3"]
+    assert reading.words.endswith("none")
+    assert reading._replace(drive_torque_nm=-0.125).words.endswith("-0.125")
+    values = ["-1.250", "0.004", "996", "-171.50", "+0.00", "498", "3"]
+    assert reading.words.split() == [*values, "none"]
     stale = reading._replace(cause=Cause.TORQUE_STALE).words
     assert stale.endswith(Cause.TORQUE_STALE.sentence)
