@@ -217,7 +217,8 @@ def test_every_misbehaviour_has_a_test():
         )
         for mark in (getattr(case, "values", case)[0] for case in test.pytestmark[0].args[1])
     }
-    assert tested | {"stale_target"} == set(ASCII_MISBEHAVIOURS)
+    of_bounds = {"bound_sleeps", "no_register"}  # in `test_serial_bounds`
+    assert tested | of_bounds | {"stale_target"} == set(ASCII_MISBEHAVIOURS)
 
 
 def test_a_stale_target_that_does_not_go_is_refused_before_power(wire):

@@ -44,6 +44,8 @@ ASCII_MISBEHAVIOURS = {
     "encoder_sign_flip": "reports position and velocity with the opposite sign",
     "velocity_gain": "reports so many times the velocity, such as 0 or -1",
     "stale_target": "keeps this target velocity in 0.1 counts/s, whatever is written",
+    "bound_sleeps": "takes this register of a bound and does not obey it",
+    "no_register": "has no register of this number",
     "changes_state": "changes to this desired state by itself",
 }
 """What `AsciiEmulator.misbehave` can do."""
@@ -53,6 +55,10 @@ POWER_UP_BAUD = 9600
 THINKING_S = 0.0002
 """From the end of a request to the start of its reply."""
 
+PEAK_CURRENT, VELOCITY_LIMIT, POSITIVE_LIMIT, NEGATIVE_LIMIT = 0x21, 0x3A, 0xB8, 0xB9
+"""Registers of bounds; those of the position act in moves, and not where both are the same."""
+
+HIGHEST = 2**31 - 1
 STEP_S = 0.001
 GENERATOR_STEP_S = 0.0005
 LOOP_GAIN_S = 60.0
@@ -92,6 +98,8 @@ class AsciiEmulator:
         self._registers |= dict.fromkeys((0xA4, 0xC8, 0xCA, 0xCB), 0)
         self._registers[0x22] = round(100.0 * arm.drive_side.rated_torque_nm / NM_PER_A)
         self._registers |= dict.fromkeys((0xCC, 0xCD, 0xCF), 10_000)
+        self._registers |= {PEAK_CURRENT: HIGHEST, VELOCITY_LIMIT: HIGHEST}
+        self._registers |= {POSITIVE_LIMIT: 0, NEGATIVE_LIMIT: 0}
         position = self._counts()[0]
         self._generator = Trapezoid(position, position)
         self._generated_s = time.monotonic()
@@ -223,6 +231,8 @@ class AsciiEmulator:
         return "e 1"
 
     def _read(self, register: int) -> str:
+        if self._faults.get("no_register") == register:
+            return "e 15"
         if register in TEXTS:
             return f"v {TEXTS[register]}"
         position, velocity = self._seen()
@@ -239,7 +249,8 @@ class AsciiEmulator:
             value = int(number, 0)
         except ValueError:
             return "e 33"
-        if register not in self._registers or register in READ_ONLY:
+        lacking = self._faults.get("no_register") == register
+        if register not in self._registers or register in READ_ONLY or lacking:
             return "e 15"
         if register == 0x90 and value not in SPEEDS.values():
             return "e 33"
@@ -299,16 +310,33 @@ class AsciiEmulator:
             target += generator.position if generator.aborting else generator.target
         elif self._registers[0xC8] != 0:
             return "e 22"
-        generator.move(target, 0.1 * self._registers[0xCB])
+        lowest, highest = self._position_limits()
+        target = max(lowest, min(highest, target))
+        generator.move(target, 0.1 * min(self._registers[0xCB], self._bound(VELOCITY_LIMIT)))
         return "ok"
+
+    def _bound(self, register: int) -> int:
+        """Return what a register bounds; the highest value where it sleeps."""
+        asleep = self._faults.get("bound_sleeps") == register
+        return HIGHEST if asleep else self._registers[register]
+
+    def _position_limits(self) -> tuple[float, float]:
+        lowest, highest = self._registers[NEGATIVE_LIMIT], self._registers[POSITIVE_LIMIT]
+        asleep = self._faults.get("bound_sleeps") in (POSITIVE_LIMIT, NEGATIVE_LIMIT)
+        return (lowest, highest) if lowest < highest and not asleep else (-math.inf, math.inf)
 
     def _wanted(self) -> float:
         """Return the target velocity in counts/s."""
         if not self._powered():
             return 0.0
         if self._registers[0x24] == VELOCITY:
-            return 0.1 * self._registers[0x2F]
+            return self._velocity()
         return self._generator.wanted(self._ramps())
+
+    def _velocity(self) -> float:
+        """Return the programmed velocity within its limit, in counts/s."""
+        limit = self._bound(VELOCITY_LIMIT)
+        return 0.1 * max(-limit, min(limit, self._registers[0x2F]))
 
     def _ramps(self) -> Ramps:
         if self._registers[0x24] == VELOCITY:
@@ -319,6 +347,9 @@ class AsciiEmulator:
     def _generate(self) -> None:
         """Advance the generator to the present time and make the arm follow it."""
         now_s = time.monotonic()
+        current = self._bound(PEAK_CURRENT)
+        bounded = current < HIGHEST and self._powered()
+        self._arm.torque_limit_nm = 0.01 * current * NM_PER_A if bounded else math.inf
         while self._generated_s < now_s:
             step_s = min(GENERATOR_STEP_S, now_s - self._generated_s)
             self._generated_s += step_s
@@ -338,7 +369,7 @@ class AsciiEmulator:
             # The target of the last move is kept, as in a real drive.
             generator.position, generator.speed = self._counts()[0], 0.0
         elif self._registers[0x24] == VELOCITY:
-            generator.run(0.1 * self._registers[0x2F], self._ramps(), step_s)
+            generator.run(self._velocity(), self._ramps(), step_s)
         else:
             generator.step(self._ramps(), step_s)
 

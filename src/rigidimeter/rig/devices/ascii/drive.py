@@ -31,6 +31,7 @@ import math
 from collections.abc import Mapping
 from typing import ClassVar
 
+from rigidimeter.rig.devices.ascii.drive_bounds import write_bounds
 from rigidimeter.rig.devices.ascii.language import Feedback, move_target, read_request, set_request
 from rigidimeter.rig.devices.ascii.line import AsciiLine
 from rigidimeter.rig.devices.ascii.setup import (
@@ -41,6 +42,7 @@ from rigidimeter.rig.devices.ascii.setup import (
     open_port,
 )
 from rigidimeter.rig.devices.base import DeviceError, DeviceFacts, MotionSample, Now
+from rigidimeter.rig.devices.bounds import BOUND_FACT, BoundFound, DriveBounds, Tight
 from rigidimeter.rig.guard import Cause
 
 VELOCITY, MOVES = 11, 21
@@ -73,6 +75,10 @@ class AsciiDrive:
         self._state_on = MOVES if settings.mode == "moves" else VELOCITY
         self._line: AsciiLine | None = None
         self._speaking = self._configured = False
+        self._bounds: DriveBounds | None = None
+        self._tight: Tight | None = None
+        self.bounds: tuple[BoundFound, ...] = ()
+        """What came of each bound when it was written last."""
         self._powered = self._commanding = False
         self._reported_off = True
         self._cycle_s = 0.0
@@ -81,6 +87,14 @@ class AsciiDrive:
         self._cycle = 0
         self._asked_why = False
         self._feedback = Feedback(settings.baud, self._jump, self._fastest, self._state_on)
+
+    def bound(self, bounds: DriveBounds) -> None:
+        """Have these bounds written by the next `configure` and every `enable`."""
+        self._bounds = bounds
+
+    def tighten(self, tight: Tight | None) -> None:
+        """Have one bound so tight from the next `enable` on that a move must hit it; None: none."""
+        self._tight = tight
 
     # -- set-up -------------------------------------------------------------------------------
 
@@ -119,6 +133,7 @@ class AsciiDrive:
         self._powered = self._commanding = False
         latched = talk.clear_faults()
         self._deceleration = talk.write_profile(self._acceleration, self._braking)
+        self._write_bounds(talk, None)
         self._cycle_s = talk.measured_cycle_s(self._now)
         if s.mode == "moves" and s.horizon_s < CYCLES_IN_HORIZON * self._cycle_s:
             raise DeviceError(
@@ -138,6 +153,7 @@ class AsciiDrive:
             "braking_rad_s2": self._deceleration / abs(self._per_rad),
             "external_watchdog": int(s.external_watchdog),
         }
+        values.update({f"{BOUND_FACT} {name}": words for name, _, words, _ in self.bounds})
         if s.torque_nm_per_a:
             values["rated_torque_nm"] = 0.01 * talk.value(0x22) * s.torque_nm_per_a
         else:
@@ -161,6 +177,7 @@ class AsciiDrive:
         if not self._configured:
             raise DeviceError("drive: enable before configure; call connect and configure first")
         try:
+            self._write_bounds(self._talking(), self._tight)
             self._powered, self._reported_off = True, False
             self._talking().energise(self._state_on, self._jump)
             self._sent = 0
@@ -299,6 +316,10 @@ class AsciiDrive:
             return
         if now_s - self._commanded_s > self._settings.horizon_s:
             self._feedback.latch(Cause.DRIVE_STATE)
+
+    def _write_bounds(self, talk: AsciiTalk, tight: Tight | None) -> None:
+        if self._bounds is not None:
+            self.bounds = write_bounds(talk, self._settings, self._bounds, tight)
 
     def _start_sampling(self) -> None:
         """Start again from a fresh sample, without the causes of the previous run."""

@@ -13,13 +13,15 @@ Each line ends with a carriage return. Registers used, in counts of the position
     0x36, 0x37 acceleration and deceleration of the velocity loop, in 1000 counts/s²
     0xc8 profile: 0 absolute trapezoid; 0xca target, 0xcb velocity in 0.1 counts/s
     0xcc, 0xcd, 0xcf acceleration, deceleration, deceleration of an abort, in 10 counts/s²
+    0x21 peak current in 0.01 A, 0x3a limit of the velocity loop in 0.1 counts/s, 0xb8 and 0xb9
+    positive and negative software limit; see `drive_bounds`
     0xa0 event status, 0xa4 latched faults; 0x90 baud rate; 0x81 serial number, 0x92 model
 
 The baud change, the states, the units of 0x18, 0x2f, 0x36, 0x37 and 0xca..0xcd and profile 0 are
 taken from published programs for such drives. The rest is from memory of the public programmer's
-guide and must be verified at commissioning: the bits of the event status, 0x0c, 0x22, 0x81, 0x92
-and 0xcf, that `t 1` accepts a changed target and velocity during a move, and that `t 0` at rest
-changes nothing.
+guide and must be verified at commissioning: the bits of the event status, 0x0c, 0x21, 0x22, 0x3a,
+0x81, 0x92 and 0xcf, that `t 1` accepts a changed target and velocity during a move, and that `t 0`
+at rest changes nothing.
 
 Moves are absolute, not relative. Sources disagree on whether a relative move started during another
 one starts from the present position or from the previous target. In the second case every command

@@ -45,6 +45,9 @@ class AsciiDriveSettings(Section):
     torque_nm_per_a : float
         Torque at the joint for an ampere of the motor, gear included, positive; 0 where the current
         is not read. Reading it makes a cycle longer.
+    reflected_inertia_kg_m2, friction_nm : float
+        Of motor and gear, seen at the joint; where the first is 0, it is not known, and the torque
+        is not bounded (see `drive_bounds`).
     """
 
     port: str
@@ -52,6 +55,8 @@ class AsciiDriveSettings(Section):
     baud: Literal[9600, 19200, 38400, 57600, 115200] = 115200
     sign: Literal[1, -1] = 1
     torque_nm_per_a: float = quantity(0.0, "N·m/A", 0.0, 1e5)
+    reflected_inertia_kg_m2: float = quantity(0.0, "kg·m²", 0.0, 100.0)
+    friction_nm: float = quantity(0.0, "N·m", 0.0, 200.0)
     angle_offset_deg: float = quantity(0.0, "deg", -360.0, 360.0)
     mode: Literal["moves", "velocity"] = "moves"
     external_watchdog: bool = False
