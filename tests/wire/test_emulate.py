@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from pathlib import Path
 
 import pytest
@@ -45,3 +46,16 @@ def test_a_rig_that_cannot_start_says_why(tmp_path: Path) -> None:
         RigProcess(tmp_path / "RIG.toml", "ascii", "--torque-rate-hz", "-1"),
     ):
         pass
+
+
+def test_motor_and_gear_are_those_of_the_settings(tmp_path: Path) -> None:
+    settings = tmp_path / "settings.toml"
+    settings.write_text("[rig.drive_side]\nrated_torque_nm = 50.0\nfriction_nm = 3.0\n")
+    with RigProcess(tmp_path / "RIG.toml", "cia402", "--settings", str(settings)) as emulated:
+        rig = load_rig(emulated.rig).build(time.monotonic, 100.0)
+        try:
+            rig.connect()
+            facts = rig.configure()["drive"]["values"]
+        finally:
+            rig.close()
+    assert facts["rated_torque_nm"] == pytest.approx(50.0)

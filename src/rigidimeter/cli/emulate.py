@@ -25,6 +25,9 @@ def emulate(
     ),
     noise: float = OPTIONS.option("--noise-nm NM", "SD of the torque noise.", 0.005),
     bandwidth: float = OPTIONS.option("--bandwidth-hz HZ", "Bandwidth of the drive.", 50.0),
+    settings: Path | None = OPTIONS.option(
+        "--settings FILE", "Motor and gear of the drive, its [rig.drive_side]."
+    ),
     seed: int = OPTIONS.option("--seed", "Seed of all random numbers.", 1),
 ) -> None:
     """Emulate a rig: an arm, a torque sensor and a drive.
@@ -38,6 +41,7 @@ def emulate(
       rigidimeter emulate --rig-out RIG.toml
       rigidimeter emulate --drive ascii --joint 0.0045 0.14 1.75
     """
+    from rigidimeter.core.settings import load_settings
     from rigidimeter.model import JointDynamics
     from rigidimeter.testing import EmulatedRig, serve
 
@@ -55,6 +59,7 @@ def emulate(
             noise_sd_nm=noise,
             bandwidth_hz=bandwidth,
             seed=seed,
+            drive_side=load_settings(settings).rig.drive_side,
         )
     except ValueError as error:
         raise UserError(f"the rig cannot be made: {error}") from None

@@ -35,6 +35,7 @@ from typing import Any, Literal
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import plain_values
+from rigidimeter.core.settings import DriveSideSettings
 from rigidimeter.model import JointDynamics
 from rigidimeter.testing import ascii_emulator
 from rigidimeter.testing.cia402 import cia402_emulator as cia402
@@ -73,6 +74,8 @@ class EmulatedRig:
     torque_rate_hz, noise_sd_nm, bandwidth_hz : float
         Of the torque sensor and the drive.
     seed : int
+    drive_side : DriveSideSettings, optional
+        Motor and gear of the drive, and how it reports its torque; by default a small joint's.
     """
 
     def __init__(
@@ -85,6 +88,7 @@ class EmulatedRig:
         noise_sd_nm: float = 0.005,
         bandwidth_hz: float = 50.0,
         seed: int = 1,
+        drive_side: DriveSideSettings | None = None,
     ) -> None:
         self._kind = drive
         # For the threads started later, if the system permits.
@@ -98,6 +102,7 @@ class EmulatedRig:
             noise_sd_nm=noise_sd_nm,
             voluntary_nm=lambda time_s: self._push_nm + self._voluntary(time_s),
             seed=seed,
+            drive_side=drive_side,
         )
         self._wrong: dict[str, float | None] = {}
         self._pressed = False

@@ -30,7 +30,10 @@ RAW = (
     ("torque", "N·m", "torque_nm", 1.0),
     ("angle", "deg", "angle_rad", deg_from_rad(1.0)),
     ("perturbation", "N·m", "perturbation_nm", 1.0),
+    ("drive's torque", "N·m", "drive_torque_nm", 1.0),
 )
+"""What is drawn of an epoch as recorded, unless it has no values."""
+
 FITTED = ("torque_nm", "joint_torque_nm", "subject_torque_nm")
 NAMES = ("measured", "J θ″ + B θ′ + K θ", "difference")
 
@@ -66,6 +69,7 @@ def epoch_panes(folder: Path, label: str, fitted: Path) -> list[dict[str, Any]]:
     panes = [
         _pane(name, unit, [""], time_s, [factor * samples[key][rows]])
         for name, unit, key, factor in RAW
+        if np.isfinite(samples[key][rows]).any()
     ]
     if fitted.is_file():
         table = pd.read_csv(fitted, dtype={"epoch": str})

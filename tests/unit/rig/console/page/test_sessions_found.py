@@ -119,6 +119,7 @@ def test_an_epoch_is_drawn_from_its_samples(root):
         "torque [N·m]",
         "angle [deg]",
         "perturbation [N·m]",
+        "drive's torque [N·m]",
     ]
     time_s = panes[0]["data"][0]
     assert time_s[-1] - time_s[0] == pytest.approx(20.0, abs=0.02)
@@ -126,7 +127,7 @@ def test_an_epoch_is_drawn_from_its_samples(root):
     assert [pane["spectrum"]["title"] for pane in panes] == [
         "spectrum [N·m/√Hz]",
         "spectrum [deg/√Hz]",
-        "spectrum [N·m/√Hz]",
+        *["spectrum [N·m/√Hz]"] * 2,
     ]
     rate_hz = read_manifest(root / "S01-1")["settings"]["rig"]["tick_rate_hz"]
     for pane in panes:
