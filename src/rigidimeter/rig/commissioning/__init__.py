@@ -1,5 +1,6 @@
 """Whether a rig is fit for a person's arm: checks on the devices, and a record of them."""
 
+from rigidimeter.rig.commissioning.bound_trials import bound_checks
 from rigidimeter.rig.commissioning.checks import RigCheck, above, below, untried
 from rigidimeter.rig.commissioning.commissioning_record import (
     A_PERSON_TELLS,
@@ -31,7 +32,7 @@ from rigidimeter.rig.commissioning.drive_side_checks import (
     unseen_nm,
     witness_check,
 )
-from rigidimeter.rig.commissioning.drive_side_fit import model_in, model_of_today
+from rigidimeter.rig.commissioning.drive_side_fit import as_numbers, model_in, model_of_today
 from rigidimeter.rig.commissioning.first_steps import ZeroFound, zero_check
 from rigidimeter.rig.commissioning.inertia_fit import (
     FREQUENCIES_HZ,

@@ -11,12 +11,14 @@ standing still or by a fault, and the guard may end it because the joint does no
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from rigidimeter.core.units import rad_from_deg
-from rigidimeter.rig.commissioning.checks import RigCheck, impossible, yes
+from rigidimeter.rig.commissioning.checks import RigCheck, above, impossible, yes
+from rigidimeter.rig.commissioning.drive_side_fit import model_in
 from rigidimeter.rig.commissioning.motion_tests import smooth_motion
 from rigidimeter.rig.commissioning.trials import (
     Readings,
@@ -28,13 +30,23 @@ from rigidimeter.rig.commissioning.trials import (
     stopped_for,
     trial,
 )
-from rigidimeter.rig.devices import MOTOR_SPEED, POSITION, SPEED, BoundFound, Tight
+from rigidimeter.rig.devices import (
+    MOTOR_SPEED,
+    POSITION,
+    SPEED,
+    TORQUE,
+    TORQUE_MARGIN,
+    BoundFound,
+    Tight,
+    drive_bounds,
+)
 from rigidimeter.rig.devices.base import DeviceError
 from rigidimeter.rig.guard import Cause
 
 BOUNDS = "bounds in the drive"
 LIMIT = "ends a slow move"
 WRITTEN = "written, not shown"
+ENOUGH = "bound of the torque above a quick stop's"
 SETTLE_S = 0.3
 MOST = 0.75
 """A move of which the drive makes more than this was not ended; a tightened bound lets half."""
@@ -51,8 +63,12 @@ def bound_check_name(name: str) -> str:
     return f"bound of the {name}"
 
 
-def bound_checks(setup: Setup) -> list[RigCheck]:
-    """Tighten each bound that the drive took, and move against it."""
+def bound_checks(setup: Setup, numbers: Mapping[str, float]) -> list[RigCheck]:
+    """Tighten each bound that the drive took, and move against it.
+
+    `numbers` may hold what was measured of the drive's side: a bound of the torque below what a
+    quick stop of that takes is a failure.
+    """
     found: tuple[BoundFound, ...] = tuple(getattr(setup.rig, "bounds", ()))
     if not found:
         return [impossible(BOUNDS, LIMIT, "the driver of this drive writes none")]
@@ -82,7 +98,27 @@ def bound_checks(setup: Setup) -> list[RigCheck]:
             if agreed
             else _not_shown(bound, "the operator did not agree to the moves")
         )
-    return [checks[bound.name] for bound in found]
+    enough = [check for bound in written for check in _enough(setup, bound, numbers)]
+    return [*(checks[bound.name] for bound in found), *enough]
+
+
+def _enough(setup: Setup, bound: BoundFound, numbers: Mapping[str, float]) -> list[RigCheck]:
+    """Hold a bound of the torque against T of the drive as measured, without its margin.
+
+    The drive counts in its own scale, of which `scale` times is true.
+    """
+    model = model_in(numbers)
+    if bound.name != TORQUE or model is None or math.isnan(bound.torque_nm):
+        return []
+    needed_nm = drive_bounds(setup.settings).torque_nm(
+        model.inertia_kg_m2, model.friction_nm, bound.ramp_rad_s2
+    )
+    needed_nm /= TORQUE_MARGIN * model.scale
+    remedy = (
+        f"a quick stop would be longer than its ramp: reflected_inertia_kg_m2 was measured as "
+        f"{model.inertia_kg_m2:.3g}, friction_nm as {model.friction_nm:.3g}; correct the rig file"
+    )
+    return [above(ENOUGH, bound.torque_nm, "N·m", needed_nm, remedy)]
 
 
 def _tried(setup: Setup, bound: BoundFound) -> RigCheck:

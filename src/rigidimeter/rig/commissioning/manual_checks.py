@@ -32,8 +32,7 @@ from rigidimeter.rig.commissioning.trials import (
     require_no_power,
     trial,
 )
-from rigidimeter.rig.devices import LED, STOP_HIGH, STOP_LOW, MotionRange
-from rigidimeter.rig.devices.motion_range import LEAST_DEG
+from rigidimeter.rig.devices import LEAST_DEG, LED, STOP_HIGH, STOP_LOW, MotionRange
 
 SETTLE_S = 0.5
 KNOWN_ANGLE_S = 1.0

@@ -229,7 +229,7 @@ def _with_power(
         found.checks.append(known)
         drive_side_checks(setup, found, loaded)
     if BOUNDS in parts:
-        found.checks += bound_checks(setup)
+        found.checks += bound_checks(setup, found.numbers)
     if WATCHDOG in parts:
         setup.operator.say(
             "Watchdog: nothing is written for a while; the drive must stop by itself."

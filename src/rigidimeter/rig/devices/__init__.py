@@ -37,6 +37,7 @@ from rigidimeter.rig.devices.bounds import (
     SLIPPAGE,
     SPEED,
     TORQUE,
+    TORQUE_MARGIN,
     BoundFound,
     DriveBounds,
     Tight,
@@ -78,6 +79,7 @@ from rigidimeter.rig.devices.cia402.state_words import (
 from rigidimeter.rig.devices.composed import ComposedRig, Home
 from rigidimeter.rig.devices.enable_line import SerialEnableLine
 from rigidimeter.rig.devices.motion_range import (
+    LEAST_DEG,
     LED,
     STOP_HIGH,
     STOP_LOW,
@@ -85,6 +87,7 @@ from rigidimeter.rig.devices.motion_range import (
     TYPED,
     MotionRange,
     range_of,
+    require_within,
 )
 from rigidimeter.rig.devices.rig_lock import RigLock, lock_path
 from rigidimeter.rig.devices.rigfile import RigFile, load_rig

@@ -118,12 +118,16 @@ class BoundFound(NamedTuple):
         Its value at the joint and as written; where it is not written, why.
     lost : str
         What is lost without it.
+    torque_nm, ramp_rad_s2 : float
+        Of a bound of the torque: T by the drive's own scale, and the a that it was computed with.
     """
 
     name: str
     where: str
     words: str
     lost: str
+    torque_nm: float = math.nan
+    ramp_rad_s2: float = math.nan
 
 
 TORQUE, POSITION, SPEED, MOTOR_SPEED, SLIPPAGE = (

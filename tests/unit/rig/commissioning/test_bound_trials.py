@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from tests.unit.rig.commissioning.conftest import at_hand
+
+from rigidimeter.rig.commissioning import Operator, Setup, Timebase, as_numbers, bound_checks
+from rigidimeter.rig.devices import BoundFound
+from rigidimeter.rig.guard import DriveModel
 
 NAMES = ("torque", "position", "speed", "motor speed", "slippage")
 
@@ -39,6 +44,25 @@ def test_a_bound_that_is_not_there_says_what_is_lost(commissioned: Any) -> None:
     check = bounds_of(record)["torque"]
     assert (check.value, check.outcome) == ("not written", "not possible here")
     assert check.remedy == "w; so l"
+
+
+@pytest.mark.parametrize(("bound_nm", "enough"), [(30.0, True), (29.9, False)])
+def test_the_bound_of_the_torque_is_held_against_the_drive_as_measured(
+    settings: Any, bound_nm: float, enough: bool
+) -> None:
+    """((0.0755 + 0.0045) 100 + 2 + 20) N·m / 1 = 30 N·m takes a stop; a scale of 2 halves it."""
+    bound = BoundFound("torque", "0x6072", "", "", bound_nm, 100.0)
+    rig = SimpleNamespace(bounds=(bound,))
+    operator = Operator(ask=lambda _: False)
+    setup = Setup(rig, settings, Timebase(lambda: 0.0, float), operator)
+    measured = DriveModel(scale=1.0, inertia_kg_m2=0.0755, friction_nm=2.0)
+    checks = {c.name: c for c in bound_checks(setup, as_numbers(measured))}
+    check = checks["bound of the torque above a quick stop's"]
+    assert check.passed is enough
+    assert check.limit == "at least 30 N·m"
+    halved = bound_checks(setup, as_numbers(measured._replace(scale=2.0)))[-1]
+    assert halved.limit == "at least 15 N·m"
+    assert len(bound_checks(setup, {})) == 1  # nothing was measured: nothing to hold it against
 
 
 def test_a_person_who_does_not_agree_sees_no_move(commissioned: Any) -> None:

@@ -5,9 +5,15 @@ import math
 import pytest
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.rig.devices import LED, STOP_HIGH, STOP_LOW, MotionRange, range_of
+from rigidimeter.rig.devices import (
+    LED,
+    STOP_HIGH,
+    STOP_LOW,
+    MotionRange,
+    range_of,
+    require_within,
+)
 from rigidimeter.rig.devices.base import DeviceError
-from rigidimeter.rig.devices.motion_range import require_within
 
 STOPS = {STOP_LOW: -45.0, STOP_HIGH: 90.0}
 

@@ -153,7 +153,7 @@ class AsciiDrive:
             "braking_rad_s2": self._deceleration / abs(self._per_rad),
             "external_watchdog": int(s.external_watchdog),
         }
-        values.update({f"{BOUND_FACT} {name}": words for name, _, words, _ in self.bounds})
+        values.update({f"{BOUND_FACT} {bound.name}": bound.words for bound in self.bounds})
         if s.torque_nm_per_a:
             values["rated_torque_nm"] = 0.01 * talk.value(0x22) * s.torque_nm_per_a
         else:

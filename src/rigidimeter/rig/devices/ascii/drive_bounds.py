@@ -75,7 +75,8 @@ def _torque(
     if tight is not None and tight.name == TORQUE:
         current = 0
     words = f"{torque_nm:.4g} N·m, {0.01 * current:.4g} A"
-    return _written(talk, TORQUE, {PEAK_CURRENT: current}, words)
+    found = _written(talk, TORQUE, {PEAK_CURRENT: current}, words)
+    return found._replace(torque_nm=torque_nm, ramp_rad_s2=ramp_rad_s2) if found.where else found
 
 
 def _position(

@@ -183,7 +183,7 @@ class Cia402Drive:
         values.update({k: value for k, value in identity.items() if value is not None})
         ramps = [found[entry.label] for entry in self._objects if entry.name in BRAKING]
         values.update({f"{BOUND_FACT} {label}": value for label, value in held.items()})
-        values.update({f"{BOUND_FACT} {name}": words for name, _, words, _ in self.bounds})
+        values.update({f"{BOUND_FACT} {bound.name}": bound.words for bound in self.bounds})
         if settings.button_bit >= 0:
             values["button_bit"] = settings.button_bit
         values.update({FACT: no_torque} if no_torque else {"rated_torque_nm": abs(rated_nm)})

@@ -65,6 +65,8 @@ class Wanted(NamedTuple):
     alternatives: tuple[tuple[Object, ...], ...]
     words: str
     why_not: str = ""
+    torque_nm: float = math.nan
+    ramp_rad_s2: float = math.nan
 
 
 def read_only(settings: Cia402Settings) -> tuple[Object, Object, Object]:
@@ -122,7 +124,7 @@ def write_bounds(
     found: list[BoundFound] = []
     written: list[Object] = []
     for bound in wanted:
-        name, alternatives, words, why_not = bound
+        name, alternatives, words, why_not, *torque_and_ramp = bound
         there: tuple[Object, ...] = ()
         if not why_not:
             holds = (each for each in alternatives if all(write_object(sdo, o, who) for o in each))
@@ -131,7 +133,7 @@ def write_bounds(
             why_not = "" if there else f"the drive has no {names}"
         written += there
         where = f"0x{there[0].index:04X}" if there else ""
-        found.append(BoundFound(name, where, why_not or words, LOST[name]))
+        found.append(BoundFound(name, where, why_not or words, LOST[name], *torque_and_ramp))
     return tuple(found), tuple(written)
 
 
@@ -165,9 +167,8 @@ def _torque(
             "the joint, without which nobody knows what a stop takes"
         )
         return Wanted(TORQUE, alternatives(1000), "", why)
-    needed_nm = bounds.torque_nm(
-        settings.reflected_inertia_kg_m2, settings.friction_nm, ramp_rad_s2(settings)
-    )
+    ramp = ramp_rad_s2(settings)
+    needed_nm = bounds.torque_nm(settings.reflected_inertia_kg_m2, settings.friction_nm, ramp)
     torque_nm = settings.torque_bound_nm or needed_nm
     if TORQUE_MARGIN * torque_nm < needed_nm:
         raise DeviceError(
@@ -183,9 +184,8 @@ def _torque(
     if thousandths > LARGEST_THOUSANDTHS:
         why = f"{torque_nm:.4g} N·m are more than {LARGEST_THOUSANDTHS} ‰ of the rated torque"
         return Wanted(TORQUE, alternatives(1000), "", why)
-    return Wanted(
-        TORQUE, alternatives(thousandths), f"{torque_nm:.4g} N·m, {thousandths} ‰ of {rated_nm:.4g}"
-    )
+    words = f"{torque_nm:.4g} N·m, {thousandths} ‰ of {rated_nm:.4g}"
+    return Wanted(TORQUE, alternatives(thousandths), words, "", torque_nm, ramp)
 
 
 def _position(
