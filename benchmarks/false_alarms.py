@@ -45,6 +45,7 @@ from rigidimeter.rig.guard import (
     torque_answer,
     torque_sign,
     watch,
+    wild_torque,
 )
 from rigidimeter.virtual.batch import Batch, enum_numbers, simulate_chunks, with_helpers
 
@@ -210,7 +211,8 @@ def compiled() -> Callable[..., tuple[int, int]]:
         energy_after=made(watch.energy_after),
     )
     ended = made(consistency.ended, means_step=means)
-    step = made(consistency.consistency_step, Cause=causes, ended=ended)
+    wild = made(wild_torque.wild_step, Cause=causes, median=made(wild_torque.median))
+    step = made(consistency.consistency_step, Cause=causes, ended=ended, wild_step=wild)
 
     return made(first_cause, consistency_step=step)
 

@@ -49,6 +49,7 @@ PAGE, SERVER_STATE = "rig/console/page/live_socket.py", "rig/console/page/server
 ACCESS, TOKEN = "rig/console/page/access.py", "rig/console/page/page_token.py"
 KEYS, ALARMS = "rig/console/stop_keys.py", "rig/console/alarms.py"
 STEP, WATCH, LIMITS = "rig/guard/step.py", "rig/guard/watch.py", "rig/guard/limits.py"
+WILD = "rig/guard/wild_torque.py"
 AGREEMENT, CONTACT = "rig/guard/agreement.py", "rig/guard/contact.py"
 CONSISTENCY, ANSWER = "rig/guard/consistency.py", "rig/guard/torque_answer.py"
 CONTROLLER, COMPOSED = "model/controller.py", "rig/devices/composed.py"
@@ -259,6 +260,19 @@ HAND_MADE = tuple(
             "ticks += now - int(ring[place])",
             "ticks += now",
             "what was long ago is held against the arm",
+        ),
+        (
+            WILD,
+            "cause, last_s, before_s = int(Cause.TORQUE_WILD), math.inf, math.inf",
+            "last_s, before_s = 0.0, last_s",
+            "single samples that are wild are counted and nothing else",
+        ),
+        (WILD, "torque_age_s < age_s - _SAME_STAMP_S", "True", "a wild sample is hidden by itself"),
+        (
+            CONSISTENCY,
+            "        unlike = of_sample\n",
+            "        pass\n",
+            "wild samples hold nothing",
         ),
         (CONTACT, " and not touching", "", "an arm that leans on its limit arrives all the time"),
         (

@@ -53,6 +53,7 @@ TESTS = {
     ),
     "rig/guard/contact.py": ("rig/guard/test_contact.py", "rig/guard/test_position_limit.py"),
     "rig/guard/drive_torque.py": ("rig/guard/test_drive_torque.py",),
+    "rig/guard/wild_torque.py": ("rig/guard/test_wild_torque.py",),
     "rig/guard/limits.py": ("rig/guard/test_limits.py",),
     "rig/guard/step.py": _STEP,
     "rig/guard/torque_answer.py": (

@@ -73,5 +73,6 @@ REMEDIES: dict[Cause, str] = {
     "its sign with `rigidimeter check`",
     Cause.TORQUE_DISAGREES: f"{_CABLE}; if the sensor is in order, gear, motor or what is mounted "
     "on the drive's side were changed: `rigidimeter commission`",
+    Cause.TORQUE_WILD: f"{_CABLE}, and whether its cable runs beside the motor's",
 }
 """What to do about each cause."""

@@ -21,6 +21,7 @@ from rigidimeter.rig.guard import (
     SHOWN_MEMORY_S,
     SQUARED_S,
     SUMMED_S,
+    THREE_S,
     WINDOW_S,
     WRONG_GAIN,
     WRONG_SHARE,
@@ -261,6 +262,10 @@ def _apart(latched: Latched) -> Found:
     return Found(value_nm, allowed_nm(model, steps.own_nm2), "N·m", WINDOW_S)
 
 
+def _wild(latched: Latched) -> Found:
+    return Found(3.0, 2.0, f"samples within {THREE_S:g} s")
+
+
 def _seldom(latched: Latched) -> Found:
     means = latched.consistency.means
     share = max(means.torque_old, means.motion_old)
@@ -327,6 +332,7 @@ _FOUND: dict[Cause, Callable[[Latched], Found]] = {
     Cause.VELOCITY_WRONG: _velocity,
     Cause.TORQUE_SILENT: _silent,
     Cause.TORQUE_DISAGREES: _apart,
+    Cause.TORQUE_WILD: _wild,
     Cause.SELDOM_FRESH: _seldom,
     Cause.DEADLINES_MISSED: _missed,
     Cause.STALLED: _stalled,

@@ -179,12 +179,24 @@ def facts(
         drive_torque_nm=recent.drive_torque_nm,
         distances=distances,
         indicators=all_indicators(
-            plan.settings, loop, recent, distances, recorder, left_s, caution
+            plan.settings,
+            loop,
+            recent,
+            distances,
+            recorder,
+            left_s,
+            "; ".join(filter(None, (caution, _wild(progress)))),
         ),
         cause=Cause(loop.cause),
         stop_words=_stop_words(progress, loop),
         held=not progress.outcome and _held(loop),
     )
+
+
+def _wild(progress: Progress) -> str:
+    count = progress.wild_samples
+    samples = "single torque sample was" if count == 1 else "single torque samples were"
+    return f"{count} {samples} far from the others" if count else ""
 
 
 def session_left_s(progress: Progress, loop: LoopStatus, return_s: float) -> float:

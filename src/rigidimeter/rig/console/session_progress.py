@@ -95,6 +95,8 @@ class Progress:
         Why the guard last stopped or held the rig, with value, limit and remedy.
     outcome, reason : str
         How the session ended; empty as long as it runs.
+    wild_samples : int
+        Single torque samples far from those around them, up to the last epoch that ended.
     """
 
     to_run: tuple[PlannedEpoch, ...]
@@ -108,6 +110,7 @@ class Progress:
     stop: str = ""
     outcome: str = ""
     reason: str = ""
+    wild_samples: int = 0
 
 
 def progress_at_start(epochs: tuple[PlannedEpoch, ...]) -> Progress:
@@ -177,5 +180,10 @@ def _ended(progress: Progress, event: Mapping[str, Any]) -> Progress:
         again is not None,
     )
     return replace(
-        progress, to_run=to_run, places=places, running=False, ended=(*progress.ended, ended)
+        progress,
+        to_run=to_run,
+        places=places,
+        running=False,
+        ended=(*progress.ended, ended),
+        wild_samples=event.get("counts", {}).get("torque_wild", 0),
     )

@@ -93,3 +93,4 @@ from rigidimeter.rig.guard.torque_sign import (
     without,
 )
 from rigidimeter.rig.guard.watch import energy_after, found_wrong, outside
+from rigidimeter.rig.guard.wild_torque import THREE_S, WildState, median, wild_step

@@ -92,7 +92,8 @@ class ConsistencyLimits(NamedTuple):
     after that. The means are of `mean_of_ticks`. `unseen_rad` is how far velocity and angle may
     disagree within `SUMMED_S`; a reading that repeats itself while the joint goes farther at its
     velocity is old, and stale after `stale_s`. `torque_old_s` and `motion_old_s` are the ages above
-    which a reading is old, `old_memory_s` the memory of their share.
+    which a reading is old, `old_memory_s` the memory of their share. A torque sample that differs
+    by `wild_nm` from those around it may be wild.
     """
 
     interval_s: float
@@ -107,6 +108,7 @@ class ConsistencyLimits(NamedTuple):
     torque_old_s: float = math.inf
     motion_old_s: float = math.inf
     old_memory_s: float = OLD_MEMORY_S
+    wild_nm: float = math.inf
 
 
 class MeansState(NamedTuple):
@@ -160,6 +162,7 @@ def consistency_limits(settings: Settings) -> ConsistencyLimits:
         torque_old_s=old_s(rig.torque),
         motion_old_s=old_s(rig.motion),
         old_memory_s=max(OLD_MEMORY_S, OLD_MEMORY_STALES * guard.stale_s),
+        wild_nm=0.5 * guard.torque_limit_nm,
     )
 
 

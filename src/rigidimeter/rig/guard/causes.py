@@ -65,6 +65,7 @@ class Cause(IntEnum):
     SELDOM_FRESH = 35
     HELD_AT_LIMIT = 36
     TORQUE_DISAGREES = 37
+    TORQUE_WILD = 38
 
     @property
     def sentence(self) -> str:
@@ -119,9 +120,10 @@ _SENTENCES = {
     Cause.HELD_AT_LIMIT: "the joint was driven against the position limit for too long or too "
     "often: the subject pushes, or the torque has an offset or the wrong sign",
     Cause.TORQUE_DISAGREES: "the torque sensor did not agree with the drive's own torque",
+    Cause.TORQUE_WILD: "single torque samples were far from those before and after them",
 }
 
-_HOLD = {Cause.TORQUE_HIGH, Cause.POWER_HIGH, Cause.HELD_AT_LIMIT}
+_HOLD = {Cause.TORQUE_HIGH, Cause.POWER_HIGH, Cause.HELD_AT_LIMIT, Cause.TORQUE_WILD}
 _CUT = {Cause.EMERGENCY_STOP, Cause.OPERATOR_HALT}
 
 REACTIONS = tuple(

@@ -13,6 +13,8 @@ repeated   An angle that stays the same while the velocity beside it stays the s
            two may disagree, the reading is as old as its first repetition, whatever its stamp.
            Where zero is commanded the angle may be right: `agreement` then names the velocity.
 
+wild       Single torque samples are far from those around them: `wild_torque`.
+
 Like the control steps, a step only adds, multiplies, divides and compares. It knows nothing of the
 controller. The compiled batch does not take it: its drive and sensors are right by construction,
 so that nothing can be found.
@@ -27,6 +29,7 @@ from typing import NamedTuple
 from rigidimeter.rig.guard.agreement import ConsistencyLimits, MeansState, means_step
 from rigidimeter.rig.guard.causes import Cause
 from rigidimeter.rig.guard.torque_answer import answer_state
+from rigidimeter.rig.guard.wild_torque import WildState, wild_step
 
 _NO_CAUSE = int(Cause.NONE)
 
@@ -38,7 +41,8 @@ class ConsistencyState(NamedTuple):
     settled (NaN before), `same_s` how long angle and velocity have been `read_rad` and
     `read_rad_s`. The others are of the ticks since the last mean: how many passed, in how many of
     them the readings were old, how many were read and perturbed; sums of what was read, the stamps
-    from the last mean on, and by how much the motion was taken before the torque.
+    from the last mean on, and by how much the motion was taken before the torque. `wild` is of the
+    single torque samples.
     """
 
     means: MeansState
@@ -58,6 +62,7 @@ class ConsistencyState(NamedTuple):
     velocity_rad_s: float = 0.0
     stamp_s: float = 0.0
     before_s: float = 0.0
+    wild: WildState = WildState()
 
 
 def consistency_state(limits: ConsistencyLimits) -> ConsistencyState:
@@ -103,9 +108,11 @@ def consistency_step(
         state, unlike = ended(limits, state)  # the gap is no part of a mean with what was before
     means, still_s, held, read_rad, read_rad_s, same_s = state[:6]
     ticks, torque_old, motion_old, readings, perturbed = state[6:11]
-    perturbation, torque, angle, velocity, stamp_s, before_s = state[11:]
+    perturbation, torque, angle, velocity, stamp_s, before_s = state[11:17]
     if elapsed_ticks < 1:
         elapsed_ticks = 1
+    elapsed_s = elapsed_ticks * limits.interval_s
+    wild, of_sample = wild_step(state.wild, limits.wild_nm, torque_nm, torque_age_s, elapsed_s)
     found = _NO_CAUSE
     if angle_rad != read_rad or velocity_rad_s != read_rad_s:
         read_rad, read_rad_s, same_s = angle_rad, velocity_rad_s, 0.0
@@ -157,11 +164,14 @@ def consistency_step(
         velocity,
         stamp_s,
         before_s,
+        wild,
     )
     if ticks >= limits.mean_of_ticks and readings > 0:
         after, of_this = ended(limits, after)
         if unlike == _NO_CAUSE:
             unlike = of_this
+    if unlike == _NO_CAUSE:
+        unlike = of_sample
     return after, found if found != _NO_CAUSE else unlike
 
 
@@ -185,4 +195,5 @@ def ended(limits: ConsistencyLimits, state: ConsistencyState) -> tuple[Consisten
     )
     same = means, still_s, held, read_rad, read_rad_s, same_s
     # Every field: the compiler of `benchmarks.false_alarms` knows no defaults.
-    return ConsistencyState(*same, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), cause
+    sums = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    return ConsistencyState(*same, 0, 0, 0, 0, 0, *sums, state.wild), cause

@@ -68,6 +68,7 @@ def test_each_side_has_its_own_end_from_where_the_joint_stands():
     assert free.min() < -8.0
     assert free.max() > 8.0
     assert dict(sink.events)["rig_enabled"]["range_rad"] is None
+    assert dict(sink.events)["epoch_ended"]["counts"]["torque_wild"] == 0
     _, angles, sink = run((-3.0, 60.0))
     assert -3.01 < angles.min() < -2.5
     told = dict(sink.events)

@@ -217,6 +217,10 @@ def test_the_larger_of_two_is_told(cause, changed, field, expected):
     assert getattr(told(cause, **changed), field) == pytest.approx(expected)
 
 
+def test_wild_samples_are_told_with_the_time_of_three():
+    same(told(Cause.TORQUE_WILD), Found(3.0, 2.0, "samples within 1 s"))
+
+
 def test_the_third_arrival_is_told_with_the_time_that_three_took():
     guard = made(SETTINGS)[0].guard
     contact = guard.contact._replace(three_s=6.5)

@@ -96,3 +96,9 @@ def test_other_events_change_nothing():
     progress = told(started(1, "1"))
     assert progress_after(progress, {"event": "order", "command": "pause"}) is progress
     assert progress_after(progress, ended(2)) is progress
+
+
+def test_single_wild_samples_are_counted_up_to_the_last_epoch_that_ended():
+    assert told(started(1, "1"), ended(1)).wild_samples == 0  # an older record
+    counts = {"torque_lost": 3, "torque_wild": 2}
+    assert told(started(1, "1"), ended(1, counts=counts)).wild_samples == 2

@@ -314,7 +314,8 @@ def test_a_mean_is_of_the_ticks_with_readings_over_the_time_of_all():
     assert (state.means.angle_rad, state.means.velocity_rad_s) == pytest.approx((0.5 / 3, 1.0))
     # Read 1, 7 and 8 ms after the last mean, so 5.33 ms after it, 2.67 ms before its own end.
     assert state.means.since_s == pytest.approx(0.008 / 3)
-    assert state[6:] == (0,) * 5 + (0.0,) * 6
+    assert state[6:17] == (0,) * 5 + (0.0,) * 6
+    assert state.wild.fifth_nm == 6.0
 
 
 def test_no_reading_in_all_the_ticks_makes_no_mean():
@@ -371,6 +372,7 @@ def test_each_limit_is_the_settings_in_si_units():
             "torque_old_s": 0.003 + 3 * 0.011,
             "motion_old_s": 0.002 + 0.012,
             "old_memory_s": 1.0,
+            "wild_nm": 5.0,
         }
     )
 
@@ -391,7 +393,10 @@ def test_whatever_comes_the_state_stays_finite():
         drawn = rng.choice(values[:-1], 7).tolist()
         state, cause = consistency_step(limits, state, *drawn, int(rng.integers(-3, 200)))
         assert cause in set(Cause)
-        assert all(math.isfinite(value) for value in (state.still_s, *state[5:], *state.means[2:]))
+        assert all(
+            math.isfinite(value) for value in (state.still_s, *state[5:17], *state.means[2:])
+        )
+        assert math.isfinite(state.wild.usual_nm)
 
 
 def test_the_figures_of_the_laws_and_what_they_begin_with():
@@ -420,11 +425,13 @@ def test_the_figures_of_the_laws_and_what_they_begin_with():
         math.inf,
         math.inf,
         0.5,
+        math.inf,
     )
     state = consistency_state(NOTHING)
     assert state.still_s == 0.0
     assert all(map(math.isnan, (state.held_rad, state.read_rad, state.read_rad_s)))
-    assert state[5:] == (0.0, 7, 0, 0, 0, 0) + (0.0,) * 6
+    assert state[5:17] == (0.0, 7, 0, 0, 0, 0) + (0.0,) * 6
+    assert state.wild.count == 0
     assert math.isnan(state.means.angle_rad)
     assert state.means[2:] == (0.0,) * 12
 
