@@ -290,7 +290,7 @@ def _run_epoch(session: _Session, planned: PlannedEpoch) -> None:
         limited_ticks=ticks.limited_ticks,
         late_ticks=ticks.late_ticks,
         missed_ticks=ticks.missed_ticks,
-        counts={**session.rig.counts, "torque_wild": run.loop.consistency.wild.count},
+        counts={**session.rig.counts, "torque_wild": run.loop.consistency.wild.counted},
         **({"again_as": again.number} if again is not None else {}),
     )
     run.open_epoch = None

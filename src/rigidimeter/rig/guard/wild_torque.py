@@ -36,7 +36,7 @@ class WildState(NamedTuple):
 
     `first_nm` to `fifth_nm` are the newest, the fifth last (NaN before there were five), `age_s`
     is the age of the fifth. `usual_nm` is d, the mean of `averaged` samples. `last_s` and
-    `before_s` are how long ago the last two wild ones were found, `count` is the number of all.
+    `before_s` are how long ago the last two wild ones were found, `counted` is the number of all.
     """
 
     first_nm: float = math.nan
@@ -49,7 +49,7 @@ class WildState(NamedTuple):
     averaged: float = 0.0
     last_s: float = math.inf
     before_s: float = math.inf
-    count: int = 0
+    counted: int = 0
 
 
 def wild_step(
@@ -67,7 +67,7 @@ def wild_step(
     elapsed_s : float
         Since the step before.
     """
-    a, b, c, d, e, age_s, usual, averaged, last_s, before_s, count = state
+    a, b, c, d, e, age_s, usual, averaged, last_s, before_s, counted = state
     age_s, last_s, before_s = age_s + elapsed_s, last_s + elapsed_s, before_s + elapsed_s
     cause = int(Cause.NONE)
     one_sum = torque_nm + torque_age_s
@@ -75,7 +75,7 @@ def wild_step(
         a, b, c, d, e, age_s = b, c, d, e, torque_nm, torque_age_s
         difference = abs(c - median(a, b, c, d, e))
         if averaged >= FEW and difference > TIMES_USUAL * usual and difference > wild_nm:
-            count += 1
+            counted += 1
             if before_s <= THREE_S:
                 cause, last_s, before_s = int(Cause.TORQUE_WILD), math.inf, math.inf
             else:
@@ -83,7 +83,7 @@ def wild_step(
         elif difference >= 0.0:  # not so before there are five
             averaged = min(averaged + 1.0, MEMORY)
             usual += (difference - usual) / averaged
-    after = WildState(a, b, c, d, e, age_s, usual, averaged, last_s, before_s, count)
+    after = WildState(a, b, c, d, e, age_s, usual, averaged, last_s, before_s, counted)
     return after, cause
 
 

@@ -431,7 +431,7 @@ def test_the_figures_of_the_laws_and_what_they_begin_with():
     assert state.still_s == 0.0
     assert all(map(math.isnan, (state.held_rad, state.read_rad, state.read_rad_s)))
     assert state[5:17] == (0.0, 7, 0, 0, 0, 0) + (0.0,) * 6
-    assert state.wild.count == 0
+    assert state.wild.counted == 0
     assert math.isnan(state.means.angle_rad)
     assert state.means[2:] == (0.0,) * 12
 

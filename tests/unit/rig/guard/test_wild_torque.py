@@ -51,31 +51,31 @@ def test_the_median_of_five_whatever_their_order():
 def test_a_single_zero_counts_where_the_torque_is_above_half_the_limit(sign, true_nm, counted):
     torques = [sign * true_nm] * 10 + [0.0] + [sign * true_nm] * 10
     state, held = heard(torques)
-    assert (state.count, held) == (counted, [])
+    assert (state.counted, held) == (counted, [])
     # it is found when two more samples have come
-    assert heard(torques[:12])[0].count == 0
-    assert heard(torques[:13])[0].count == counted
+    assert heard(torques[:12])[0].counted == 0
+    assert heard(torques[:13])[0].counted == counted
 
 
 @pytest.mark.parametrize("every", [1, 10])
 def test_a_sample_that_is_read_again_counts_once(every):
     state, _ = heard([6.0] * 8 + [0.0] + [6.0] * 8, every=every)
-    assert state.count == 1
+    assert state.counted == 1
 
 
 def test_the_third_within_a_second_holds_and_the_count_goes_on():
     one = [6.0] * 19 + [0.0]
     state, held = heard(one * 10)
-    assert (state.count, held) == (9, [3 * 20 + 1, 6 * 20 + 1, 9 * 20 + 1])
+    assert (state.counted, held) == (9, [3 * 20 + 1, 6 * 20 + 1, 9 * 20 + 1])
     # 0.499 s apart the third comes within a second, 0.51 s apart after it
     assert len(heard(([6.0] * 498 + [0.0]) * 3 + [6.0] * 9)[1]) == 1
     state, held = heard(([6.0] * 509 + [0.0]) * 9)
-    assert (state.count, held) == (8, [])
+    assert (state.counted, held) == (8, [])
 
 
 def test_two_alike_count_and_three_are_the_joints_own():
-    assert heard([6.0] * 9 + [0.0] * 2 + [6.0] * 9)[0].count == 2
-    assert heard([6.0] * 9 + [0.0] * 3 + [6.0] * 9)[0].count == 0
+    assert heard([6.0] * 9 + [0.0] * 2 + [6.0] * 9)[0].counted == 2
+    assert heard([6.0] * 9 + [0.0] * 3 + [6.0] * 9)[0].counted == 0
 
 
 @pytest.mark.parametrize(
@@ -88,7 +88,7 @@ def test_two_alike_count_and_three_are_the_joints_own():
     ],
 )
 def test_what_a_joint_may_do_is_not_wild(torque):
-    assert heard([torque(k) for k in range(200)])[0].count == 0
+    assert heard([torque(k) for k in range(200)])[0].counted == 0
 
 
 def test_what_is_usual_for_these_samples_is_not_wild():
@@ -97,14 +97,14 @@ def test_what_is_usual_for_these_samples_is_not_wild():
     state, held = heard(noisy[:400], state=WildState())
     usual = [abs(noisy[k] - np.median(noisy[k - 2 : k + 3])) for k in range(200, 398)]
     assert state.usual_nm == pytest.approx(np.mean(usual), rel=0.15)
-    assert (heard(noisy, state=WildState())[0].count, held) == (0, [])
+    assert (heard(noisy, state=WildState())[0].counted, held) == (0, [])
     # the same spike is wild where little is usual
     quiet = 0.05 * noisy[:400]
     quiet[300] += 9.0
-    assert heard(quiet)[0].count == 1
+    assert heard(quiet)[0].counted == 1
     loud = noisy[:400].copy()
     loud[300] = 9.0
-    assert heard(loud, state=WildState())[0].count == 0
+    assert heard(loud, state=WildState())[0].counted == 0
 
 
 def test_of_the_first_samples_none_is_wild():
@@ -112,7 +112,7 @@ def test_of_the_first_samples_none_is_wild():
     for place, counted in ((21, 0), (22, 1)):
         torques = [6.0] * 30
         torques[place] = 0.0
-        assert heard(torques, state=WildState())[0].count == counted
+        assert heard(torques, state=WildState())[0].counted == counted
 
 
 def test_wild_samples_are_not_what_is_usual():
@@ -122,7 +122,7 @@ def test_wild_samples_are_not_what_is_usual():
 
 def test_a_number_that_is_none_is_left_out():
     torques = [6.0] * 9 + [math.nan, 0.0, math.inf] + [6.0] * 9
-    assert heard(torques)[0].count == 1
+    assert heard(torques)[0].counted == 1
     state, _ = wild_step(WildState(), WILD_NM, 6.0, math.nan, TICK_S)
     assert math.isnan(state.fifth_nm)
 
@@ -139,4 +139,4 @@ def test_it_is_one_of_the_laws_that_need_time():
     assert [k for k, cause in enumerate(causes) if cause] == [72]
     assert causes[72] == Cause.TORQUE_WILD
     assert Cause.TORQUE_WILD.reaction.name == "HOLD"
-    assert state.wild.count == 5
+    assert state.wild.counted == 5
