@@ -39,8 +39,10 @@ class Recorded(session_run.ControllerRun):
 
     kept: ClassVar[list[Recorded]] = []
 
-    def __init__(self, settings: Any, rig: Any, clock: Any, sink: Any, *others: Any) -> None:
-        super().__init__(settings, rig, clock, sink, *others)
+    def __init__(
+        self, settings: Any, rig: Any, clock: Any, sink: Any, *others: Any, **more: Any
+    ) -> None:
+        super().__init__(settings, rig, clock, sink, *others, **more)
         self.settings, self.samples, self.events = settings, [], []
         record, event = self.loop.record, sink.event
 

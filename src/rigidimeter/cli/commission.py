@@ -145,6 +145,7 @@ def _repeat(
     for line in differences(before, now):
         echo(f"{line[0].upper()}{line[1:]}.", err=True)
     path = repeated_path(rigfile.path)
+    keep_inputs((path,), (rigfile.path, record))
     asked = operator(yes=yes)
     with claimed(rigfile, settings, path, "repeat the checks", asked) as setup:
         found = repeat_checks(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from datetime import UTC, datetime
 
 import pytest
 
@@ -11,6 +12,18 @@ from rigidimeter.cli.commission import _check_known
 from rigidimeter.cli.emulate import _check_target
 from rigidimeter.cli.rig_checks import interrupted_once
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.settings import Settings
+from rigidimeter.rig.commissioning import (
+    MUST_PASS,
+    CommissioningRecord,
+    RigCheck,
+    covered,
+    program_identity,
+    record_path,
+    repeated_path,
+    write_record,
+)
+from rigidimeter.rig.devices import load_rig
 
 HARDWARE = """
 [torque_sensor]
@@ -44,6 +57,39 @@ def test_hardware_does_not_move_by_a_consent_that_nobody_gave(rigidimeter, tmp_p
     rig.write_text(HARDWARE)
     ran = rigidimeter("commission", "--rig", rig, "--yes", "--signed-by", "A. Weber")
     assert (ran.status, "is real hardware; somebody must check" in ran.err) == (1, True)
+
+
+def test_where_program_and_computer_are_those_of_the_record_nothing_is_repeated(
+    rigidimeter, tmp_path
+):
+    rig = tmp_path / "RIG.toml"
+    rig.write_text(HARDWARE)
+    again = ("commission", "--rig", rig, "--again", "--signed-by", "A. Weber")
+    ran = rigidimeter(*again)
+    assert (ran.status, "nobody can answer the questions" in ran.err) == (1, True)
+    emulated = HARDWARE.replace("192.168.1.1", "127.0.0.1").replace("socketcan", "virtual")
+    rig.write_text(emulated)
+    ran = rigidimeter(*again, "--yes")
+    assert (ran.status, "there is no such record" in ran.err) == (1, True)
+    rigfile, settings = load_rig(rig), Settings()
+    record = CommissioningRecord(
+        rig_name=rigfile.name,
+        rig_digest=rigfile.digest,
+        facts={},
+        covered=covered(settings),
+        checks=tuple(
+            RigCheck(name, 1.0, "s", "", "passed") for name in (*MUST_PASS, "stability with OFF")
+        ),
+        numbers={},
+        software="0.1",
+        made_utc=datetime.now(UTC).isoformat(),
+        emulated=True,
+        identity=program_identity(rigfile),
+    )
+    write_record(record_path(rig), record)
+    ran = rigidimeter(*again, "--yes")
+    assert (ran.status, "Nothing to repeat" in ran.out) == (0, True)
+    assert not repeated_path(rig).exists()
 
 
 @pytest.mark.parametrize("value", [0.0, float("nan"), float("inf")])
