@@ -84,6 +84,10 @@ def test_the_ticks_that_enabling_took_are_left_out():
     assert ran.sink.of("epoch_started")[0]["time_s"] == 0.5
 
 
+LIMIT_DEG = 3.0
+"""To which the epochs of these tests come, and not so often that the guard holds the arm for it."""
+
+
 def repeated_as(ran):
     """Return of each epoch the number of its repetition, as it is told at the epoch's end."""
     return [ended.get("again_as") for ended in ran.sink.of("epoch_ended")]
@@ -91,12 +95,12 @@ def repeated_as(ran):
 
 def test_an_epoch_in_which_a_limit_held_is_a_fail_and_repeated_last_if_wanted():
     protocol = {**VALUES["protocol"], "repeat_limited": True}
-    values = {"guard": {**VALUES["guard"], "position_limit_deg": 1.5}, "protocol": protocol}
+    values = {"guard": {**VALUES["guard"], "position_limit_deg": LIMIT_DEG}, "protocol": protocol}
     ran = session(values=values)
     assert ran.labels == ["1", "2", "1r", "2r"]
     assert [number for number, _ in ran.epochs] == [1, 2, 3, 4]
     assert {outcome for _, outcome in ran.epochs} == {"fail"}
-    assert "position limit of ±1.5 deg" in ran.sink.of("epoch_ended")[0]["reason"]
+    assert f"position limit of ±{LIMIT_DEG:g} deg" in ran.sink.of("epoch_ended")[0]["reason"]
     assert (ran.result.outcome, ran.result.epochs_run, ran.result.epochs_good) == ("success", 4, 0)
     assert repeated_as(ran) == [3, 4, None, None]
 
@@ -124,10 +128,10 @@ def test_a_sinusoid_is_what_the_settings_describe():
 
 
 def test_an_epoch_in_which_a_limit_held_is_a_fail_also_if_an_operator_ends_it():
-    values = {"guard": {**VALUES["guard"], "position_limit_deg": 1.5}}
+    values = {"guard": {**VALUES["guard"], "position_limit_deg": LIMIT_DEG}}
     ran = session(Desk(orders={48: Command.PAUSE_NOW, 100: Command.RESUME}), values=values)
     assert ran.epochs[0] == (1, "fail")
-    assert "position limit of ±1.5 deg" in ran.sink.of("epoch_ended")[0]["reason"]
+    assert f"position limit of ±{LIMIT_DEG:g} deg" in ran.sink.of("epoch_ended")[0]["reason"]
 
 
 def test_a_pause_waits_for_the_epoch_and_goes_back_once_it_is_resumed():
