@@ -4,7 +4,7 @@
 
 The guard's memory is its own from the first tick on. Taken from the record are what it was given:
 readings, stamps, the request, the perturbation, ticks that were missed, what loop and devices
-reported, and holds that the operator ended; and, after each tick, the velocity that was in force:
+reported, holds that the operator ended and ways back; and, after each tick, the velocity in force:
 what the drive made of the command, if it rounds it.
 
 Causes and limits must be those of the record at the same ticks. A command must be the one that was
@@ -188,6 +188,10 @@ def replay(
     ]
     knows_cause, knows_reported = "cause" in recorded, "reported_cause" in recorded
     latched_s = {event.get("time_s") for event in events if event.get("event") == "guard_latched"}
+    # Before each way back the loop releases its guard, whether or not it held the joint.
+    returns_s = [
+        float(event["time_s"]) for event in events if event.get("event") == "return_started"
+    ]
     halted_s = min(
         (
             float(event["time_s"])
@@ -223,10 +227,13 @@ def replay(
             break
         if not knows_reported:
             reported = cause if cause in LOOP or cause in DEVICES else _NONE
-        again = cause_before != _NONE and (cause == _NONE or time_s in latched_s)
-        if again and guard.reaction == Reaction.HOLD and guard.velocity_rad_s == 0.0:
-            guard = released(guard)
         due_s = tick / rate_hz
+        again = cause_before != _NONE and (cause == _NONE or time_s in latched_s)
+        while returns_s and due_s >= returns_s[0]:
+            again = True
+            returns_s.pop(0)
+        if again and guard.reaction <= Reaction.HOLD and guard.velocity_rad_s == 0.0:
+            guard = released(guard)
         before = guard.cause
         while zeroings and due_s >= zeroings[0][0]:
             torques = zeroed(torques, zeroings.pop(0)[1])
