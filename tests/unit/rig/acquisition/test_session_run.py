@@ -44,7 +44,7 @@ def test_a_session_runs_what_was_planned_tells_it_and_takes_the_power_away():
     assert ended == {
         **{"event": "epoch_ended", "epoch": 1, "time_s": 1.0, "outcome": "success", "reason": ""},
         **{"limited_ticks": ended["limited_ticks"], "late_ticks": 0, "missed_ticks": 0},
-        "counts": {"lost": 3},
+        "counts": {"lost": 3, "torque_wild": 0},
     }
     assert ran.rig.calls[0] == ("enable",)
     assert ran.rig.until_off[-2:] == [("write", 0.0), ("disable",)]
