@@ -8,6 +8,7 @@ import time
 import pytest
 from tests.wire.cia402_wire import Wire, run_loop, wire
 
+from rigidimeter.model import JointDynamics
 from rigidimeter.rig.devices import (
     BOUND_FACT,
     MOTOR_SPEED,
@@ -124,6 +125,42 @@ def test_a_bound_that_sleeps_reads_back_and_ends_nothing(wire, name):
     assert Cause(sample.cause) is Cause.NONE
     assert way > 0.8 * WAY
     assert fastest > 0.9 * SPEED_RAD_S
+
+
+def stopped_after_s(wire, bounds, **inertia):
+    """Return how long a quick stop from 2 rad/s takes with these bounds."""
+    drive = wire.drive(**{**INERTIA, **inertia}, quick_stop_rad_s2=60.0)
+    drive.bound(bounds)
+    drive.configure()
+    drive.enable()
+    run_loop(drive, 2.0, for_s=1.0, until=lambda s: s.velocity_rad_s > 1.9)
+    drive.stop()
+    run_loop(drive, for_s=1.5, until=lambda _: not math.isnan(wire.emulator.state()["stop_rest_s"]))
+    state = wire.emulator.state()
+    return state["stop_rest_s"] - state["stop_began_s"]
+
+
+def test_a_quick_stop_keeps_to_its_ramp_below_the_bound_of_the_torque(wire):
+    """2 rad/s at 60 rad/s² take 33 ms, and a drive of 50 Hz some ms more to be at rest.
+
+    (0.05 + 0.08) 60 + 0.3 = 8.1 N·m of the drive and the arm; the bound is 1.25 (8.1 + 20).
+    """
+    took_s = stopped_after_s(wire, BOUNDS)
+    print(f"\nwith the bound of the settings: at rest after {1e3 * took_s:.0f} ms")
+    assert took_s < 2.0 / 60.0 + 0.03
+
+
+def test_a_bound_for_a_lighter_drive_makes_the_quick_stop_longer(wire):
+    """0.9 · 1.25 · 0.01 · 120 = 1.35 N·m and 0.3 of friction brake 0.13 kg·m² by 12.7 rad/s².
+
+    So 1.9 rad/s take 0.15 s. The slippage is let go, which would name it first.
+    """
+    bounds = BOUNDS._replace(arm_inertia_kg_m2=0.0, stop_torque_nm=0.0)
+    wire.emulator._arm.joint = JointDynamics(0.08, 0.0, 0.0)
+    wire.emulator.misbehave("bound sleeps", 0x60F8)
+    took_s = stopped_after_s(wire, bounds, reflected_inertia_kg_m2=0.01, friction_nm=0.0)
+    print(f"\nwith the bound of a lighter drive: at rest after {1e3 * took_s:.0f} ms")
+    assert took_s == pytest.approx(1.9 * 0.13 / 1.65, abs=0.03)
 
 
 @pytest.fixture
