@@ -115,7 +115,10 @@ def test_an_effect_is_negligible_below_one_percent_and_half_the_interval(
     assert Effect(percent, half_intervals).negligible == negligible
 
 
-def test_an_effect_is_a_share_of_the_size_of_the_estimate_and_of_half_its_interval():
+def test_an_effect_is_a_share_of_what_the_estimate_would_be_without_it_and_of_half_its_interval():
+    """A B of 0.269 that holds 0.169 of friction is 169 % too high, not 63 %."""
+    (percent,) = {Effect.of((0.169,) * 3, (0.269,) * 3, (0.01,) * 3).percent[1]}
+    assert percent == pytest.approx(169.0)
     effect = Effect.of((-1e-4, 0.02, 0.0), (1e-3, -0.1, 2.0), (2e-4, 0.01, 0.1))
-    assert effect.percent == pytest.approx((-10.0, 20.0, 0.0))
+    assert effect.percent == pytest.approx((-100 / 11, 100 / 6, 0.0))
     assert effect.half_intervals == pytest.approx((-0.5, 2.0, 0.0))

@@ -36,6 +36,7 @@ def found(
     facts: Mapping[str, Fact] | None = None,
     variant: str = "",
     harmless: str = "",
+    excludes: bool = False,
 ) -> Finding:
     """Return a finding with the level of the settings.
 
@@ -53,12 +54,14 @@ def found(
     harmless : str
         The variant that says why it does not move J, B or K by more than their intervals; empty
         where it does.
+    excludes : bool
+        The numbers mean nothing: by default the epoch is excluded.
     """
     level = settings.levels.of(name)
     if level == default_level(name):
         if not harmless and effect.negligible:
             harmless = "negligible"
-        level = "note" if harmless else level
+        level = "exclude" if excludes else "note" if harmless else level
     else:
         harmless = ""
     named = " ".join(filter(None, (variant, harmless)))
@@ -74,7 +77,8 @@ def in_half_intervals(fit: Fit) -> Fit:
         percent, of_half = one.effect
         if not any(map(math.isfinite, percent)) or any(map(math.isfinite, of_half)):
             return one
-        bias = np.array(percent) / 100.0 * np.abs(fit.value)
+        share = np.array(percent) / 100.0
+        bias = np.abs(fit.value) * share / (1.0 + share)  # of what they would be without it
         return replace(one, effect=Effect.of(bias, fit.value, half_widths(fit)))
 
     return replace(fit, findings=tuple(map(completed, fit.findings)))

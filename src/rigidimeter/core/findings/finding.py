@@ -28,7 +28,7 @@ class Effect(NamedTuple):
     Attributes
     ----------
     percent : (float, float, float)
-        Of J, B and K.
+        Of J, B and K as they would be without it.
     half_intervals : (float, float, float)
         Of half their 95 % intervals.
     """
@@ -46,7 +46,7 @@ class Effect(NamedTuple):
             By how much J, B and K are too high; the estimates; half their 95 % intervals. In SI.
         """
         each = [*zip(bias, values, half, strict=True)]
-        percent = [100.0 * b / abs(v) if v else math.nan for b, v, _ in each]
+        percent = [100.0 * b / abs(v - b) if v != b else math.nan for b, v, _ in each]
         return cls(_three(percent), _three([b / h if h else math.nan for b, _, h in each]))
 
     @property

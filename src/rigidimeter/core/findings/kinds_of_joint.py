@@ -39,6 +39,15 @@ JOINT_KINDS = (
                 "first order, which so large a bias exceeds."
             },
             "negligible": OF_SUBJECT["negligible"],
+            "not_known": {
+                "headline": "Loop not known: a bias by it is not in the intervals",
+                "measured": "Neither settings nor a recorded perturbation or command say whether "
+                "the robot gives way to torque.",
+                "meaning": "If it does, torque from elsewhere biases least squares, and the "
+                "intervals do not include that. If it does not, nothing is missing.",
+                "remedy": "Where the robot gives way, say --controller, or record the perturbation "
+                "and use iv.",
+            },
         },
         example={"value": 180.0, "limit": 50.0, "percent_of": (-17.0, -16.0, -7.2)},
     ),
@@ -60,18 +69,15 @@ JOINT_KINDS = (
     ),
     Kind(
         "noise_of_motion",
-        "how many times smaller J or B is where each frequency counts by its noise than where all "
-        "count alike: noise of the motion that neighbouring samples share",
-        headline="Noise of the motion makes {symbol} {value:.2g} times smaller",
-        measured="Where each frequency counts by its noise, {symbol} is {value:.2g} times smaller "
-        "than where all count alike (at most {limit:g} times).",
-        meaning="Frequencies at which the motion is noise decide the fit, so its numbers mean "
-        "nothing.",
+        "noise of the motion in % of the motion that decides J or B: half the difference of what "
+        "even and odd samples give, each frequency by its weight",
+        headline="{value:.2g} % of the motion that decides {symbol} is noise",
+        measured="Even and odd samples of the motion differ by {value:.2g} % of what decides "
+        "{symbol} (at most {limit:g} %).",
+        meaning="Frequencies at which the motion is noise decide the fit.",
         remedy="Use a better motion sensor, a larger perturbation, or --band-hz to end the band "
         "where the motion ends.",
-        unit="1",
-        level="exclude",
-        example={"value": 66.0, "limit": 3.0, "symbol": "J"},
+        example={"value": 66.0, "limit": 50.0, "symbol": "J"},
     ),
     Kind(
         "voluntary_torque",

@@ -76,8 +76,9 @@ class DiagnosticLevels(create_model("Levels", __base__=Section, **_LEVELS)):  # 
     The names and defaults are those of the kinds of findings.
 
     By default a check excludes the epoch if it shows that a channel did not measure or that the
-    numbers are meaningless. A negative or unlikely parameter does not: leaving out epochs because
-    of their result shifts the median of the others.
+    numbers are meaningless, as where J, B and K are all below zero: the torque's sign is wrong. One
+    negative or unlikely parameter does not: leaving out epochs because of their result shifts the
+    median of the others.
     """
 
     def of(self, name: str) -> Level:

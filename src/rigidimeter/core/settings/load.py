@@ -119,7 +119,8 @@ def changed_settings(
         As `parse_settings`; the sentence begins with `source`.
     """
     changes = _renamed(changes, source)
-    return parse_settings(_merged(dump_settings(settings), changes), source=source)
+    stated = settings.model_dump(mode="json", exclude_unset=True)  # a default stays one
+    return parse_settings(_merged(stated, changes), source=source)
 
 
 def _renamed(values: Mapping[str, Any], source: str) -> dict[str, Any]:

@@ -171,6 +171,16 @@ def controller_used(prepared: PreparedEpoch) -> Loop:
     return loop if shown is None else replace(loop, controller=shown)
 
 
+def loop_known(prepared: PreparedEpoch) -> bool:
+    """Whether the loop that the epoch ran in is known: recorded, or stated in the settings.
+
+    The controller's defaults are the paper's, which are no reason to think that a robot gave way.
+    """
+    recorded = ("perturbation_nm", "velocity_command_rad_s")
+    stated = "controller" in prepared.settings.model_fields_set
+    return stated or any(name in prepared.epoch.channels for name in recorded)
+
+
 def controller_shown(prepared: PreparedEpoch, loop: Loop) -> ControllerSettings | None:
     """Return the controller that makes the recorded command, if there is one."""
     made = command_made(prepared.epoch, loop)

@@ -104,8 +104,8 @@ class Misfit(NamedTuple):
     ----------
     low_hz, high_hz : float
     share : float
-        Of the torque's response to the perturbation, what follows it beyond the model, less what
-        noise would leave; 0 to 1 and beyond.
+        Of the torque that answers the perturbation, what the model does not explain, less what
+        noise would leave.
     p : float
         Probability of as much from noise alone.
     """
@@ -139,7 +139,8 @@ def proportional(answers: Sequence[Answer]) -> list[Misfit]:
         # The mean of |h|², less what noise leaves: groups count by how well h is known in them, or
         # a tremor in one would be the mean.
         beyond = float(np.sum(answered[part])) - numerator * noise
-        share = float(np.sqrt(max(beyond, 0.0) / np.sum(excited[part])))
+        whole = np.abs(1.0 + factor[part]) ** 2 * excited[part]
+        share = float(np.sqrt(max(beyond, 0.0) / np.sum(whole)))
         last = frequency[starts[part[-1]] + sizes[part[-1]] - 1]
         found.append(Misfit(float(frequency[starts[part[0]]]), float(last), share, float(p)))
     return found
@@ -160,7 +161,8 @@ def repeated(answers: Sequence[Answer]) -> list[Misfit]:
     white = turned / np.sqrt(power)
     mean, frequency = white.mean(0), answers[0].frequency_hz
     scatter = np.sum(np.abs(white - mean) ** 2, axis=0) / (count - 1)
-    size = np.mean([np.abs(answer.response_nm) ** 2 for answer in answers], axis=0)
+    at_zero = [answer.response_nm * toward_zero_phase(answer.response_nm) for answer in answers]
+    size = np.abs(np.mean(at_zero, axis=0) + np.mean(turned, axis=0)) ** 2
     found = []
     for part in _parts(frequency, frequency[-1]):
         m = part.size

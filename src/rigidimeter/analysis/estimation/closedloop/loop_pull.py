@@ -35,7 +35,9 @@ DIVERGED = 1e3
 def loop_pull(
     problems: Sequence[Problem], powers: Sequence[Array], values: Array, inverse: Array
 ) -> Array:
-    """Return b, shape (p,); 0 for instruments, NaN where no joint fits recording and loop.
+    """Return b, shape (p,); NaN where no joint fits recording and loop.
+
+    It is 0 for instruments, and where no loop is known, so that b is not either.
 
     Parameters
     ----------
@@ -48,9 +50,10 @@ def loop_pull(
         G⁻¹.
     """
     bias = np.zeros(values.size)
-    if any(problem.observation.excitation is not None for problem in problems):
+    observations = [problem.observation for problem in problems]
+    if any(one.excitation is not None or one.loop is None for one in observations):
         return bias
-    opened = [_opened(problem.observation) for problem in problems]
+    opened = [_opened(one) for one in observations]
     for _ in range(ITERATIONS):
         moment = np.zeros(values.size)
         for problem, power, loop in zip(problems, powers, opened, strict=True):
@@ -76,6 +79,6 @@ def _opened_at(loop: Loop, first: int, count: int, spacing_hz: float) -> OpenLoo
 
 def _opened(observation: Observation) -> OpenLoop:
     loop, grid = observation.loop, observation.grid
-    assert loop is not None  # `observe_motion` gives it
+    assert loop is not None  # else there is no b
     spacing_hz = float(f"{grid.rate_hz / grid.time_s.size:.9g}")
     return _opened_at(loop, int(grid.line[0]), grid.line.size, spacing_hz)

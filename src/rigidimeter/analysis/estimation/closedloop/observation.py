@@ -75,7 +75,8 @@ class Observation:
     sent : Sent or None
     loop : Loop or None
         That the epoch ran in, by the settings and the drive that the recording shows; where the
-        perturbation is not used also with the controller that it shows.
+        perturbation is not used also with the controller that it shows. None where no loop is
+        known.
     perturbation : Channel or None
         At every tick; None where it is not used.
     excitation : Excitation or None

@@ -20,6 +20,7 @@ from rigidimeter.analysis.estimation.closedloop.between_samples import (
 )
 from rigidimeter.analysis.estimation.closedloop.controller_used import (
     controller_used,
+    loop_known,
     loop_shown,
 )
 from rigidimeter.analysis.estimation.closedloop.epoch_motion import EpochMotion
@@ -152,8 +153,9 @@ def _observed(
     wider: Grid | None = None,
     motion: EpochMotion | None = None,
 ) -> Observation:
+    loop: Loop | None
     if perturbation is None:
-        made, loop = None, controller_used(prepared)
+        made, loop = None, controller_used(prepared) if loop_known(prepared) else None
     else:
         loop = loop_shown(prepared)
         made = _excitation(prepared, perturbation, loop, grid)

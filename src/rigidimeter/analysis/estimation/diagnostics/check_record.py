@@ -168,7 +168,8 @@ class Look(NamedTuple):
 
     `value` and `limit` are in the unit of the kind of finding; `failed` says whether the value is
     on the wrong side; one that is not a number is. `facts` are what else the words show, and
-    `variant` which words they are.
+    `variant` which words they are. `excludes` says that the numbers mean nothing, although others
+    of the kind may not.
     """
 
     value: float
@@ -178,6 +179,7 @@ class Look(NamedTuple):
     variant: str = ""
     effect: Effect = UNKNOWN_EFFECT
     p: float = math.nan
+    excludes: bool = False
 
 
 @dataclass(frozen=True)
@@ -203,6 +205,8 @@ class Check:
     effect : callable
         From a `Case` in which the check failed to what that does to J, B and K, where the look
         does not say it.
+    may_exclude : bool
+        Whether a look may say `excludes`.
     """
 
     name: str
@@ -211,6 +215,7 @@ class Check:
     of_fit: bool = True
     harmless: Callable[[Case, Look], Harmless] = lambda case, look: HARMFUL
     effect: Callable[[Case], Effect] = lambda case: UNKNOWN_EFFECT
+    may_exclude: bool = False
 
     def looks(self, case: Case) -> Look | None:
         """Return what the check sees, or None where it lacks what it needs."""
@@ -231,6 +236,7 @@ class Check:
             facts={**look.facts, **why, **(method if variant == "instrument" else {})},
             variant=look.variant,
             harmless=variant,
+            excludes=look.excludes,
         )
 
 

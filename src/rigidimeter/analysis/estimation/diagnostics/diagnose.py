@@ -108,7 +108,11 @@ def checked(
         delay=next((delay for delay in delays if delay.source == fit.source), None),
     )
     levels = case.settings.levels
-    checks = [c for c in CHECKS if not exclusions_alone or levels.of(c.name) == "exclude"]
+    checks = [
+        one
+        for one in CHECKS
+        if not exclusions_alone or one.may_exclude or levels.of(one.name) == "exclude"
+    ]
     findings = diagnose(case, prepared.once(_seen_without_fit), checks)
     serious = [finding for finding in findings if finding.level == "exclude"]
     outcome = fit.outcome

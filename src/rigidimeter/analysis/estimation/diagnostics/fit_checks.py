@@ -130,7 +130,9 @@ def negative_parameters(parameters: Array, high: Array | None = None) -> Look:
     variant = ""
     if len(wrong) == len(parameters):
         variant = "noise" if high is not None and np.any(np.asarray(high) > 0) else "reaction"
-    return Look(float(len(wrong)), 0.0, bool(wrong), {"names": " and ".join(wrong)}, variant)
+    facts = {"names": " and ".join(wrong)}
+    reaction = variant == "reaction"
+    return Look(float(len(wrong)), 0.0, bool(wrong), facts, variant, excludes=reaction)
 
 
 def implausible_parameters(parameters: Array, settings: DiagnosticsSettings) -> Look:
@@ -230,6 +232,7 @@ PARAMETER_CHECKS = (
         "negative_parameters",
         (),
         lambda c: negative_parameters(c.parameters, None if c.fit is None else c.fit.high),
+        may_exclude=True,
     ),
     Check("implausible_parameters", (), lambda c: implausible_parameters(c.parameters, c.settings)),
 )

@@ -24,7 +24,14 @@ from rigidimeter.analysis.estimation.closedloop.loop_pull import loop_pull
 from rigidimeter.analysis.estimation.closedloop.normal_equations import scaled_inverse, sums
 from rigidimeter.analysis.estimation.closedloop.observe import observe_motion
 from rigidimeter.analysis.estimation.closedloop.refine import shared_powers
-from rigidimeter.analysis.estimation.diagnostics.check_record import Case, Check, Look, too_biased
+from rigidimeter.analysis.estimation.diagnostics.check_record import (
+    HARMFUL,
+    Case,
+    Check,
+    Harmless,
+    Look,
+    too_biased,
+)
 from rigidimeter.analysis.estimation.found import half_widths
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.estimation.signals import Array
@@ -38,12 +45,14 @@ STANDARD_ERRORS = 4.0
 PULL_SHARE = 0.5
 """And by this share of b₀, which is computed from the residual of one epoch."""
 
-TIMES_SMALLER = 3.0
-"""No reflex, friction or cuff makes J or B so many times smaller where lines are weighted."""
+MOST_NOISE = 50.0
+"""In %. Then as much of what decides J or B is noise as is motion."""
 
 
-def unbiased(prepared: PreparedEpoch, fit: Fit, by_noise: bool) -> Array:
+def unbiased(prepared: PreparedEpoch, fit: Fit, by_noise: bool) -> Array | None:
     """Return J, B and K by least squares without the pull of the loop; NaN where it is too large.
+
+    None where no loop is known.
 
     Parameters
     ----------
@@ -54,6 +63,8 @@ def unbiased(prepared: PreparedEpoch, fit: Fit, by_noise: bool) -> Array:
         Or all lines count alike.
     """
     observation = prepared.once(observe_motion)
+    if observation.loop is None:
+        return None
     problems = direct([observation], fit.value)
     if by_noise:
         values, powers = fit.value, shared_powers(problems, fit.value)
@@ -125,30 +136,46 @@ def unweighted_fit(case: Case) -> Look | None:
 
 
 def noise_of_motion(case: Case) -> Look | None:
-    """Return how many times smaller weights make J or B.
+    """Return how much of the motion that decides J or B is noise, in %.
 
-    Noise of the motion that neighbouring samples share is motion without torque. Weights that let
-    lines of such noise decide make J and B small, and then these lines fit best.
+    Half the difference of what even and odd samples give is the noise of their mean. With its power
+    |n|² and that of the motion |φ|², both weighted, the share is Σ |n|²/S ÷ Σ |φ|²/S. What
+    neighbouring samples share, as behind a filter, it does not show.
     """
-    found = case.once(_unweighted)
-    if found is None:
+    if case.fit is None or case.prepared is None or not case.bias_in_interval:
         return None
-    apart = np.abs(found.values - case.parameters)[:2]
-    factor = np.abs(found.values / case.parameters)[:2]
-    factor[apart <= found.allowed[:2]] = 0.0
-    about = int(np.argmax(factor))
-    value = float(factor[about])
-    return Look(value, TIMES_SMALLER, value > TIMES_SMALLER, {"symbol": "JB"[about]})
+    if case.uses_perturbation:
+        return None
+    observation = case.prepared.once(observe_motion)
+    if observation.noise is None:
+        return None
+    (power,) = shared_powers(direct([observation], case.parameters), case.parameters)
+    of_noise, of_motion = (
+        np.sum(np.abs(lines[:, :2]) ** 2 / power[:, None], axis=0)
+        for lines in (observation.noise, observation.motion)
+    )
+    share = 100.0 * of_noise / of_motion
+    about = int(np.argmax(share))
+    value = float(share[about])
+    return Look(value, MOST_NOISE, value > MOST_NOISE, {"symbol": "JB"[about]})
 
 
 def _loop_bias(case: Case) -> Look | None:
-    if case.fit is None or case.unbiased is None:
+    if case.fit is None or case.uses_perturbation or case.prepared is None:
         return None
+    if case.unbiased is None:
+        return Look(np.nan, case.settings.max_loop_bias_percent, True)
     return loop_bias(case.fit, case.unbiased, case.bias_in_interval, case.settings)
 
 
+def _not_known(case: Case, look: Look) -> Harmless:
+    """Return the variant for a loop that is not known: a note, since nothing is computed."""
+    del look
+    return ("not_known", {}) if case.unbiased is None else HARMFUL
+
+
 LEAST_SQUARES_CHECKS = (
-    Check("loop_bias", (), _loop_bias),
+    Check("loop_bias", (), _loop_bias, harmless=_not_known),
     Check("unweighted_fit", (), unweighted_fit),
     Check("noise_of_motion", (), noise_of_motion),
 )

@@ -121,8 +121,8 @@ def missing_term(case: Case) -> Look | None:
     if len(found.terms) > 1:
         variants = "several"
         for term, (by_fit, *_) in zip(found.terms, alone, strict=True):
-            percent = 100 * by_fit / np.abs(case.parameters)
-            for symbol, one in zip("JBK", percent.tolist(), strict=True):
+            percent = Effect.of(by_fit, case.parameters, case.half_widths).percent
+            for symbol, one in zip("JBK", percent, strict=True):
                 facts[f"{symbol}_percent_of_{term.name}"] = one
     if _little_friction(case, found.terms):
         variants = "of_drive"

@@ -239,7 +239,11 @@ def _pooled_bias(
     if not own:
         return []
     by_noise, settings = estimator.by_noise, own[0][0].settings.diagnostics
-    bias = np.mean([one.value - unbiased(p, one, by_noise) for p, one in own], axis=0)
+    known = [(one, unbiased(p, one, by_noise)) for p, one in own]
+    biases = [one.value - without for one, without in known if without is not None]
+    if not biases:
+        return []  # no loop is known, as the epochs say
+    bias = np.mean(biases, axis=0)
     look = loop_bias(fit, fit.value - bias, by_noise, settings)
     if not look.failed:
         return []

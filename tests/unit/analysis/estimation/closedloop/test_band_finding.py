@@ -40,7 +40,7 @@ def test_a_band_that_contradicts_is_told():
     )
     assert (facts["error"], facts["of_half"]) == pytest.approx((0.1, 1.2))
     assert found.p == pytest.approx(3e-6)
-    assert found.effect.percent == pytest.approx((0.0, 0.0, 6.0))
+    assert found.effect.percent == pytest.approx((0.0, 0.0, 6.0 / 0.94))
     assert found.effect.half_intervals == pytest.approx((0.0, 0.0, 1.2))
 
 

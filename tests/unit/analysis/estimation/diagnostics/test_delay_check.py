@@ -49,7 +49,7 @@ def test_its_effect_is_what_a_move_of_the_torque_changes(subject):
     then = estimate([earlier], "bandlimited", settings=late.analysed_with())
     (fit,), (moved,) = first.fits, then.fits
     (finding,) = [one for one in fit.findings if one.name == "torque_delay"]
-    changed = 100 * (1 - moved.value / fit.value)
+    changed = 100 * (fit.value / moved.value - 1)
     np.testing.assert_allclose(finding.effect.percent, changed, rtol=0.1, atol=0.3)
 
 

@@ -83,7 +83,8 @@ def test_a_bias_of_the_loop_below_a_percent_and_the_interval_is_a_note():
         unbiased = value * [1.0, 1.0, 1 - percent / 100]
         look = loop_bias(fit, unbiased, False, DiagnosticsSettings())
         assert look.failed
-        assert look.effect.percent == pytest.approx((0.0, 0.0, percent))
+        beside = percent / (1 - percent / 100)
+        assert look.effect.percent == pytest.approx((0.0, 0.0, beside))
         assert look.effect.half_intervals == pytest.approx((0.0, 0.0, percent))
         finding = made(
             "loop_bias", DiagnosticsSettings(), look.value, look.limit, effect=look.effect

@@ -47,7 +47,8 @@ def test_a_term_is_named_and_its_bias_told(method, term):
     assert finding.level == "caution"
     asked = f"inertia,{'' if term == 'directional damping' else 'damping,'}stiffness,"
     assert term == "coupling" or finding.facts["asked"].startswith(asked)
-    included = fit.value * (1.0 - np.array(finding.effect.percent) / 100.0)
+    # The effect is a share of what the parameter is beside the term.
+    included = fit.value / (1.0 + np.array(finding.effect.percent) / 100.0)
     error, corrected = fit.value / truth - 1, included / truth - 1
     for i in range(3):
         assert abs(corrected[i]) < max(0.4 * abs(error[i]), 0.06), "JBK"[i]
