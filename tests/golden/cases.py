@@ -141,7 +141,7 @@ epochs = 2
 """
 PUSHING = "[subject.OFF]\nvoluntary_sd_nm = 0.2\n"
 SLOW = "[guard]\nspeed_limit_deg_s = 12.0\n"
-NARROW = "[guard]\nposition_limit_deg = 6.0\n[sinusoid]\namplitude_deg = 5.0\n"
+NARROW = "[guard]\nposition_limit_deg = 10.0\n[sinusoid]\namplitude_deg = 5.0\n"
 SINUSOID = "[sinusoid]\nmotion_s = 6.0\nduration_s = 7.0\n[scores]\ncycles = 4\n"
 
 

@@ -112,7 +112,8 @@ class Recordings:
     controller: tuple[float, float] | None = ESTIMATE.further(
         "--controller J_C B_C",
         "Inertia in kg·m² and damping in N·m·s/rad of the admittance, for files without a "
-        "manifest. Default: those of the settings, else the paper's. A wrong value makes iv less "
+        "manifest. Default: those of the settings, else the paper's where the perturbation or the "
+        "command was recorded, and else no loop is assumed. A wrong value makes iv less "
         "precise but does not bias it.",
     )
     settings: Path | None = SETTINGS
