@@ -37,6 +37,7 @@ protocol.blocks = [
 ]
 """
 WIDTH, HEIGHT, REPORT_HEIGHT, LIST_HEIGHT = 1100, 860, 1080, 1120
+FORM_HEIGHT = 960
 COLOURS = 256
 ATTEMPTS = 6
 SCORES = {2: "2", 3: "2", 4: "1,5", 5: "1", 6: "1,5"}
@@ -91,7 +92,7 @@ def pictures(folder: Path, sessions: Path) -> None:
                            "stim_ma": "2,5", "stim_width": "60"}.items():  # fmt: skip
             fill(page, key, value)
         page.wait_for_timeout(1000)
-        take(page, folder, "form")
+        take(page, folder, "form", FORM_HEIGHT)
         start(page, operator="Kim")
         in_epoch(page, "1 of 6")
         page.wait_for_timeout(SEEN_MS)
