@@ -184,7 +184,7 @@ def _torque(
     if thousandths > LARGEST_THOUSANDTHS:
         why = f"{torque_nm:.4g} N·m are more than {LARGEST_THOUSANDTHS} ‰ of the rated torque"
         return Wanted(TORQUE, alternatives(1000), "", why)
-    words = f"{torque_nm:.4g} N·m, {thousandths} ‰ of {rated_nm:.4g}"
+    words = f"{torque_nm:.4g} N·m, {thousandths} ‰ of the rated {rated_nm:.4g} N·m"
     return Wanted(TORQUE, alternatives(thousandths), words, "", torque_nm, ramp)
 
 
