@@ -25,7 +25,7 @@ from rigidimeter.core.session import (
     rest_of,
 )
 from rigidimeter.core.settings import Settings, changed_settings, load_settings
-from rigidimeter.planning import plan
+from rigidimeter.planning import Dose, dose_objection, dose_reached, plan
 from rigidimeter.rig.acquisition.processes import (
     Ended,
     Realtime,
@@ -94,6 +94,11 @@ class PlannedSession:
         entered = replace(entered, subject=str(self.about.get("subject", "")))
         return replace(self, about={**self.about, "range": entered.facts()})
 
+    @property
+    def dose_before(self) -> Dose:
+        """What the sessions did that this one continues."""
+        return Dose.of_record(self.continues.get("dose", {}))
+
     def blinded(self) -> PlannedSession:
         """Return the session with codes for its conditions, which one that has them keeps."""
         if self.about.get("codes"):
@@ -151,8 +156,11 @@ def checked_rig(planned: PlannedSession, rig: Path | None) -> PlannedSession:
     Raises
     ------
     UserError
-        If the rig was not commissioned or not checked, or another program has it.
+        If the protocol asks for more than the dose of one session, or the rig was not commissioned
+        or not checked, or another program has it.
     """
+    if too_much := _beyond_dose(planned):
+        raise UserError(f"{planned.source or 'the session'}: {too_much}")
     if rig is None:
         # Imported late: it loads what only a check needs.
         from rigidimeter.cli.virtual_check import measured_drive_side
@@ -200,6 +208,15 @@ def _require_range(
     found.require_inside(commissioned.numbers, str(record_path(where)))
 
 
+def _beyond_dose(planned: PlannedSession) -> str:
+    """Return why it must not begin; one that is continued runs until its dose is reached."""
+    limits, protocol = planned.settings.dose, planned.protocol
+    if not planned.continues:
+        return dose_objection(limits, protocol)
+    first_s = protocol.epochs[0].duration_s + protocol.return_s
+    return dose_reached(limits, planned.dose_before, first_s)
+
+
 def run_planned(
     planned: PlannedSession,
     out: Path,
@@ -229,6 +246,7 @@ def run_planned(
             home_rad,
             range_rad,
             drive_model=planned.drive_model,
+            dose_before=planned.dose_before,
         ),
         recording,
         realtime=realtime,

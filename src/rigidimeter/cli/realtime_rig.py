@@ -12,6 +12,7 @@ from rigidimeter.cli.output import echo
 if TYPE_CHECKING:
     from rigidimeter.core.session import PlannedEpoch, Protocol
     from rigidimeter.core.settings import Settings
+    from rigidimeter.planning import Dose
     from rigidimeter.rig.acquisition import DeadlineClock
     from rigidimeter.rig.acquisition.processes import LoopSide
     from rigidimeter.rig.devices.base import Rig
@@ -29,6 +30,7 @@ def run_loop(
     range_rad: tuple[float, float] | None,
     side: LoopSide,
     drive_model: DriveModel | None = None,
+    dose_before: Dose | None = None,
 ) -> None:
     """Run a session; the target of the loop's process.
 
@@ -47,13 +49,18 @@ def run_loop(
     drive_model : DriveModel, optional
         Of the drive's side; without it the guard does not compare the torque sensor with the
         drive's own torque.
+    dose_before : Dose, optional
+        What the session did that this one continues.
     """
     from rigidimeter.rig.acquisition import DeadlineClock
 
     clock = DeadlineClock()
     if rig_path is None:
         rig, new_joint = virtual_rig(settings, protocol)
-        _run(settings, protocol, rig, new_joint, clock, side, lambda _: (), range_rad, drive_model)
+        _run(
+            *(settings, protocol, rig, new_joint, clock, side, lambda _: ()),
+            *(range_rad, drive_model, dose_before),
+        )
         return
     # What is slow to load is loaded before the sensor's samples flow.
     from rigidimeter.rig.commissioning import check_record, require_daily_check
@@ -71,7 +78,10 @@ def run_loop(
     with rigfile.claim() as lock:
         bounds = drive_bounds(settings, range_rad)
         rig = rigfile.build(clock.now_s, settings.rig.tick_rate_hz, home, lock, bounds)
-        _run(settings, protocol, rig, lambda _: {}, clock, side, approve, range_rad, drive_model)
+        _run(
+            *(settings, protocol, rig, lambda _: {}, clock, side, approve),
+            *(range_rad, drive_model, dose_before),
+        )
 
 
 def _run(
@@ -84,8 +94,10 @@ def _run(
     approve: Callable[[Mapping[str, Any]], Sequence[str]],
     range_rad: tuple[float, float] | None,
     drive_model: DriveModel | None,
+    dose_before: Dose | None,
 ) -> None:
     """Set up the rig and run; `approve` refuses it or says which checks were never made."""
+    from rigidimeter.planning import NO_DOSE
     from rigidimeter.rig.acquisition import run_session
 
     try:
@@ -108,6 +120,7 @@ def _run(
             before_epoch=new_joint,
             supervision=side.supervision,
             zero_first=True,
+            dose_before=dose_before or NO_DOSE,
             state_changed=side.sink.state_changed,
             watch=side.sink.watch,
             range_rad=range_rad,

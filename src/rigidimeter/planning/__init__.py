@@ -17,6 +17,14 @@ from rigidimeter.planning.days_needed import (
     planned_epochs,
 )
 from rigidimeter.planning.document import DESIGN_SCHEMA, design_document
+from rigidimeter.planning.dose import (
+    NO_DOSE,
+    Dose,
+    dose_objection,
+    dose_part,
+    dose_reached,
+    dose_words,
+)
 from rigidimeter.planning.joint_bandwidth import (
     APPENDIX_A,
     CONTROLLER_INERTIA_KG_M2,

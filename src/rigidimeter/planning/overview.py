@@ -29,6 +29,7 @@ from rigidimeter.planning.days_needed import (
     detect,
     planned_epochs,
 )
+from rigidimeter.planning.dose import dose_objection
 from rigidimeter.planning.joint_bandwidth import APPENDIX_A, Corners, Forearm, corners
 from rigidimeter.planning.motion_demand import (
     Demand,
@@ -252,6 +253,10 @@ def design(
     sinusoid_demand = demand(angle_rad, velocity_rad_s, rate_hz, guard)
     warnings = [*beyond_limits("the sinusoid", sinusoid_demand, guard), *too_few_cycles(chosen)]
 
+    protocol = plan(chosen.protocol, chosen.prbs, chosen.sinusoid, chosen.seed)
+    if too_much := dose_objection(chosen.dose, protocol):
+        warnings.append(too_much)
+
     joints: dict[str, JointDynamics | None] = {"free arm": None}
     for condition, subject in chosen.subject.items():
         joints[f"subject {condition}"] = median_joint(subject)
@@ -276,7 +281,7 @@ def design(
         velocity_rad_s=velocity_rad_s,
         band=check_band(chosen.prbs, rate_hz),
         bandwidth=corners(forearm.arm() if forearm else APPENDIX_A),
-        protocol=plan(chosen.protocol, chosen.prbs, chosen.sinusoid, chosen.seed),
+        protocol=protocol,
         planned_epochs=planned_epochs(chosen),
         sinusoid_demand=sinusoid_demand,
         prbs_demand=prbs_demand,

@@ -43,7 +43,7 @@ def test_prints_the_numbers() -> None:
         "damping, N·m·s/deg 0.02800",
         "time constant, s 0.02857",
         "task prbs sinusoid condition OFF OFF epochs 4 4",
-        "total, s 280.0",
+        "total, s 304.0",
         "stays within the guard's limits",
     ):
         assert expected in words
@@ -81,7 +81,7 @@ def test_writes_what_will_be_commanded(tmp_path: Path) -> None:
     assert document["schema"] == DESIGN_SCHEMA == "rigidimeter.design/2"
     assert document["prbs"]["covered"] is True
     assert len(document["bandwidth"]["corners"]) == 8
-    assert document["protocol"]["total_s"] == 280.0
+    assert document["protocol"]["total_s"] == 304.0
     assert document["controller"]["inertia_kg_m2_per_deg"] == pytest.approx(0.0008)
     assert document["controller"]["damping_nm_s_deg"] == pytest.approx(0.028)
 

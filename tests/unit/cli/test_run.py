@@ -12,6 +12,7 @@ import pytest
 
 from rigidimeter.cli.attendance import attendance
 from rigidimeter.cli.page_session import lead_session
+from rigidimeter.cli.planned_session import PlannedSession, checked_rig
 from rigidimeter.cli.realtime_rig import HOME_TOLERANCE_RAD
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import SessionWriter
@@ -33,7 +34,7 @@ counts_per_turn = 1000
 """
 
 
-CHECKED = SimpleNamespace(reference=None)
+CHECKED = SimpleNamespace(reference=None, numbers={})
 
 
 class BuiltError(Exception):
@@ -330,3 +331,27 @@ def test_a_session_on_the_page_runs_only_while_the_page_is_there(tmp_path, monke
     assert lead_session(state, StartRequest("s", settings), Realtime(), lambda: None) is None
     assert told["operator_seen_ns"] == state.operator_seen_ns
     assert state.finished.sentences == ("that is enough",)
+
+
+def test_a_protocol_beyond_the_dose_of_a_session_is_refused_before_any_process_starts(
+    tmp_path, rigidimeter
+):
+    protocol = tmp_path / "long.toml"
+    protocol.write_text("[dose]\nepochs = 3\n[[protocol.blocks]]\nepochs = 4\n")
+    ran = rigidimeter("run", protocol, "--out", tmp_path / "s")
+    assert ran.status == 1
+    assert "long.toml: the protocol has 4 epochs, more than dose.epochs = 3" in ran.err
+    assert not (tmp_path / "s").exists()
+
+
+@pytest.mark.parametrize(("epochs", "words"), [(2, ""), (3, "3 epochs were run, the most of one")])
+def test_a_session_is_continued_until_its_dose_is_reached(tmp_path, epochs, words):
+    settings = parse_settings({"dose": {"epochs": 3}})
+    protocol = plan(settings.protocol, settings.prbs, settings.sinusoid, 1)
+    continues = {"dose": {"epochs": epochs, "motion_s": 0.0, "arrivals": 0}}
+    planned = PlannedSession(settings, protocol, continues=continues)
+    if words:
+        with pytest.raises(UserError, match=words):
+            checked_rig(planned, None)
+    else:
+        assert checked_rig(planned, None).protocol == protocol

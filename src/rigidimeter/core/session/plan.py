@@ -123,7 +123,8 @@ class Rest:
         Whether it was recorded on the virtual rig.
     continues : dict
         What the manifest of the new session says of the old one; its `origin_rad`, where it is
-        known, is where the joint stood when the first of them was begun.
+        known, is where the joint stood when the first of them was begun, and its `dose` what all of
+        them have done.
     about : dict
         What the operator said of subject, condition and stimulation.
     """
@@ -188,9 +189,17 @@ def rest_of(folder: Path) -> Rest:
             "session_id": manifest.get("session_id", ""),
             "created_utc": manifest["created_utc"],
             **origin,
+            **_dose(manifest, ended),
         },
         dict(manifest.get("about", {})),
     )
+
+
+def _dose(manifest: Mapping[str, Any], ended: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return what was done up to the last epoch, with the sessions before, where it was counted."""
+    counted = [manifest.get("continues", {}), *ended]
+    doses = [found["dose"] for found in counted if isinstance(found.get("dose"), dict)]
+    return {"dose": doses[-1]} if doses else {}
 
 
 def again(folder: Path, number: int) -> Rest:

@@ -11,6 +11,7 @@ from rigidimeter.core.settings.estimation_settings import (
 )
 from rigidimeter.core.settings.experiment_settings import (
     BlockSettings,
+    DoseSettings,
     MarginsSettings,
     PrbsSettings,
     ProtocolSettings,

@@ -82,6 +82,19 @@ class ProtocolSettings(Section):
         return self
 
 
+class DoseSettings(Section):
+    """The most of one session, with those that it continues.
+
+    No epoch begins beyond `epochs`, nor one that would take the motion, of epochs and returns,
+    beyond `motion_min`. At the arrival of number `arrivals` at the position limit the session ends
+    at once.
+    """
+
+    epochs: int = quantity(120, "1", 1, 100000)
+    motion_min: float = quantity(60.0, "min", 0.1, 10000.0)
+    arrivals: int = quantity(30, "1", 1, 100000)
+
+
 class MarginsSettings(Section):
     """How far the loop must stay from instability, and for which joints.
 

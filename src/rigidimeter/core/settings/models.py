@@ -20,6 +20,7 @@ from rigidimeter.core.settings.estimation_settings import (
     ScoreSettings,
 )
 from rigidimeter.core.settings.experiment_settings import (
+    DoseSettings,
     MarginsSettings,
     MultisineSettings,
     OptimiseSettings,
@@ -121,6 +122,7 @@ class Settings(Section):
         }
     )
     protocol: ProtocolSettings = ProtocolSettings()
+    dose: DoseSettings = DoseSettings()
     estimation: EstimationSettings = EstimationSettings()
     scores: ScoreSettings = ScoreSettings()
     margins: MarginsSettings = MarginsSettings()

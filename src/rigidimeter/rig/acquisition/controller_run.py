@@ -152,6 +152,13 @@ class ControllerRun:
         """
         if self.stopped_by_guard():
             return False
+        if self.loop.dose_reached:
+            self.outcome = "fail"
+            self.reason = (
+                f"the arm came to its position limit {self.loop.arrivals} times, the most of one "
+                "session (dose.arrivals)"
+            )
+            return False
         if self.loop.reaction is Reaction.NONE or self.is_in(State.STOPPING):
             return True
         if self._supervision.attended:

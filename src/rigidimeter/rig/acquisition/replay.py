@@ -188,10 +188,6 @@ def replay(
     ]
     knows_cause, knows_reported = "cause" in recorded, "reported_cause" in recorded
     latched_s = {event.get("time_s") for event in events if event.get("event") == "guard_latched"}
-    # Before each way back the loop releases its guard, whether or not it held the joint.
-    returns_s = [
-        float(event["time_s"]) for event in events if event.get("event") == "return_started"
-    ]
     halted_s = min(
         (
             float(event["time_s"])
@@ -229,9 +225,6 @@ def replay(
             reported = cause if cause in LOOP or cause in DEVICES else _NONE
         due_s = tick / rate_hz
         again = cause_before != _NONE and (cause == _NONE or time_s in latched_s)
-        while returns_s and due_s >= returns_s[0]:
-            again = True
-            returns_s.pop(0)
         if again and guard.reaction <= Reaction.HOLD and guard.velocity_rad_s == 0.0:
             guard = released(guard)
         before = guard.cause

@@ -12,7 +12,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import Ending, PlannedEpoch, Protocol
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.units import rad_from_deg
-from rigidimeter.planning import prbs_nm, sinusoid
+from rigidimeter.planning import NO_DOSE, Dose, dose_reached, prbs_nm, sinusoid
 from rigidimeter.rig.acquisition.clock import Clock
 from rigidimeter.rig.acquisition.control_modes import (
     follow,
@@ -39,7 +39,7 @@ from rigidimeter.rig.acquisition.supervision import Sink, Supervision
 from rigidimeter.rig.acquisition.tick import ControlLoop, zero_torque
 from rigidimeter.rig.acquisition.zeroing import bias_and_noise, motion_objection
 from rigidimeter.rig.devices.base import Reading, Rig
-from rigidimeter.rig.guard import Cause, DriveModel, why_ended
+from rigidimeter.rig.guard import Cause, DriveModel, Reaction, why_ended
 
 BeforeEpoch = Callable[[PlannedEpoch], Mapping[str, Any]]
 
@@ -75,8 +75,13 @@ class _Session:
     perturbation_nm: list[float]
     angle_rad: list[float]
     velocity_rad_s: list[float]
+    dose: Dose
     epochs_run: int = 0
     epochs_good: int = 0
+
+    def dose_with_arrivals(self) -> Dose:
+        """Return the dose so far; what the session before did is in it."""
+        return self.dose._replace(arrivals=self.run.loop.arrivals)
 
 
 def run_session(
@@ -90,6 +95,7 @@ def run_session(
     progress: Callable[[float], None] = lambda _: None,
     supervision: Supervision | None = None,
     zero_first: bool = False,
+    dose_before: Dose = NO_DOSE,
     state_changed: Callable[[Run], None] = lambda _: None,
     watch: Callable[[ControlLoop], None] = lambda _: None,
     range_rad: tuple[float, float] | None = None,
@@ -117,6 +123,8 @@ def run_session(
         Where orders and causes from other processes come from; nobody if not given.
     zero_first : bool
         Whether to zero the torque sensor, and check its noise, before the first epoch.
+    dose_before : Dose
+        Of the session that this one continues.
     state_changed : callable
         Called whenever the run changes its state.
     watch : callable
@@ -144,7 +152,10 @@ def run_session(
         prbs_nm(settings.prbs, rate_hz).tolist(),
         angle_rad.tolist(),
         velocity_rad_s.tolist(),
+        dose_before,
     )
+    run.loop.arrivals_before = dose_before.arrivals
+    run.loop.most_arrivals = settings.dose.arrivals
     sink.event("session_started", time_s=0.0)
     if drive_model is not None:
         sink.event("drive_model", **drive_model._asdict())
@@ -182,10 +193,12 @@ def _run_epochs(session: _Session) -> None:
     """Run what is in the queue, pausing where asked."""
     run = session.run
     while session.queue and _ready_for_epoch(session):
+        if _dose_is_reached(session):
+            return
         planned = session.queue.popleft()
         _run_epoch(session, planned)
         run.change_state(epoch_over(run.run))
-        if not run.may_go_on():
+        if not run.may_go_on() or (session.queue and _dose_is_reached(session)):
             return
         if run.is_in(State.RUNNING):
             if not _go_back(session):
@@ -196,6 +209,15 @@ def _run_epochs(session: _Session) -> None:
                 rest(run.loop, planned.rest_s, _return_speed_rad_s(session))
                 if not run.may_go_on():
                     return
+
+
+def _dose_is_reached(session: _Session) -> bool:
+    """End the session where the next epoch would go beyond the dose; return whether that is so."""
+    next_s = session.queue[0].duration_s + session.settings.protocol.return_s
+    why = dose_reached(session.settings.dose, session.dose_with_arrivals(), next_s)
+    if why:
+        session.run.reason = f"{why}; {len(session.queue)} epochs are left"
+    return bool(why)
 
 
 def _ready_for_epoch(session: _Session) -> bool:
@@ -226,7 +248,8 @@ def _go_back(session: _Session) -> bool:
             return False
     if not run.is_in(State.RUNNING):
         return run.may_go_on()
-    release(loop)
+    if loop.reaction is Reaction.HOLD:  # no release without one: the guard would forget arrivals
+        release(loop)
     if not run.run.stop_next:
         speed_rad_s = _return_speed_rad_s(session)
         duration_s = return_duration_s(loop.angle_rad, protocol.return_s, speed_rad_s)
@@ -237,8 +260,15 @@ def _go_back(session: _Session) -> bool:
             duration_s=duration_s,
         )
         run.begin(Phase.RETURN)
+        began_s = loop.time_s
         go_back(loop, duration_s, speed_rad_s)
+        _moved(session, began_s)
     return run.may_go_on()
+
+
+def _moved(session: _Session, since_s: float) -> None:
+    motion_s = session.dose.motion_s + session.run.loop.time_s - since_s
+    session.dose = session.dose._replace(motion_s=motion_s)
 
 
 def _return_speed_rad_s(session: _Session) -> float:
@@ -272,6 +302,7 @@ def _run_epoch(session: _Session, planned: PlannedEpoch) -> None:
     )
     run.open_epoch = planned.number
     run.begin(Phase.EPOCH)
+    began_s = run.loop.time_s
     if planned.task == "prbs":
         ticks = perturb(run.loop, planned.number, session.perturbation_nm)
     else:
@@ -280,6 +311,8 @@ def _run_epoch(session: _Session, planned: PlannedEpoch) -> None:
     ending: Ending = "fail" if why else "success"
     if ticks.interrupted and not why:
         ending, why = "abort", "ended by the operator"
+    _moved(session, began_s)
+    session.dose = session.dose._replace(epochs=session.dose.epochs + 1)
     again = _repetition(session, planned, ending)
     sink.event(
         "epoch_ended",
@@ -291,6 +324,7 @@ def _run_epoch(session: _Session, planned: PlannedEpoch) -> None:
         late_ticks=ticks.late_ticks,
         missed_ticks=ticks.missed_ticks,
         counts={**session.rig.counts, "torque_wild": run.loop.consistency.wild.counted},
+        dose=session.dose_with_arrivals()._asdict(),
         **({"again_as": again.number} if again is not None else {}),
     )
     run.open_epoch = None

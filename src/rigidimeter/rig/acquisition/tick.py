@@ -142,6 +142,8 @@ class ControlLoop:
         self.late_ticks = self.missed_ticks = 0
         self.limited_ticks = 0
         self.limit_time_s = math.nan
+        self.arrivals_before, self.most_arrivals = 0, math.inf
+        self.dose_reached = False
         self.angle_rad = 0.0
         self.phase = Phase.HOLD
         self.stop: StopReport | None = None
@@ -165,6 +167,11 @@ class ControlLoop:
     def reaction(self) -> Reaction:
         """What the guard's cause asks for."""
         return Reaction(self.guard.reaction)
+
+    @property
+    def arrivals(self) -> int:
+        """How often the arm came to its position limit, in the session that is continued too."""
+        return self.arrivals_before + self.guard.contact.arrivals
 
     @property
     def at_rest(self) -> bool:
@@ -210,6 +217,8 @@ def run_ticks(
 ) -> TickResult:
     """Run for the time of `n` ticks, or until the guard latches or an operator ends it.
 
+    An arm that has arrived at its position limit too often ends it too.
+
     Parameters
     ----------
     loop : ControlLoop
@@ -232,6 +241,9 @@ def run_ticks(
             if loop.stop is None:  # of several causes the first
                 loop.stop = report_stop(latched_tick(loop, loop.sample))
                 loop.latched(loop.stop, loop.sample.time_s)
+            break
+        if loop.dose_reached:
+            interrupted = True
             break
         order = loop.supervision.order()
         if order.command is not Command.NONE and loop.take_order(order):
@@ -327,8 +339,8 @@ def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: i
         loop.guard = loop.guard._replace(velocity_rad_s=sent)
     if limited:
         loop.limited_ticks += 1
-        if limited == POSITION_LIMITED and not loop.limit_time_s <= due_s:
-            loop.limit_time_s = due_s
+        if limited == POSITION_LIMITED:
+            _at_limit(loop, due_s)
     if math.isfinite(angle):
         loop.angle_rad = angle
     loop.sample = sample = Sample(
@@ -357,6 +369,13 @@ def run_tick(loop: ControlLoop, epoch: int, k: int, command: Controller, last: i
     )
     loop.record(sample)
     return k
+
+
+def _at_limit(loop: ControlLoop, due_s: float) -> None:
+    """Take note that the position limit held a command back."""
+    if not loop.limit_time_s <= due_s:
+        loop.limit_time_s = due_s
+    loop.dose_reached = loop.arrivals >= loop.most_arrivals
 
 
 def _miss(loop: ControlLoop, ticks: int) -> int:

@@ -16,8 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.core.settings import GuardSettings, Settings
+from rigidimeter.core.settings import DoseSettings, GuardSettings, Settings
 from rigidimeter.core.units import deg_from_rad
+from rigidimeter.planning import NO_DOSE, Dose, dose_part, dose_words
 from rigidimeter.rig.acquisition.processes import ROW, LoopStatus, ProcessCondition
 from rigidimeter.rig.guard import Cause, Limited
 
@@ -217,6 +218,7 @@ def all_indicators(
     recorder: RecorderState,
     session_left_s: float,
     caution: str = "",
+    dose: Dose = NO_DOSE,
 ) -> tuple[Indicator, ...]:
     """Return the indicators, in the order in which they are shown."""
     sensor = _reading("sensor", "torque", recent, recent.torque_age_s, settings.guard.stale_s)
@@ -229,11 +231,12 @@ def all_indicators(
         _lateness(settings, loop, recent),
         _recorder(settings, recorder),
         _disk(settings, recorder, session_left_s),
+        _dose(settings.dose, dose),
     )
     cause = Cause(loop.cause)
     return tuple(
         Indicator(indicator.name, Level.BAD, cause.sentence)
-        if cause in _OF_INDICATOR[indicator.name]
+        if cause in _OF_INDICATOR.get(indicator.name, ())
         else indicator
         for indicator in made
     )
@@ -306,3 +309,8 @@ def _disk(settings: Settings, recorder: RecorderState, session_left_s: float) ->
             "disk", Level.WATCH, f"{words}; the session may need {needed / 1e9:.1f} GB more"
         )
     return Indicator("disk", Level.GOOD, words)
+
+
+def _dose(limits: DoseSettings, dose: Dose) -> Indicator:
+    level = Level.WATCH if dose_part(limits, dose) >= NEAR else Level.GOOD
+    return Indicator("dose", level, dose_words(limits, dose))

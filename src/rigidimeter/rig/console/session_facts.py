@@ -186,6 +186,7 @@ def facts(
             recorder,
             left_s,
             "; ".join(filter(None, (caution, _wild(progress)))),
+            progress.dose,
         ),
         cause=Cause(loop.cause),
         stop_words=_stop_words(progress, loop),

@@ -12,6 +12,7 @@ from typing import Any
 
 from rigidimeter.core.session import PlannedEpoch
 from rigidimeter.core.settings import Settings
+from rigidimeter.planning import NO_DOSE, Dose
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,8 @@ class Progress:
         How the session ended; empty as long as it runs.
     wild_samples : int
         Single torque samples far from those around them, up to the last epoch that ended.
+    dose : Dose
+        What was done up to the last epoch, with the session that this one continues.
     """
 
     to_run: tuple[PlannedEpoch, ...]
@@ -111,6 +114,7 @@ class Progress:
     outcome: str = ""
     reason: str = ""
     wild_samples: int = 0
+    dose: Dose = NO_DOSE
 
 
 def progress_at_start(epochs: tuple[PlannedEpoch, ...]) -> Progress:
@@ -186,4 +190,5 @@ def _ended(progress: Progress, event: Mapping[str, Any]) -> Progress:
         running=False,
         ended=(*progress.ended, ended),
         wild_samples=event.get("counts", {}).get("torque_wild", 0),
+        dose=Dose.of_record(event.get("dose", progress.dose._asdict())),
     )

@@ -146,3 +146,22 @@ def test_what_was_said_of_the_subject_goes_on(tmp_path):
     writer = SessionWriter(tmp_path / "s", SETTINGS, planned, {}, virtual=True, about=about)
     writer.close(1.0, "abort", "aborted by the operator")
     assert rest_of(tmp_path / "s").about == about
+
+
+@pytest.mark.parametrize("counted", [True, False])
+def test_what_a_session_has_done_is_passed_on_to_the_one_that_continues_it(tmp_path, counted):
+    """That of its last epoch, which holds what came before; else that of the session before."""
+    before = {"epochs": 4, "motion_s": 80.0, "arrivals": 1}
+    planned = [asdict(epoch) for epoch in EPOCHS]
+    continues = {"dose": before}
+    writer = SessionWriter(tmp_path / "s", SETTINGS, planned, {}, virtual=True, continues=continues)
+    done = {"epochs": 5, "motion_s": 103.0, "arrivals": 1}
+    if counted:
+        ending = {"time_s": 1.0, "outcome": "success", "reason": "", "dose": done}
+        writer.event("epoch_ended", epoch=1, **ending)
+    writer.close(1.0, "abort", "aborted by the operator")
+    assert rest_of(tmp_path / "s").continues["dose"] == (done if counted else before)
+
+
+def test_a_session_of_before_counts_no_dose(session):
+    assert "dose" not in rest_of(session("s")).continues

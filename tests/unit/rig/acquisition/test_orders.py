@@ -183,8 +183,8 @@ def test_parameters_change_within_bounds_without_a_bump_and_are_logged(tmp_path)
 
 def test_an_epoch_at_the_limit_is_run_again_at_the_end_if_wanted(tmp_path):
     values = {
-        "guard": {"position_limit_deg": 3.0, "reaction_time_s": 0.03},
-        "protocol": {**VALUES["protocol"], "repeat_limited": True},
+        "guard": {"position_limit_deg": 8.0, "reaction_time_s": 0.03},
+        "protocol": {**VALUES["protocol"], "repeat_limited": True, "rests_s": [5.0]},
         "sinusoid": {"amplitude_deg": 1.0},
     }
     _, events, _ = run(tmp_path / "s", Desk(), values=values)

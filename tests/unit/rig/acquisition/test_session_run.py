@@ -17,9 +17,9 @@ from tests.unit.rig.acquisition.whole_session import (
 )
 
 from rigidimeter.core.settings import parse_settings
-from rigidimeter.planning import prbs_nm
+from rigidimeter.planning import NO_DOSE, Dose, prbs_nm
 from rigidimeter.rig.acquisition import REMEDIES, Command, Order, SessionResult, State
-from rigidimeter.rig.guard import Cause
+from rigidimeter.rig.guard import Cause, Limited
 
 # As planned
 
@@ -45,6 +45,7 @@ def test_a_session_runs_what_was_planned_tells_it_and_takes_the_power_away():
         **{"event": "epoch_ended", "epoch": 1, "time_s": 1.0, "outcome": "success", "reason": ""},
         **{"limited_ticks": ended["limited_ticks"], "late_ticks": 0, "missed_ticks": 0},
         "counts": {"lost": 3, "torque_wild": 0},
+        "dose": {"epochs": 1, "motion_s": 1.0, "arrivals": 0},
     }
     assert ran.rig.calls[0] == ("enable",)
     assert ran.rig.until_off[-2:] == [("write", 0.0), ("disable",)]
@@ -84,23 +85,20 @@ def test_the_ticks_that_enabling_took_are_left_out():
     assert ran.sink.of("epoch_started")[0]["time_s"] == 0.5
 
 
-LIMIT_DEG = 3.0
-"""To which the epochs of these tests come, and not so often that the guard holds the arm for it."""
-
-
 def repeated_as(ran):
     """Return of each epoch the number of its repetition, as it is told at the epoch's end."""
     return [ended.get("again_as") for ended in ran.sink.of("epoch_ended")]
 
 
 def test_an_epoch_in_which_a_limit_held_is_a_fail_and_repeated_last_if_wanted():
-    protocol = {**VALUES["protocol"], "repeat_limited": True}
-    values = {"guard": {**VALUES["guard"], "position_limit_deg": LIMIT_DEG}, "protocol": protocol}
+    # One arrival in each, three of them in more than 10 s.
+    protocol = {**VALUES["protocol"], "repeat_limited": True, "rests_s": [5.0]}
+    values = {"guard": {**VALUES["guard"], "position_limit_deg": 6.5}, "protocol": protocol}
     ran = session(values=values)
     assert ran.labels == ["1", "2", "1r", "2r"]
     assert [number for number, _ in ran.epochs] == [1, 2, 3, 4]
     assert {outcome for _, outcome in ran.epochs} == {"fail"}
-    assert f"position limit of ±{LIMIT_DEG:g} deg" in ran.sink.of("epoch_ended")[0]["reason"]
+    assert "position limit of ±6.5 deg" in ran.sink.of("epoch_ended")[0]["reason"]
     assert (ran.result.outcome, ran.result.epochs_run, ran.result.epochs_good) == ("success", 4, 0)
     assert repeated_as(ran) == [3, 4, None, None]
 
@@ -128,10 +126,10 @@ def test_a_sinusoid_is_what_the_settings_describe():
 
 
 def test_an_epoch_in_which_a_limit_held_is_a_fail_also_if_an_operator_ends_it():
-    values = {"guard": {**VALUES["guard"], "position_limit_deg": LIMIT_DEG}}
-    ran = session(Desk(orders={48: Command.PAUSE_NOW, 100: Command.RESUME}), values=values)
+    values = {"guard": {**VALUES["guard"], "position_limit_deg": 2.5}}
+    ran = session(Desk(orders={48: Command.PAUSE_NOW, 100: Command.STOP}), values=values)
     assert ran.epochs[0] == (1, "fail")
-    assert f"position limit of ±{LIMIT_DEG:g} deg" in ran.sink.of("epoch_ended")[0]["reason"]
+    assert "position limit of ±2.5 deg" in ran.sink.of("epoch_ended")[0]["reason"]
 
 
 def test_a_pause_waits_for_the_epoch_and_goes_back_once_it_is_resumed():
@@ -436,3 +434,65 @@ def test_ended_while_the_arm_still_comes_to_rest_no_epoch_begins(causes, orders,
     ran = session(desk, values={"guard": guard})
     assert ran.sink.samples[52].velocity_command_rad_s != 0.0
     assert (ran.result.outcome, ran.labels) == (outcome, ["1"])
+
+
+# The dose
+
+
+def test_what_was_done_is_counted_with_each_epoch():
+    ran = session(dose_before=Dose(5, 30.0, 1))
+    first, second = (event["dose"] for event in ran.sink.of("epoch_ended"))
+    assert first == {"epochs": 6, "motion_s": pytest.approx(31.0), "arrivals": 1}
+    # An epoch of 1 s and a return of 0.5 s; neither the stop before it nor the rest counts.
+    assert second == {"epochs": 7, "motion_s": pytest.approx(32.5), "arrivals": 1}
+
+
+@pytest.mark.parametrize(
+    ("dose", "before", "words"),
+    [
+        ({"epochs": 1}, NO_DOSE, "1 epochs were run, the most of one session (dose.epochs)"),
+        ({"epochs": 4}, Dose(3, 0.0, 0), "4 epochs were run"),
+        ({"motion_min": 0.1}, Dose(0, 3.6, 0), "longer than"),
+    ],
+)
+def test_a_session_ends_after_the_epoch_with_which_its_dose_is_reached(dose, before, words):
+    words = words if words != "longer than" else "with another epoch for more than 0.1 min"
+    ran = session(values={"dose": dose}, dose_before=before)
+    assert (ran.result.outcome, ran.epochs) == ("success", [(1, "success")])
+    assert words in ran.result.reason
+    assert ran.result.reason.endswith("1 epochs are left")
+    assert ran.sink.of("return_started") == []
+    assert ran.rig.until_off[-1] == ("disable",)
+
+
+def test_a_dose_that_is_just_enough_for_the_protocol_changes_nothing():
+    ran = session(values={"dose": {"epochs": 2}})
+    assert (ran.result.outcome, ran.result.reason, len(ran.epochs)) == ("success", "", 2)
+
+
+def test_a_session_that_has_had_its_dose_runs_no_epoch():
+    ran = session(values={"dose": {"epochs": 2}}, dose_before=Dose(2, 0.0, 0))
+    assert (ran.labels, ran.result.outcome) == ([], "success")
+    assert "2 epochs were run" in ran.result.reason
+
+
+@pytest.mark.parametrize("before", [0, 2])
+def test_a_session_ends_at_once_when_the_arm_came_to_its_limit_too_often(before):
+    guard = {**VALUES["guard"], "position_limit_deg": 1.5}
+    values = {"guard": guard, "dose": {"arrivals": before + 1}}
+    ran = session(values=values, dose_before=Dose(0, 0.0, before))
+    at_limit = next(s for s in ran.sink.samples if s.limited == Limited.POSITION)
+    epoch = [s.tick for s in ran.sink.samples if s.epoch == 1]
+    assert epoch[-1] == at_limit.tick < EPOCH - 1
+    assert (ran.result.outcome, ran.epochs) == ("fail", [(1, "fail")])
+    assert f"came to its position limit {before + 1} times" in ran.result.reason
+    assert ran.sink.of("epoch_ended")[0]["dose"]["arrivals"] == before + 1
+    assert ran.rig.until_off[-1] == ("disable",)
+
+
+def test_the_guard_remembers_arrivals_at_the_limit_from_one_epoch_to_the_next():
+    """One in each epoch, the third within 10 s: a return without a hold releases nothing."""
+    protocol = {**VALUES["protocol"], "blocks": [{"epochs": 3}]}
+    values = {"guard": {**VALUES["guard"], "position_limit_deg": 6.5}, "protocol": protocol}
+    ran = session(Desk(attended=False), values=values)
+    assert (ran.labels, ran.result.cause) == (["1", "2", "3"], Cause.HELD_AT_LIMIT)

@@ -175,7 +175,8 @@ def lit(loop=RUNNING, recent=QUIET, recorder=WELL, energy_j=0.5, left_s=60.0):
 
 def test_all_lamps_are_good_and_say_what_they_know():
     found = lit()
-    assert list(found) == ["limits", "sensor", "drive", "lateness", "recorder", "disk"]
+    lamps = ["limits", "sensor", "drive", "lateness", "recorder", "disk", "dose"]
+    assert list(found) == lamps
     assert {indicator.level for indicator in found.values()} == {Level.GOOD}
     assert found["limits"].words == "angle 10.0 of 40 deg (25 %)"
     assert found["sensor"].words == "torque 1 ms old, limit 100 ms"
@@ -184,7 +185,19 @@ def test_all_lamps_are_good_and_say_what_they_know():
     )
     assert found["recorder"].words == "0.1 s of samples wait, limit 2 s"
     assert found["disk"].words == "40.0 GB free, 0 s not yet on the disk"
+    assert found["dose"].words == (
+        "0 of 120 epochs, 0.0 of 60 min of motion, 0 of 30 arrivals at the position limit"
+    )
     assert len({level.sign for level in Level}) == len(Level)
+
+
+@pytest.mark.parametrize(("epochs", "level"), [(95, Level.GOOD), (96, Level.WATCH)])
+def test_the_dose_of_the_last_epoch_is_shown_and_near_its_limit_asks_for_attention(epochs, level):
+    done = {"epochs": epochs, "motion_s": 60.0, "arrivals": 2}
+    progress = told(started(1, "1"), ended(1, dose=done))
+    dose = next(one for one in shown(progress).indicators if one.name == "dose")
+    assert dose.level is level
+    assert dose.words.startswith(f"{epochs} of 120 epochs, 1.0 of 60 min of motion, 2 of 30")
 
 
 @pytest.mark.parametrize(
