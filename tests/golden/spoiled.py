@@ -86,20 +86,22 @@ def narrow(columns: Columns) -> None:
 
 
 def noise_of_the_angle(columns: Columns) -> None:
-    """White noise of 3 mrad beside slow motion of 30 mrad."""
-    _noise_beside_slow_motion(columns, lambda noise: noise)
+    """White noise of 3 mrad beside motion of 30 mrad below 1 Hz, in which J hardly shows."""
+    _noise_beside_slow_motion(columns, 1.0, lambda noise: noise)
 
 
 def filtered_noise_of_the_angle(columns: Columns) -> None:
     """Noise of 3 mrad that went through a filter of 50 Hz, beside slow motion of 30 mrad."""
     _noise_beside_slow_motion(
-        columns, lambda noise: signal.lfilter(*signal.butter(2, 50.0, fs=RATE_HZ), noise)
+        columns, 8.0, lambda noise: signal.lfilter(*signal.butter(2, 50.0, fs=RATE_HZ), noise)
     )
 
 
-def _noise_beside_slow_motion(columns: Columns, through: Callable[[object], object]) -> None:
+def _noise_beside_slow_motion(
+    columns: Columns, below_hz: float, through: Callable[[object], object]
+) -> None:
     noise = np.random.default_rng(8).normal(size=(2, columns["time_s"].size))
-    slow = signal.butter(2, [0.3, 8.0], "bandpass", fs=RATE_HZ, output="sos")
+    slow = signal.butter(2, [0.3, below_hz], "bandpass", fs=RATE_HZ, output="sos")
     angle = signal.sosfiltfilt(slow, noise[0])
     _follow(columns, 0.03 * angle / angle.std())
     added = through(noise[1])
