@@ -68,6 +68,10 @@ FAULTS: dict[int, tuple[str, str, str]] = {
          "guard: does the torque answer the motion", "S1"),
     27: ("torque pauses for 95 ms of every 100, 30 of every 60",
          "guard: share of the time with an old reading", "S1"),
+    28: ("an offset drives the arm to its position limit again and again",
+         "guard: time at the limit, arrivals there", "SH"),
+    29: ("one torque of twenty is zero, above half the torque limit",
+         "guard: single samples far from those around them", "SH"),
 }  # fmt: skip
 """Fault, what detects it, reaction: S0, S1 and SH as in the document."""
 
@@ -76,6 +80,7 @@ NOT_CARRIED = {
     (5, "virtual"): "no packets",
     (9, "virtual"): VIRTUAL_CANNOT,
     (24, "rdt_ascii"): "a move that ended is held in position",
+    **{(fault, rig): "the law is the same" for fault in (28, 29) for rig in RIGS[1:]},
 }
 """Why a rig cannot have a fault."""
 

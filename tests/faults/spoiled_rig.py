@@ -104,6 +104,9 @@ class SpoiledRig:
             ready = len(self._past) > habits["late"] * self.rate_hz
             torque_nm = self._past.popleft() if ready else self._past[0]
         torque_nm *= habits.get("gain", 1.0)
+        torque_nm += habits.get("offset", 0.0)
+        if "zeros" in habits:  # a subject who pushes, and a sensor that drops one sample of twenty
+            torque_nm = torque_nm - habits["zeros"] if self._ticks % 20 else 0.0
         if "toggles" in habits:
             torque_nm = 0.0005 * (self._ticks % 2)
         if "axis_constant" in habits:

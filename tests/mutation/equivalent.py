@@ -22,8 +22,8 @@ RAMP = "only a ramp uses it, and its controller does not ask for the tick's numb
 
 EQUIVALENT: dict[str, str] = {
     "agreement.py means_step: passed_s > _SAME_STAMP_S → passed_s >= _SAME_STAMP_S": MOMENT,
-    "consistency.py ended: ConsistencyState(*same, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0) → "
-    "ConsistencyState(*same, 0, 0, 0, 0, 0.0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)": "all are 0",
+    "consistency.py ended: ConsistencyState(*same, 0, 0, 0, 0, 0, *sums, state.wild) → "
+    "ConsistencyState(*same, 0, 0, 0, 0, *sums, 0, state.wild)": "all are 0",
     "consistency.py ConsistencyState: ticks: int = 0 → ticks: int = -1": GIVEN,
     "consistency.py ConsistencyState: 0 → 1": GIVEN,
     "consistency.py ConsistencyState: 0 → -1": GIVEN,

@@ -82,6 +82,9 @@ OLD_MEMORY_S, OLD_MEMORY_STALES = 0.5, 5.0
 LATE = 1.5
 """Of the time of a mean: it holds a gap in which the velocity changed nobody knows when."""
 
+WILD_RATE_HZ = 100.0
+"""With fewer samples a second a stiff joint's torque goes and comes back between two of them."""
+
 _SAME_STAMP_S = 1e-6
 
 
@@ -145,6 +148,8 @@ def consistency_limits(settings: Settings) -> ConsistencyLimits:
     unseen_deg = UNSEEN_DEG + 2.0 * rig.motion.angle_resolution_deg
     unseen_deg += summed_s * rig.motion.velocity_resolution_deg_s
 
+    samples_hz = min(rig.torque.rate_hz, rig.tick_rate_hz)  # those that the loop has
+
     def old_s(sensor: TorqueSensorSettings | MotionSensorSettings) -> float:
         sample_s = 1.0 / sensor.rate_hz + sensor.jitter_s  # no sensor is faster than the loop
         return sensor.latency_s + max(FEW_SAMPLES * sample_s, MIN_OLD_S)
@@ -162,7 +167,7 @@ def consistency_limits(settings: Settings) -> ConsistencyLimits:
         torque_old_s=old_s(rig.torque),
         motion_old_s=old_s(rig.motion),
         old_memory_s=max(OLD_MEMORY_S, OLD_MEMORY_STALES * guard.stale_s),
-        wild_nm=0.5 * guard.torque_limit_nm,
+        wild_nm=0.5 * guard.torque_limit_nm if samples_hz >= WILD_RATE_HZ else math.inf,
     )
 
 

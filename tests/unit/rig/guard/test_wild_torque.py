@@ -140,3 +140,22 @@ def test_it_is_one_of_the_laws_that_need_time():
     assert causes[72] == Cause.TORQUE_WILD
     assert Cause.TORQUE_WILD.reaction.name == "HOLD"
     assert state.wild.counted == 5
+
+
+@pytest.mark.parametrize(
+    ("tick_hz", "torque_hz", "wild_nm"),
+    [(1000.0, 100.0, 5.0), (100.0, 100.0, 5.0), (1000.0, 99.0, math.inf), (50.0, 50.0, math.inf)],
+)
+def test_with_few_samples_a_second_nothing_is_wild(tick_hz, torque_hz, wild_nm):
+    settings = parse_settings(
+        {
+            "controller": {"torque_cutoff_hz": 10.0},
+            "guard": {"reaction_time_s": 0.1},
+            "rig": {
+                "tick_rate_hz": tick_hz,
+                "torque": {"rate_hz": torque_hz},
+                "motion": {"rate_hz": tick_hz},
+            },
+        }
+    )
+    assert consistency_limits(settings).wild_nm == wild_nm
