@@ -15,6 +15,7 @@ epoch that a limit of the guard ended counts as long as it was.
     rigid      ten times the stiffness, six times the damping
 
     python -m benchmarks.drive_torque --hours 100
+    python -m benchmarks.drive_torque --hours 2 --loop  # interpreted, with rests, at 1000 ticks/s
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -43,6 +45,9 @@ from rigidimeter.model import (
     quantised,
     reported_torque_nm,
 )
+from rigidimeter.planning import prbs_nm
+from rigidimeter.rig.acquisition import ControlLoop, SimulatedClock, hold, perturb
+from rigidimeter.rig.devices import SimulatedRig
 from rigidimeter.rig.guard import (
     Cause,
     DriveTorqueLimits,
@@ -279,12 +284,48 @@ def models_of(size: str, rate: int) -> dict[str, tuple[DriveTorqueLimits, DriveS
     return found
 
 
+def through_the_loop(size: str, side: str, hours: float, seed: int) -> str:
+    """Run epochs and rests of every subject in turn through the whole loop; return a line.
+
+    An epoch that another law or limit ends counts as long as it was.
+    """
+    model = measured_drive_side(settings_of(size, "relaxed", side=side))
+    ended: Counter[str] = Counter()
+    ticks = number = 0
+    subjects = [name for name in SUBJECTS if not name.startswith("cogwheel")]
+    while ticks < hours * 3600.0 * 1000.0:
+        subject = subjects[number % len(subjects)]
+        frequency_hz = TREMOR_HZ[number // len(subjects) % len(TREMOR_HZ)]
+        settings = settings_of(size, subject, side=side, frequency_hz=frequency_hz)
+        rng = np.random.default_rng([seed, number])
+        rig = SimulatedRig(settings.rig, settings.subject["OFF"], rng)
+        loop = ControlLoop(settings, rig, SimulatedClock(), lambda _: None, drive_model=model)
+        rig.enable()
+        hold(loop, 1.0)
+        perturb(loop, 0, prbs_nm(settings.prbs, settings.rig.tick_rate_hz).tolist())
+        if loop.cause is Cause.NONE:
+            hold(loop, 1.0)
+        ended[loop.cause.name] += 1
+        ticks, number = ticks + loop.tick, number + 1
+    causes = ", ".join(f"{n} {name}" for name, n in ended.most_common())
+    return f"| {size} | {side} | {ticks / 3.6e6:.2f} | {number} | {causes} |"
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--hours", type=float, default=1.0, help="simulated, over all kinds")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--loop", action="store_true", help="through the whole loop instead")
+    parser.add_argument("--only", type=int, help="with --loop: one of joints and drives")
     given = parser.parse_args()
+    if given.loop:
+        pairs = [(size, side) for size in SIZES for side in SIDES]
+        chosen = pairs if given.only is None else [pairs[given.only]]
+        print("| joint | drive's side | hours | epochs | ended by |\n|" + " --- |" * 5)
+        for size, side in chosen:
+            print(through_the_loop(size, side, given.hours / len(pairs), given.seed), flush=True)
+        return
     find, began_s, rows = compiled(), time.monotonic(), list(kinds())
     models = {(size, rate): models_of(size, rate) for size in SIZES for rate in range(len(RATES))}
     totals = {side: Counted(0.0, 0, 0.0, 0.0) for side in SIDES}

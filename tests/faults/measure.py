@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.faults.rigs import RIGS
+from tests.faults.torque_faults import table as torque_faults
 
 ROOT = Path(__file__).parents[2]
 HAZARDS = ROOT / "docs" / "reference" / "hazards.md"
@@ -157,13 +158,14 @@ def cases(notes: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def between_the_marks(page: Path, body: str) -> None:
+def between_the_marks(page: Path, body: str, what: str = "measured") -> None:
     """Replace what stands between the two marks of a page."""
-    head, begin, rest = page.read_text(encoding="utf-8").partition(BEGIN)
-    _, end, tail = rest.partition(END)
+    first, last = BEGIN.replace("measured", what), END.replace("measured", what)
+    head, begin, rest = page.read_text(encoding="utf-8").partition(first)
+    _, end, tail = rest.partition(last)
     if not (begin and end):
-        sys.exit(f"{page.name} has no marks to write between: {BEGIN} … {END}")
-    page.write_text(f"{head}{BEGIN}\n\n{body}\n\n{END}{tail}", encoding="utf-8")
+        sys.exit(f"{page.name} has no marks to write between: {first} … {last}")
+    page.write_text(f"{head}{first}\n\n{body}\n\n{last}{tail}", encoding="utf-8")
 
 
 def main() -> None:
@@ -178,6 +180,7 @@ def main() -> None:
     measured = f"Measured with {python}; {len(notes)} cases."
     between_the_marks(HAZARDS, f"{measured}\n\n{table(notes)}")
     between_the_marks(GUARD_LAWS, cases(notes))
+    between_the_marks(GUARD_LAWS, torque_faults(), "torque faults")
 
 
 if __name__ == "__main__":

@@ -51,12 +51,42 @@ KEYS, ALARMS = "rig/console/stop_keys.py", "rig/console/alarms.py"
 STEP, WATCH, LIMITS = "rig/guard/step.py", "rig/guard/watch.py", "rig/guard/limits.py"
 WILD = "rig/guard/wild_torque.py"
 AGREEMENT, CONTACT = "rig/guard/agreement.py", "rig/guard/contact.py"
+TORQUES = "rig/guard/drive_torque.py"
 CONSISTENCY, ANSWER = "rig/guard/consistency.py", "rig/guard/torque_answer.py"
 CONTROLLER, COMPOSED = "model/controller.py", "rig/devices/composed.py"
 
 HAND_MADE = tuple(
     HandMade(*fault)
     for fault in (
+        # The drive's own torque
+        (TORQUES, "if size > most or slope", "if slope", "an offset is never found"),
+        (TORQUES, "or slope * slope > most * most * square", "", "a gain is found later"),
+        (TORQUES, "- model.friction_nm * terms.sign", "+ model.friction_nm * terms.sign", "false"),
+        (TORQUES, "+ model.zero_nm\n", "", "a sensor with a zero of its own is stopped"),
+        (TORQUES, "allowed = terms.unknown * model.friction_nm", "allowed = 0.0", "false at rest"),
+        (
+            TORQUES,
+            "allowed = terms.unknown * model.friction_nm",
+            "allowed = model.friction_nm",
+            "the friction hides a fault also where the drive slips",
+        ),
+        (TORQUES, "acceleration + angle_before_s * jerk", "acceleration", "stamps are not used"),
+        (TORQUES, "if direction != toward:", "if False:", "it slips at once after turning back"),
+        (TORQUES, "zero_nm=model.zero_nm - bias_nm", "zero_nm=model.zero_nm", "the zeroing counts"),
+        (TORQUES, "if missing > MAX_FILLED or", "if", "a long gap is filled in with a line"),
+        (
+            TICK,
+            "        loop.elapsed_ticks,\n        apart,\n",
+            "        loop.elapsed_ticks,\n",
+            "torques that disagree stop nothing",
+        ),
+        (TICK, "    loop.torques = zeroed(loop.torques, bias_nm)\n", "", "the zeroing is a fault"),
+        (
+            DECISION,
+            "disagreement if disagreement != _NO_CAUSE else apart",
+            "disagreement",
+            "torques that disagree stop nothing",
+        ),
         # Time
         (MODES, "        loop.rig.read(late)\n", "", "begins with readings from before enabling"),
         (TICK, "loop.rig.read(loop.elapsed_ticks)", "loop.rig.read()", "rig not told of missed"),

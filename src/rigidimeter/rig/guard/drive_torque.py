@@ -207,8 +207,7 @@ def drive_torque_step(
         )  # the gap is no part of a mean with what was before
     steps, toward, way_rad, ticks, readings = state[:5]
     torque, drive, angle, sign, unknown, drive_before_s, angle_before_s = state[5:]
-    if elapsed_ticks < 1:
-        elapsed_ticks = 1
+    elapsed_ticks = max(elapsed_ticks, 1)
     ticks += elapsed_ticks
     one_sum = torque_nm + angle_rad + velocity_rad_s + drive_nm
     one_sum += torque_age_s + motion_age_s + drive_age_s
@@ -263,14 +262,12 @@ def means_ended(limits: DriveTorqueLimits, state: DriveTorqueState) -> tuple[Dri
     torque, drive, angle = state.torque_nm * share, state.drive_nm * share, state.angle_rad * share
     sign, unknown = state.sign * share, state.unknown * share
     drive_before_s, angle_before_s = state.drive_before_s * share, state.angle_before_s * share
-    missing = int(ticks * limits.interval_s / limits.step_s + 0.5)
+    missing = max(int(ticks * limits.interval_s / limits.step_s + 0.5), 1)
     cause = _NO_CAUSE
     if missing > MAX_FILLED or steps.settled_s == 0.0:
         steps = begun(steps, torque, drive, angle, sign, unknown)
         missing = 1
     torque_0, drive_0, angle_0 = steps.torque[0], steps.drive[0], steps.angle[0]
-    if missing < 1:
-        missing = 1
     for k in range(1, missing + 1):
         part = k / missing
         steps, found = one_step(
@@ -294,7 +291,8 @@ def means_ended(limits: DriveTorqueLimits, state: DriveTorqueState) -> tuple[Dri
 def begun(
     steps: StepsState, torque_nm: float, drive_nm: float, angle_rad: float, sign: float, u: float
 ) -> StepsState:
-    """Return the state in which every filter begins with what it is given."""
+    """Return the state in which every filter begins with what it is given, and the window anew."""
+    steps.window[:] = 0.0
     return StepsState(
         steps.window,
         (torque_nm, torque_nm, torque_nm, torque_nm, torque_nm),
@@ -304,11 +302,11 @@ def begun(
         (u, u, u, u, u),
         steps.terms,
         0.0,
-        steps.place,
-        steps.size_nm,
-        steps.slope_nm2,
-        steps.model_nm2,
-        steps.own_nm2,
+        0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
     )
 
 

@@ -9,6 +9,7 @@ from rigidimeter.core.settings import parse_settings
 from rigidimeter.rig.guard import (
     LEAST_SHARE,
     PRESLIDING_RAD,
+    SETTLED_S,
     SLIPS_RAD_S,
     TIMES_SCATTER,
     WINDOW_S,
@@ -176,6 +177,14 @@ def test_before_the_filters_have_settled_nothing_is_looked_at():
     ran = Rig(sensed=lambda t: 100.0).run(3.0)
     assert ran.cause is Cause.TORQUE_DISAGREES
     assert ran.time_s == pytest.approx(0.36, abs=0.01)
+
+
+def test_an_offset_is_found_where_the_true_torque_is_zero_and_has_no_slope():
+    limit_nm = TIMES_SCATTER * SCATTER_NM + SHARE * 0.9 * abs(Rig(torque=lambda t: 0.0).drive(0.0))
+    for offset_nm, cause in ((0.99 * limit_nm, Cause.NONE), (1.01 * limit_nm, 37)):
+        ran = Rig(torque=lambda t: 0.0, sensed=lambda t: offset_nm).run(3.0)  # noqa: B023
+        assert ran.cause == cause
+        assert ran.state.steps.model_nm2 == pytest.approx(0.0, abs=1e-6)
 
 
 # --- slope
@@ -354,6 +363,11 @@ def test_a_sensor_that_was_zeroed_is_compared_with_the_model_of_before():
     ran = Rig(sensed=lambda t: 1.0 - 0.4).run(3.0, bounds)
     assert ran.cause is Cause.NONE
     assert ran.state.steps.size_nm == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_numbers_are_those_of_the_documents():
+    assert (WINDOW_S, SETTLED_S, SLIPS_RAD_S, PRESLIDING_RAD) == (0.5, 0.35, 0.02, 0.006)
+    assert (TIMES_SCATTER, LEAST_SHARE) == (4.0, 0.005)
 
 
 def test_more_readings_within_a_step_do_not_count_twice():
