@@ -140,6 +140,72 @@ def test_a_tick_is_a_sync_a_command_and_a_heartbeat_when_due(node):
         assert sent == (math.copysign(4.0, beyond) if math.isfinite(beyond) else 0.0)
 
 
+@pytest.fixture
+def with_button():
+    made = Node(button_bit=3)
+    made.drive._wire.inputs_s = made.clock.time_s  # as `enable` leaves it
+    made.drive._cause = Cause.NONE
+    yield made
+    made.drive.close()
+    made.bus.shutdown()
+    made.questions.shutdown()
+
+
+def inputs(node, levels):
+    node.send(0x381, struct.pack("<I", levels))
+
+
+def test_a_button_is_an_emergency_stop_while_its_contact_is_open(with_button):
+    node = with_button
+    inputs(node, 0xFFFF_FFFF)
+    assert node.tick()[0] is Cause.NONE
+    inputs(node, ~0x8 & 0xFFFF_FFFF)
+    assert node.tick()[0] is Cause.EMERGENCY_STOP
+    inputs(node, 0xFFFF_FFFF)  # its release takes nothing back
+    assert node.tick()[0] is Cause.EMERGENCY_STOP
+
+
+def test_a_button_is_heard_over_a_fault_and_after_a_restart(with_button):
+    node = with_button
+    inputs(node, 0x8)
+    node.tick()
+    assert node.tick(status=FAULT)[0] is Cause.DRIVE_FAULT
+    inputs(node, 0x0)
+    assert node.tick(status=FAULT)[0] is Cause.EMERGENCY_STOP
+    _, returned, (control, _) = node.tick(heartbeat=0)  # the node has restarted
+    assert (returned, control) == (0.0, Control.DISABLE_VOLTAGE)
+
+
+def test_a_button_whose_frame_stays_away_for_lost_s_is_lost(with_button):
+    """0.03 s; the measurements go on."""
+    node = with_button
+    inputs(node, 0x8)
+    assert node.tick(dt=0.0)[0] is Cause.NONE
+    causes = [node.tick()[0] for _ in range(17)]
+    assert causes[:15] == [Cause.NONE] * 15
+    assert causes[15:] == [Cause.DRIVE_LOST] * 2
+
+
+def test_a_frame_of_inputs_of_another_length_is_damaged(with_button):
+    node = with_button
+    node.send(0x381, b"\0")
+    node.drive.read()
+    assert node.drive.counts["damaged"] == 1
+
+
+def test_inputs_of_a_drive_without_a_button_are_not_heard(node):
+    inputs(node, 0)
+    assert [node.tick()[0] for _ in range(20)] == [Cause.NONE] * 20
+
+
+@pytest.mark.parametrize(("bounded", "cause"), [(True, Cause.DRIVE_FAULT), (False, Cause.NONE)])
+def test_slippage_is_a_fault_where_it_was_bounded(node, bounded, cause):
+    node.drive._slips = bounded
+    assert node.tick()[0] is Cause.NONE
+    node.report(status=IN_OPERATION | 1 << 13)
+    assert node.tick()[0] is cause  # also where a later statusword has it no more
+
+
 def test_stop_is_sent_both_ways_and_kept(node):
     node.tick()
     node.drive.stop()

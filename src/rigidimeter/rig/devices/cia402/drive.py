@@ -297,10 +297,10 @@ class Cia402Drive:
     def _find_cause(self, now_s: float) -> Cause:
         """Return why the drive is not in the commanded state, NONE if it is."""
         wire, settings = self._wire, self._settings
-        if wire.inputs is not None and is_pressed(settings, wire.inputs):
-            return Cause.EMERGENCY_STOP
         if wire.booted:
             self._halt(Control.DISABLE_VOLTAGE)
+        if wire.inputs is not None and is_pressed(settings, wire.inputs):
+            return Cause.EMERGENCY_STOP
         unheard = wire.unheard and self._control is Control.ENABLE_OPERATION
         if wire.booted or wire.alarmed or unheard or wire.state in FAULTS:
             return Cause.DRIVE_FAULT
