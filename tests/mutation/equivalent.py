@@ -90,6 +90,7 @@ EQUIVALENT: dict[str, str] = {
     "if False: ...": SLOWER,
     NEAR + "left >= speed * (reach_s + limits.interval_s + held_s) + stopping → "
     "left > speed * (reach_s + limits.interval_s + held_s) + stopping": SLOWER,
+    "wild_torque.py wild_step: torque_nm + torque_age_s → torque_nm - torque_age_s": ANY_SIGN,
     "contact.py contact_step: min(passed, ring.size) → passed": "goes round again: the same",
     NEAR + "1 → 0": "a whole round of the ring is where it began",
     "step.py _most_serious: reported != _NO_CAUSE and REACTIONS[reported] >= REACTIONS[found] → "

@@ -15,6 +15,7 @@ from rigidimeter.rig.guard import (
     consistency_step,
     median,
     wild_step,
+    wild_torque,
 )
 
 TICK_S = 0.001
@@ -124,6 +125,21 @@ def test_a_number_that_is_none_is_left_out():
     torques = [6.0] * 9 + [math.nan, 0.0, math.inf] + [6.0] * 9
     assert heard(torques)[0].counted == 1
     state, _ = wild_step(WildState(), WILD_NM, 6.0, math.nan, TICK_S)
+    assert math.isnan(state.fifth_nm)
+
+
+def test_the_figures_of_the_law_and_what_it_begins_with():
+    assert (wild_torque.TIMES_USUAL, wild_torque.THREE_S) == (5.0, 1.0)
+    assert (wild_torque.MEMORY, wild_torque.FEW, wild_torque._SAME_STAMP_S) == (200.0, 20.0, 1e-6)
+    state = WildState()
+    assert all(math.isnan(torque_nm) for torque_nm in state[:5])
+    assert state[5:] == (math.inf, 0.0, 0.0, math.inf, math.inf, 0)
+
+
+def test_a_torque_and_an_age_that_are_infinite_alike_are_left_out():
+    state, _ = wild_step(WildState(), WILD_NM, math.inf, math.inf, TICK_S)
+    assert math.isnan(state.fifth_nm)
+    state, _ = wild_step(WildState(), WILD_NM, 6.0, -math.inf, TICK_S)
     assert math.isnan(state.fifth_nm)
 
 
