@@ -273,7 +273,7 @@ def run_on_clock(
         monkeypatch.setattr("rigidimeter.rig.acquisition.DeadlineClock", lambda: clock)
         monkeypatch.setattr(loop_process, "prepare_loop_process", lambda **_: PREPARED)
         protocol = plan(SETTINGS.protocol, SETTINGS.prbs, SETTINGS.sinusoid, 1)
-        assert loop_main(partial(run_loop, SETTINGS, protocol, None, None)) == 0
+        assert loop_main(partial(run_loop, SETTINGS, protocol, None, None, None)) == 0
         return clock
 
     return run
