@@ -287,7 +287,7 @@ def replay(
         reported=tuple(reports.values()),
         differences=tuple(differences.values()),
         differing_ticks=differing,
-        not_run=tuple(_not_run(recorded)),
+        not_run=tuple(_not_run(recorded, has_model=_drive_model(events) is not None)),
         left_out=left_out,
         rounded_ticks=rounded,
         rounded_rad_s=rounded_rad_s,
@@ -308,7 +308,7 @@ def _drive_model(events: Sequence[Mapping[str, Any]]) -> DriveModel | None:
     return None
 
 
-def _not_run(recorded: Collection[str]) -> list[str]:
+def _not_run(recorded: Collection[str], *, has_model: bool) -> list[str]:
     """Return which laws did not run."""
     not_run = []
     if "cause" not in recorded:
@@ -321,5 +321,10 @@ def _not_run(recorded: Collection[str]) -> list[str]:
     if "drive_torque_nm" not in recorded:
         not_run.append(
             "the torque sensor is not compared with the drive's torque: that was not recorded"
+        )
+    elif not has_model:
+        not_run.append(
+            "the torque sensor is not compared with the drive's torque: nor was it in the session, "
+            "which had no model of the drive"
         )
     return not_run
