@@ -2,9 +2,11 @@
 
     python -m tests.faults.measure              runs the tests, about four minutes
     python -m tests.faults.measure LINES.jsonl  takes what a run noted
+    python -m tests.faults.measure --pause      only whoever leads a session is gone, two minutes
 
 The faults go to `hazards.md`, every case to `guard-laws.md`; only what stands between the two marks
-of a page is replaced.
+of a page is replaced. So is, between two others of `hazards.md`, what follows when whoever leads a
+session is gone, at twenty random moments of it; a simulated clock gives the same numbers each time.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
+from tests.faults.closed_pages import HOW, closed, moments, pause_table
 from tests.faults.rigs import RIGS
 from tests.faults.torque_faults import table as torque_faults
 
@@ -168,8 +171,23 @@ def between_the_marks(page: Path, body: str, what: str = "measured") -> None:
     page.write_text(f"{head}{first}\n\n{body}\n\n{last}{tail}", encoding="utf-8")
 
 
+def measure_pauses() -> None:
+    """Write, and print, what follows when whoever leads a session is gone."""
+    cases = []
+    for how in HOW:
+        for phase, at_s in moments():
+            with tempfile.TemporaryDirectory() as folder:
+                cases.append(closed(Path(folder), how, phase, at_s))
+    found = pause_table(cases)
+    print(found)
+    between_the_marks(HAZARDS, found, "operator gone")
+
+
 def main() -> None:
     """Write the tables into the pages."""
+    measure_pauses()
+    if sys.argv[1:] == ["--pause"]:
+        return
     path = Path(sys.argv[1]) if len(sys.argv) > 1 else measure()
     notes = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
     missing = sorted(set(FAULTS) - {note["fault"] for note in notes})
