@@ -49,6 +49,8 @@ class RecentSamples(NamedTuple):
     motion_status: int = 0
     held_back: bool = False
     drive_torque_nm: float = math.nan
+    lowest_angle_rad: float = math.nan
+    highest_angle_rad: float = math.nan
 
 
 def recent_samples(rows: NDArray[np.void]) -> RecentSamples:
@@ -72,11 +74,18 @@ def recent_samples(rows: NDArray[np.void]) -> RecentSamples:
         int(last["motion_status"]),
         bool(np.any(rows["limited"] == Limited.POSITION)),
         float(np.mean(newest["drive_torque_nm"])),
+        -_most(-rows["angle_rad"]),
+        _most(rows["angle_rad"]),
     )
 
 
 def _largest(values: NDArray[np.float64]) -> float:
     finite = np.abs(values[np.isfinite(values)])
+    return float(np.max(finite)) if finite.size else math.nan
+
+
+def _most(values: NDArray[np.float64]) -> float:
+    finite = values[np.isfinite(values)]
     return float(np.max(finite)) if finite.size else math.nan
 
 
@@ -115,7 +124,10 @@ class LimitDistance:
 
 
 def limit_distances(
-    guard: GuardSettings, recent: RecentSamples, energy_j: float
+    guard: GuardSettings,
+    recent: RecentSamples,
+    energy_j: float,
+    range_rad: tuple[float, float] | None = None,
 ) -> tuple[LimitDistance, ...]:
     """Return the distance to each limit.
 
@@ -125,11 +137,29 @@ def limit_distances(
     recent : RecentSamples
     energy_j : float
         What the guard counts as going to and fro within a second.
+    range_rad : tuple of float, optional
+        Both ends of the person's range of motion, from the start; of the two the nearer counts.
     """
+    angle = LimitDistance(
+        "angle", "deg", deg_from_rad(recent.largest_angle_rad), guard.position_limit_deg
+    )
+    if range_rad is not None:
+        reached = (
+            (-recent.lowest_angle_rad, -range_rad[0]),
+            (recent.highest_angle_rad, range_rad[1]),
+        )
+        ends = [
+            LimitDistance(
+                "angle",
+                "deg",
+                max(deg_from_rad(angle_rad), 0.0),
+                min(deg_from_rad(end_rad), guard.position_limit_deg),
+            )
+            for angle_rad, end_rad in reached
+        ]
+        angle = max(ends, key=lambda end: end.part)
     return (
-        LimitDistance(
-            "angle", "deg", deg_from_rad(recent.largest_angle_rad), guard.position_limit_deg
-        ),
+        angle,
         LimitDistance(
             "speed", "deg/s", deg_from_rad(recent.largest_velocity_rad_s), guard.speed_limit_deg_s
         ),

@@ -160,7 +160,7 @@ def facts(
     state = State(loop.state)
     words, countdown_s = _countdown(progress, loop)
     left_s = session_left_s(progress, loop, plan.settings.protocol.return_s)
-    distances = limit_distances(plan.settings.guard, recent, loop.energy_j)
+    distances = limit_distances(plan.settings.guard, recent, loop.energy_j, progress.range_rad)
     live, live_words = _live(plan, progress, history)
     return Facts(
         time_s=loop.time_s,

@@ -98,6 +98,8 @@ class Progress:
         How the session ended; empty as long as it runs.
     wild_samples : int
         Single torque samples far from those around them, up to the last epoch that ended.
+    range_rad : tuple of float or None
+        Both ends of the person's range of motion, from where the joint began.
     dose : Dose
         What was done up to the last epoch, with the session that this one continues.
     """
@@ -114,6 +116,7 @@ class Progress:
     outcome: str = ""
     reason: str = ""
     wild_samples: int = 0
+    range_rad: tuple[float, float] | None = None
     dose: Dose = NO_DOSE
 
 
@@ -129,6 +132,9 @@ def progress_after(progress: Progress, event: Mapping[str, Any]) -> Progress:
         return _started(progress, event)
     if kind == "epoch_ended":
         return _ended(progress, event)
+    if kind == "rig_enabled" and event.get("range_rad"):
+        low_rad, high_rad = event["range_rad"]
+        return replace(progress, range_rad=(low_rad, high_rad))
     if kind == "sensor_zeroed":
         return replace(progress, zeroed=not event["refused"])
     if kind == "daily_check":

@@ -265,6 +265,7 @@ def test_the_last_second_in_numbers():
     assert found.torque_nm == pytest.approx(1.0)
     assert found.drive_torque_nm == pytest.approx(2.5)
     assert found.largest_angle_rad == 0.3
+    assert (found.lowest_angle_rad, found.highest_angle_rad) == (-0.3, 0.0)
     assert found.largest_torque_nm == 12.0
     assert found.largest_power_w == 6.0
     assert found.largest_lateness_s == 4e-3
@@ -274,3 +275,25 @@ def test_the_last_second_in_numbers():
     assert recent_samples(rows[:0]) == pytest.approx(RecentSamples(), nan_ok=True)
     rows["torque_nm"] = math.nan
     assert math.isnan(recent_samples(rows).torque_nm)
+
+
+def test_of_a_range_the_nearer_end_is_shown():
+    recent = QUIET._replace(
+        largest_angle_rad=0.3, lowest_angle_rad=-0.1, highest_angle_rad=math.radians(20.0)
+    )
+    enabled = {"event": "rig_enabled", "range_rad": [math.radians(-6.0), math.radians(60.0)]}
+    ends = told(enabled).range_rad
+    assert told({"event": "rig_enabled", "range_rad": None}).range_rad is None
+    angle = limit_distances(SETTINGS.guard, recent, 0.0, ends)[0]
+    assert (angle.value, angle.limit) == (pytest.approx(math.degrees(0.1)), pytest.approx(6.0))
+    assert angle.near
+    other = recent._replace(lowest_angle_rad=0.2)  # beyond the start on the other side
+    angle = limit_distances(SETTINGS.guard, other, 0.0, ends)[0]
+    assert (angle.value, angle.limit) == (pytest.approx(20.0), 40.0)
+
+
+def test_wild_samples_are_said_beside_the_sensor():
+    for count, words in ((1, "1 single torque sample was"), (3, "3 single torque samples were")):
+        progress = told(started(1, "1"), ended(1, counts={"torque_wild": count}))
+        said = {one.name: one.words for one in shown(progress).indicators}
+        assert said["sensor"].startswith(f"{words} far from the others")
