@@ -33,6 +33,7 @@ SMALLEST = {
     "scenarios.__main__": "--only relaxed --recordings 1 --methods bandlimited",
     "size": "",
     "tick": "--repeats 1",
+    "torque_channel": "--repeats 1",
     "torque_sign": "--epochs 1 --sizes small",
     "trips": "design",
     "untrue": "",
