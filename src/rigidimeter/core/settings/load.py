@@ -119,8 +119,10 @@ def changed_settings(
         As `parse_settings`; the sentence begins with `source`.
     """
     changes = _renamed(changes, source)
-    stated = settings.model_dump(mode="json", exclude_unset=True)  # a default stays one
-    return parse_settings(_merged(stated, changes), source=source)
+    # What was not stated and is not changed stays a default, and is not stated by this either.
+    stated = settings.model_dump(mode="json", exclude_unset=True)
+    touched = {key: value for key, value in dump_settings(settings).items() if key in changes}
+    return parse_settings(_merged({**stated, **touched}, changes), source=source)
 
 
 def _renamed(values: Mapping[str, Any], source: str) -> dict[str, Any]:

@@ -4,7 +4,13 @@ import re
 import pytest
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.settings import Settings, dump_settings, load_settings, parse_settings
+from rigidimeter.core.settings import (
+    Settings,
+    changed_settings,
+    dump_settings,
+    load_settings,
+    parse_settings,
+)
 
 
 def test_the_controller_is_read_per_degree():
@@ -159,3 +165,9 @@ def test_a_kind_of_interval_is_read_in_an_old_session_and_refused_in_a_file(tmp_
     (tmp_path / "rig.toml").write_text('[estimation]\nintervals = "white"\n')
     with pytest.raises(UserError, match=r"rig.toml: estimation.intervals was removed"):
         load_settings(tmp_path / "rig.toml")
+
+
+def test_a_change_leaves_the_other_defaults_unstated_and_the_default_subjects_there():
+    changed = changed_settings(Settings(), {"subject": {"X": {}}, "prbs": {"amplitude_nm": 0.5}})
+    assert set(changed.subject) == {"OFF", "DBS", "X"}
+    assert changed.model_fields_set == {"subject", "prbs"}

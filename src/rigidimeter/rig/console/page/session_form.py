@@ -228,7 +228,7 @@ def _with_subjects(base: Settings, blocks: Sequence[Mapping[str, Any]]) -> Setti
     known = dump_settings(base)["subject"]
     first = next(iter(known.values()))
     more = {block["condition"]: first for block in blocks if block["condition"] not in known}
-    return changed_settings(base, {"subject": known | more}, "form") if more else base
+    return changed_settings(base, {"subject": more}, "form") if more else base
 
 
 def _placed(text: str, fields: Sequence[Field]) -> dict[str, str]:
