@@ -133,6 +133,25 @@ def test_samples_are_written_before_the_event_that_follows_them(rig):
     assert order == ["session_started", "epoch_started", 0, 1, 2, *ended]
 
 
+def test_an_event_counts_as_recorded_when_it_is_written_whatever_fails_after_it(rig):
+    """Else a recorder that goes on, or whoever completes the session, would write it again."""
+    rig.begin()
+    rig.recorder.drain()
+    rig.sink.event("epoch_started", epoch="one")  # of which the recorder cannot take the number
+    rig.sink.event("note", text="later")
+    with pytest.raises(ValueError, match="one"):
+        rig.recorder.drain()
+    rig.recorder.drain()
+    rig.end()
+    rig.recorder.drain()
+    events, _ = read_events(rig.folder / "events.jsonl")
+    assert [event["event"] for event in events] == [
+        *("session_started", "epoch_started", "epoch_started", "note"),
+        *("epoch_ended", "session_ended"),
+    ]
+    assert rig.events.recorded == rig.events.written
+
+
 def test_and_events_before_the_samples_that_follow_them(rig):
     """Though the loop goes on while the recorder looks how many there are."""
     order = noted(rig)

@@ -146,7 +146,6 @@ class Recorder:
             event = self._events.get(self._events.recorded)
             self._copy(event.samples_before)
             self._write(event)
-            self._events.recorded += 1
         self._copy(stop)
         while self._own:
             self._writer.line(self._own[0])
@@ -207,6 +206,8 @@ class Recorder:
                 self._writer.line(self._own[0])
                 self._own.popleft()
         self._writer.line(event.line)
+        # At once: whatever fails below, nobody may write it a second time.
+        self._events.recorded += 1
         if kind == "session_ended":
             self.closing = True
         elif kind == "epoch_started":
