@@ -29,7 +29,7 @@ from rigidimeter.rig.commissioning import (
     write_record,
 )
 from rigidimeter.rig.console.page import start_refusal
-from rigidimeter.rig.devices import RigFile
+from rigidimeter.rig.devices import MotionRange, RigFile
 
 NOW = datetime.now(UTC).replace(microsecond=0)
 SETTINGS = Settings()
@@ -45,7 +45,8 @@ def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     path = tmp_path / "RIG.toml"
     for module in ("rig_steps", "planned_session"):
         monkeypatch.setattr(
-            f"rigidimeter.cli.{module}.load_rig", lambda path: RigFile(path, "rig", {}, "abc")
+            f"rigidimeter.cli.{module}.load_rig",
+            lambda path: RigFile(path, "rig", {}, "abc", absolute_angle=True),
         )
     monkeypatch.setattr(RigFile, "claim", lambda _: SimpleNamespace(close=lambda: None))
     commissioned = CommissioningRecord(
@@ -54,7 +55,10 @@ def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         facts={},
         covered=covered(SETTINGS),
         checks=passed(*MUST_PASS, *A_PERSON_TELLS, "stability with OFF"),
-        numbers={"gain_margin_db_OFF": 14.7, "gain_margin_db_DBS": 13.2},
+        numbers={
+            **{"gain_margin_db_OFF": 14.7, "gain_margin_db_DBS": 13.2},
+            **{"mechanical_stop_low_deg": -60.0, "mechanical_stop_high_deg": 60.0},
+        },
         software="0.1",
         made_utc=(NOW - timedelta(days=2)).isoformat(),
         signed_by="A. Weber",
@@ -94,7 +98,8 @@ def check_again(rig: Path, **changes: Any) -> None:
 
 def refusal_of_run(rig: Path) -> str:
     try:
-        checked_rig(new_session(SETTINGS, {}, None), rig)
+        planned = new_session(SETTINGS, {}, None)
+        checked_rig(planned.within(MotionRange(-50.0, 50.0)), rig)
     except UserError as error:
         return str(error)
     return ""
