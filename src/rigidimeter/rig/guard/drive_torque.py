@@ -263,10 +263,10 @@ def means_ended(limits: DriveTorqueLimits, state: DriveTorqueState) -> tuple[Dri
     sign, unknown = state.sign * share, state.unknown * share
     drive_before_s, angle_before_s = state.drive_before_s * share, state.angle_before_s * share
     missing = max(int(ticks * limits.interval_s / limits.step_s + 0.5), 1)
-    cause = _NO_CAUSE
+    cause, elapsed_s = _NO_CAUSE, ticks * limits.interval_s
     if missing > MAX_FILLED or steps.settled_s == 0.0:
         steps = begun(steps, torque, drive, angle, sign, unknown)
-        missing = 1
+        missing, elapsed_s = 1, limits.step_s  # what the filters have seen
     torque_0, drive_0, angle_0 = steps.torque[0], steps.drive[0], steps.angle[0]
     for k in range(1, missing + 1):
         part = k / missing
@@ -280,7 +280,7 @@ def means_ended(limits: DriveTorqueLimits, state: DriveTorqueState) -> tuple[Dri
             unknown,
             drive_before_s,
             angle_before_s,
-            ticks * limits.interval_s / missing,
+            elapsed_s / missing,
         )
         if cause == _NO_CAUSE:
             cause = found

@@ -321,8 +321,11 @@ def test_late_ticks_are_filled_in_and_a_long_gap_begins_anew():
     state = rig.run(2.0).state
     gone = Rig(angle=lambda t: 50.0, elapsed=lambda k: 600 if k == 0 else 1)
     after = gone.run(0.604, state=state).state
-    assert after.steps.settled_s < 0.61
-    assert after.steps.angle[4] == pytest.approx(50.0)
+    steps = after.steps
+    assert steps.settled_s == pytest.approx(0.008)  # nothing is looked at for a while
+    assert steps.angle == (50.0,) * 5
+    assert (steps.sign, steps.unknown) == ((1.0,) * 5, (0.0,) * 5)
+    assert (steps.window.any(), steps[8:]) == (False, (0, 0.0, 0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("tick_hz", [1000.0, 100.0, 50.0])
@@ -363,6 +366,36 @@ def test_a_sensor_that_was_zeroed_is_compared_with_the_model_of_before():
     ran = Rig(sensed=lambda t: 1.0 - 0.4).run(3.0, bounds)
     assert ran.cause is Cause.NONE
     assert ran.state.steps.size_nm == pytest.approx(0.0, abs=1e-9)
+
+
+def test_it_begins_with_nothing():
+    steps, *ticks = drive_torque_state(limits())
+    assert ticks == [0.0] * 11
+    window, *filters = steps[:6]
+    assert (window.shape, window.any()) == ((62, 4), False)
+    assert all(math.isnan(one[0]) and one[1:] == (0.0,) * 4 for one in filters)
+    assert steps.terms == (0.0,) * 6 + (1.0,)
+    assert steps[7:] == (0.0,) * 6
+    assert tuple(DriveModel()) == (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, math.inf, 0.0)
+
+
+def one_tick(state, torque, elapsed):
+    return drive_torque_step(limits(), state, torque, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, elapsed)[0]
+
+
+def test_a_tick_counts_as_one_at_least():
+    assert one_tick(drive_torque_state(limits()), 0.0, 0).ticks == 1
+
+
+def test_a_gap_is_no_part_of_a_mean_with_what_was_before():
+    state = drive_torque_state(limits())
+    for _ in range(12):
+        state = one_tick(state, 0.0, 1)
+    assert (state.ticks, state.readings) == (4, 4)
+    state = one_tick(state, 1.0, 40)
+    assert (state.ticks, state.readings) == (0, 0)
+    assert state.steps.torque[0] == 1.0
+    assert state.steps.settled_s == pytest.approx(0.052)
 
 
 def test_the_numbers_are_those_of_the_documents():
