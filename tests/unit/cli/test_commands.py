@@ -258,7 +258,7 @@ def test_a_session_in_which_an_epoch_failed_is_recorded_and_ends_with_1(rigidime
     """The perturbation moves the arm to the position limit, the imposed sinusoid does not."""
     (tmp_path / "tight.toml").write_text(
         "[rig]\ntick_rate_hz = 250.0\ntorque.rate_hz = 250.0\nmotion.rate_hz = 250.0\n"
-        "[guard]\nposition_limit_deg = 6.0\n[sinusoid]\namplitude_deg = 5.0\n"
+        "[guard]\nposition_limit_deg = 10.0\n[sinusoid]\namplitude_deg = 5.0\n"
         "[protocol]\nrests_s = [1.0]\nreturn_s = 1.0\n"
         'blocks = [{task = "prbs", epochs = 1}, {task = "sinusoid", epochs = 1}]\n'
     )

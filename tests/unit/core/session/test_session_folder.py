@@ -93,10 +93,10 @@ def test_what_is_recorded_is_what_was_sent(simulate):
 
 
 def test_an_epoch_that_comes_to_the_position_limit_says_so(simulate):
-    folder = simulate(guard={"position_limit_deg": 8.0}, sinusoid={"amplitude_deg": 5.0})
+    folder = simulate(guard={"position_limit_deg": 9.0}, sinusoid={"amplitude_deg": 5.0})
     ended = next(e for e in events(folder) if e["event"] == "epoch_ended")
     assert ended["outcome"] == "fail"
-    assert "position limit of ±8 deg" in ended["reason"]
+    assert "position limit of ±9 deg" in ended["reason"]
     (epoch,), _ = read_session(folder)
     assert epoch.closed.kind == "excluded"
     assert np.rad2deg(np.abs(epoch.channels["angle_rad"].values)).max() <= 8.01
