@@ -99,7 +99,7 @@ def test_an_epoch_that_comes_to_the_position_limit_says_so(simulate):
     assert "position limit of ±9 deg" in ended["reason"]
     (epoch,), _ = read_session(folder)
     assert epoch.closed.kind == "excluded"
-    assert np.rad2deg(np.abs(epoch.channels["angle_rad"].values)).max() <= 8.01
+    assert np.rad2deg(np.abs(epoch.channels["angle_rad"].values)).max() <= 9.01
 
 
 def test_the_same_seed_gives_the_same_bytes(simulate):
