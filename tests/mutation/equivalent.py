@@ -116,7 +116,7 @@ EQUIVALENT: dict[str, str] = {
     LOOP + "self.limit_time_s = math.nan → pass": ANEW,
     "tick.py run_tick: sent != allowed and math.isfinite(sent) → math.isfinite(sent)": "what was "
     "sent as it was allowed is the guard's velocity already",
-    "tick.py run_tick: loop.limit_time_s <= due_s → loop.limit_time_s < due_s": "a later tick is "
+    "tick.py _at_limit: loop.limit_time_s <= due_s → loop.limit_time_s < due_s": "a later tick is "
     "due later",
     "session_end.py _after_power: angle_rad + reading.torque_nm → "
     "angle_rad - reading.torque_nm": ANY_SIGN,

@@ -182,7 +182,7 @@ HAND_MADE = tuple(
         ),
         (
             DECISION,
-            "        disagreement,\n    )",
+            "        disagreement if disagreement != _NO_CAUSE else apart,\n    )",
             "    )",
             "motion nobody commanded is not stopped",
         ),
@@ -209,8 +209,18 @@ HAND_MADE = tuple(
         (TICK, "if math.isfinite(torque_nm):", "if True:", "a NaN stays in the filter for ever"),
         (TICK, "loop.filtered, smooth_nm", "_, smooth_nm", "the filter forgets: torque all but 0"),
         (TICK, "command(reading, smooth_nm, k)", "command(reading, torque_nm, k)", "no filter"),
-        (TICK, "due_s - motion_s", "due_s - torque_s", "an old angle passes as a new one"),
-        (TICK, "due_s - torque_s", "due_s - motion_s", "an old torque passes as a new one"),
+        (
+            TICK,
+            "due_s - motion_s,\n        due_s - torque_s,",
+            "due_s - torque_s,\n        due_s - torque_s,",
+            "an old angle passes as a new one",
+        ),
+        (
+            TICK,
+            "due_s - motion_s,\n        due_s - torque_s,",
+            "due_s - motion_s,\n        due_s - motion_s,",
+            "an old torque passes as a new one",
+        ),
         (TICK, "if math.isfinite(angle):", "if True:", "the way back begins nowhere"),
         (WATCH, "if not torque_age_s <= limits.stale_s:", "if False:", "a silent sensor passes"),
         (WATCH, "if not age_s <= limits.stale_s:", "if False:", "a silent drive passes"),
@@ -239,8 +249,8 @@ HAND_MADE = tuple(
         ),
         (
             TICK,
-            "limited == POSITION_LIMITED and not",
-            "limited == STALLED and not",
+            "if limited == POSITION_LIMITED:",
+            "if limited == STALLED:",
             "an epoch at the position limit counts",
         ),
         (
@@ -408,7 +418,7 @@ HAND_MADE = tuple(
             "(not begun or loop.state == 2)",
             "a page may be away from an arm that moves",
         ),
-        (SESSION, "    session.rig.zero(bias_nm)\n", "", "the torque keeps its bias"),
+        (TICK, "    loop.rig.zero(bias_nm)\n", "", "the torque keeps its bias"),
         (
             SESSION,
             "        go_back(loop, duration_s, speed_rad_s)\n",
@@ -612,7 +622,7 @@ HAND_MADE = tuple(
         (
             ACCESS,
             'f"http://{host}".lower()',
-            'f"{origin.partition(":")[0]}://{host}".lower()',
+            'f"{origin.partition(chr(58))[0]}://{host}".lower()',
             "any scheme",
         ),
         (ACCESS, "(*self._names, reached)", '("*",)', "any name is this computer's"),
