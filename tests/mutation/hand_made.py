@@ -390,6 +390,18 @@ HAND_MADE = tuple(
         ),
         (
             SESSION,
+            "if loop.reaction is Reaction.HOLD:  #",
+            "if True:  #",
+            "the guard forgets arrivals at the limit at every return",
+        ),
+        (
+            TICK,
+            "        if loop.dose_reached:\n",
+            "        if False:\n",
+            "an arm that comes to its limit again and again goes on",
+        ),
+        (
+            SESSION,
             "    run.begin(Phase.HOLD)\n    hold(run.loop, POLL_S)",
             "    rest(run.loop, POLL_S, 0.3)",
             "a paused arm is led back",
