@@ -27,6 +27,9 @@ SMALLEST = {
     "cpu_commands": "--command estimate --repeats 1 --study {study}",
     "day_tests": "2 1 3 days each",
     "false_alarms": "--hours 1e-5",
+    "drive_torque": "--hours 1e-5",
+    "file_faults": "--files 8",
+    "held_at_limit": "--hours 1e-5",
     "lack_of_fit": "--recordings 1",
     "model_terms": "--epochs 1 --only relaxed",
     "null_studies": "--studies 1 --processes 1",
@@ -51,9 +54,12 @@ def smaller(name: str, module: ModuleType, folder: Path) -> Mapping[str, Any]:
         return {"TABLE": folder / "page.md", "FIRST_HZ": (100.0,), "FILTERS_HZ": (0.0,)}
     if name == "archive":
         return {"apart": module.measured}
-    if name == "false_alarms":
+    if name in ("drive_torque", "false_alarms"):
         (kind, *_), compiled = module.kinds(), module.compiled
         return {"kinds": lambda: [kind], "compiled": lambda: interpreted(compiled)}
+    if name == "held_at_limit":
+        (row, *_), compiled = module.rows(False), module.compiled
+        return {"rows": lambda _: [row], "compiled": lambda: interpreted(compiled)}
     if name == "torque_sign":
         one = dict([*module.SUBJECTS.items()][:1])
         return {"RATES": module.RATES[:1], "SUBJECTS": one, "MOMENTS_S": module.MOMENTS_S[:1]}
