@@ -80,7 +80,12 @@ HAND_MADE = tuple(
             "        loop.elapsed_ticks,\n",
             "torques that disagree stop nothing",
         ),
-        (TICK, "    loop.torques = zeroed(loop.torques, bias_nm)\n", "", "the zeroing is a fault"),
+        (
+            TICK,
+            "    loop.torques, loop.compared = zeroed(loop.torques, loop.compared, bias_nm)\n",
+            "",
+            "the zeroing is a fault",
+        ),
         (
             DECISION,
             "disagreement if disagreement != _NO_CAUSE else apart",

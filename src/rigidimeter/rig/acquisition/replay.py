@@ -229,7 +229,7 @@ def replay(
             guard = released(guard)
         before = guard.cause
         while zeroings and due_s >= zeroings[0][0]:
-            torques = zeroed(torques, zeroings.pop(0)[1])
+            torques, compared = zeroed(torques, compared, zeroings.pop(0)[1])
         compared, apart_cause = drive_torque_step(
             torques,
             compared,

@@ -204,7 +204,7 @@ def set_admittance(loop: ControlLoop, inertia_kg_m2: float, damping_nm_s_rad: fl
 def zero_torque(loop: ControlLoop, bias_nm: float) -> None:
     """Subtract a bias from every torque from now on."""
     loop.rig.zero(bias_nm)
-    loop.torques = zeroed(loop.torques, bias_nm)
+    loop.torques, loop.compared = zeroed(loop.torques, loop.compared, bias_nm)
 
 
 def ticks_late(loop: ControlLoop) -> int:

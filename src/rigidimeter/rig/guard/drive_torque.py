@@ -162,10 +162,24 @@ def drive_torque_limits(settings: Settings, model: DriveModel | None = None) -> 
     )
 
 
-def zeroed(limits: DriveTorqueLimits, bias_nm: float) -> DriveTorqueLimits:
-    """Return the limits after the torque sensor was zeroed: M is less by the bias from now on."""
-    model = limits.model
-    return limits._replace(model=model._replace(zero_nm=model.zero_nm - bias_nm))
+def zeroed(
+    limits: DriveTorqueLimits, state: DriveTorqueState, bias_nm: float
+) -> tuple[DriveTorqueLimits, DriveTorqueState]:
+    """Return both after the torque sensor was zeroed: M is less by the bias from now on.
+
+    So is what the filters hold of it: they would take a third of a second to forget the bias, and
+    the law would find it meanwhile.
+    """
+    model, steps = limits.model, state.steps
+    one, two, three, four, five = steps.torque
+    less = one - bias_nm, two - bias_nm, three - bias_nm, four - bias_nm, five - bias_nm
+    return (
+        limits._replace(model=model._replace(zero_nm=model.zero_nm - bias_nm)),
+        state._replace(
+            steps=steps._replace(torque=less),
+            torque_nm=state.torque_nm - state.readings * bias_nm,
+        ),
+    )
 
 
 def drive_torque_state(limits: DriveTorqueLimits) -> DriveTorqueState:

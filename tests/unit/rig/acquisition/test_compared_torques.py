@@ -99,6 +99,33 @@ def test_what_the_zeroing_took_off_is_taken_off_the_model():
     assert rig.read().torque_nm == pytest.approx(-0.9, abs=0.03)
 
 
+def test_to_zero_a_sensor_that_is_off_stops_no_session():
+    """Neither as it is zeroed, nor after it, on a drive without friction that would hide it."""
+    settings = parse_settings(
+        {"prbs": {"duration_s": 2.0}, "protocol": {"blocks": [{"epochs": 1}], "rests_s": [0.6]}}
+        | {"zeroing": {"duration_s": 1.0}, "rig": {"drive_side": {"friction_nm": 0.0}}}
+    )
+    rig = SimulatedRig(settings.rig, settings.subject["OFF"], np.random.default_rng(3))
+    read, sink = rig.read, ListSink()
+
+    def reading(elapsed=1):
+        sample = read(elapsed)
+        return sample._replace(torque_nm=sample.torque_nm + 0.9)
+
+    rig.read = reading
+    result = run_session(
+        plan(settings.protocol, settings.prbs, settings.sinusoid, 1),
+        settings,
+        rig,
+        SimulatedClock(),
+        sink,
+        zero_first=True,
+        drive_model=MODEL._replace(zero_nm=0.9, friction_nm=0.0),
+    )
+    assert sink.of("sensor_zeroed")[0]["bias_nm"] == pytest.approx(0.9, abs=0.01)
+    assert (result.cause, result.reason) == (Cause.NONE, "")
+
+
 def test_a_session_records_the_model_and_a_replay_finds_the_same():
     sink = ListSink()
     # The sensor is off by 0.6 N·m all the time, and was so when the rig was commissioned.

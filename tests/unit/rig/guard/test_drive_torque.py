@@ -361,11 +361,23 @@ def test_without_a_model_the_law_is_off():
 
 
 def test_a_sensor_that_was_zeroed_is_compared_with_the_model_of_before():
-    bounds = zeroed(limits(), 0.4)
+    bounds, _ = zeroed(limits(), drive_torque_state(limits()), 0.4)
     assert isinstance(bounds, DriveTorqueLimits)
     ran = Rig(sensed=lambda t: 1.0 - 0.4).run(3.0, bounds)
     assert ran.cause is Cause.NONE
     assert ran.state.steps.size_nm == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("seconds", [0.0, 1.0, 1.003])
+def test_to_zero_the_sensor_while_its_torque_is_compared_is_no_fault(seconds):
+    """What the filters hold is less by the bias at once, in the middle of a mean as well."""
+    model = MODEL._replace(zero_nm=0.9)
+    before = Rig(model=model, sensed=lambda t: 1.0).run(seconds, limits(model))
+    bounds, state = zeroed(limits(model), before.state, 0.9)
+    rig = Rig(model=model, sensed=lambda t: 1.0 - 0.9, angle=lambda t: SPEED * (seconds + t))
+    after = rig.run(1.0, bounds, state)
+    assert after.cause is Cause.NONE
+    assert after.state.steps.size_nm == pytest.approx(0.0, abs=1e-9)
 
 
 def test_it_begins_with_nothing():
