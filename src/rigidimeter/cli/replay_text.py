@@ -18,10 +18,12 @@ def say_replayed(folder: Path) -> None:
     Raises
     ------
     UserError
-        If the guard of this version decides otherwise, or the session cannot be read.
+        If the guard of this version decides otherwise, or no tick of the session can be read.
     """
     began_s = time.perf_counter()
     found = replay_session(folder)
+    if not found.ticks:
+        raise UserError(f"{folder}: no tick can be replayed: {found.left_out or 'there is none'}")
     for line in replay_lines(found, time.perf_counter() - began_s):
         echo(line)
     if found.differences:

@@ -91,6 +91,15 @@ def test_another_guard_is_a_failure_that_says_where(recorded, rigidimeter, monke
     assert "the guard of this version differs from the record in" in ran.err
 
 
+def test_a_session_of_which_nothing_is_left_is_no_success(recorded, rigidimeter):
+    folder = recorded()
+    samples = folder / "samples.arrows"
+    samples.write_bytes(samples.read_bytes()[:2000])
+    ran = rigidimeter("check", "--replay", folder)
+    assert (ran.status, ran.out) == (1, "")
+    assert "no tick can be replayed: the end of samples.arrows is damaged or missing" in ran.err
+
+
 @pytest.mark.parametrize("also", [["RIG.toml"], ["--zero"], ["--settings", "other.toml"]])
 def test_a_replay_goes_alone(recorded, rigidimeter, also):
     ran = rigidimeter("check", *also, "--replay", recorded())

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.core.session import read_session_files, session_settings
+from rigidimeter.core.session import EVENTS, SAMPLES, read_session_files, session_settings
 from rigidimeter.core.settings import Settings
 from rigidimeter.rig.acquisition.decision import decide, late_cause, stronger
 from rigidimeter.rig.guard import (
@@ -114,7 +114,7 @@ class Replay(NamedTuple):
     not_run : tuple of str
         Laws that did not run, and why, each a clause.
     left_out : str
-        Which part of the record was not replayed, and why; empty if all of it was.
+        What of the record was not replayed, and why; empty if all of it was.
     rounded_ticks : int
         At which another command was sent than the guard allowed, within what a drive does to it.
     rounded_rad_s : float
@@ -147,9 +147,16 @@ def replay_session(folder: Path) -> Replay:
     columns = {name: column[:whole] for name, column in samples.columns.items()}
     recorded = files.manifest["channel_units"]
     found = replay(session_settings(folder), columns, files.log.events, recorded)
-    if samples.lost and not found.left_out:
-        found = found._replace(left_out=f"from {samples.lost[0]} on: its samples are lost")
-    return found
+    left_out = [found.left_out] if found.left_out else []
+    if samples.lost and not left_out:
+        left_out.append(f"from {samples.lost[0]} on: its samples are lost")
+    if files.ended and not samples.stream.closed:
+        left_out.append(f"the end of {SAMPLES} is damaged or missing")
+    left_out += [
+        f"line {n} of {EVENTS} is damaged, so what it says of range, zero or drive is not known"
+        for n in files.log.damaged
+    ]
+    return found._replace(left_out="; ".join(left_out))
 
 
 def replay(

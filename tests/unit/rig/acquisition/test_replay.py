@@ -250,6 +250,36 @@ def test_a_session_that_is_halted_by_the_operator_sends_nothing_more(tmp_path):
     assert ran.result.cause is Cause.OPERATOR_HALT  # replayed by the fixture of this folder
 
 
+@pytest.mark.parametrize("cut", [0.5, 0.02])
+def test_a_folder_whose_end_is_missing_says_so(tmp_path, cut):
+    """It was closed, so that the record is known to have gone on."""
+    columns, _ = recorded()
+    writer = SessionWriter(tmp_path / "s", SETTINGS, [], {}, virtual=True)
+    for start in range(0, 1000, 100):
+        writer.columns({name: column[start : start + 100] for name, column in columns.items()})
+    writer.close(1.0, "success", "")
+    path = tmp_path / "s" / "samples.arrows"
+    content = path.read_bytes()
+    path.write_bytes(content[: int(cut * len(content))])
+    found = replay_session(tmp_path / "s")
+    assert found.ticks < 1000
+    assert "the end of samples.arrows is damaged or missing" in found.left_out
+
+
+def test_a_line_of_the_events_that_cannot_be_read_is_named(tmp_path):
+    """It may have been the range of motion, the zeroing or the model of the drive."""
+    columns, _ = recorded()
+    writer = SessionWriter(tmp_path / "s", SETTINGS, [], {}, virtual=True)
+    writer.columns(columns)
+    writer.event("sensor_zeroed", time_s=0.0, bias_nm=0.5, noise_sd_nm=0.01, refused="")
+    writer.close(1.0, "success", "")
+    path = tmp_path / "s" / "events.jsonl"
+    path.write_text(path.read_text().replace('"bias_nm": 0.5', '"bias_nm": 0.7'))
+    found = replay_session(tmp_path / "s")
+    assert found.ticks == len(columns["tick"])
+    assert "line 1 of events.jsonl is damaged" in found.left_out
+
+
 def test_a_folder_is_replayed_and_says_from_where_samples_are_lost(tmp_path):
     columns, _ = recorded()
     writer = SessionWriter(tmp_path / "s", SETTINGS, [], {}, virtual=True)
