@@ -138,6 +138,7 @@ def test_a_joint_outside_of_the_persons_range_is_refused():
         ({"rated_torque_mnm": 1}, {}, TORQUE, "more than 65535"),
         ({"home_offset_counts": 5}, {}, POSITION, "home offset of 5"),
         ({"position_counts": 2**31 - 100}, {}, POSITION, "do not fit into 32 bits"),
+        ({}, {"axis_subindex": 2}, POSITION, "sub-indices of 0x607D, which are those of axes"),
     ],
 )
 def test_a_bound_that_cannot_be_computed_is_not_written_and_says_why(says, changes, name, why):

@@ -261,6 +261,20 @@ def test_a_mapping_that_refuses_to_be_written_is_accepted_if_it_is_as_needed():
         written(drive)
 
 
+@pytest.mark.parametrize(
+    ("units", "name"),
+    [
+        ({"velocity_units_per_rev_s": 1e9}, r"max profile velocity \(0x607F:00\)"),
+        ({"motor_speed_units_per_rev_s": 1e9}, r"max motor speed \(0x6080:00\)"),
+    ],
+)
+def test_a_value_that_its_object_has_no_room_for_is_refused_in_one_sentence(units, name):
+    settings, bounds = Cia402Settings(**units), drive_bounds(parse_settings({}))
+    entries = (*objects(settings), *bound_objects(settings, bounds))
+    with pytest.raises(DeviceError, match=rf"{name} = \d+ does not fit into its 4 bytes"):
+        all(write_object(Drive({}), entry, "drive") for entry in entries)
+
+
 def test_max_profile_velocity_is_optional_and_the_watchdog_is_not():
     assert written(Drive({}, absent=(0x607F,))) == [0x607F]
     for index in (0x1016, 0x6007):

@@ -11,7 +11,7 @@
 ends of 0x607D. The following error window 0x6065 is not written: by CiA 402 it acts in the position
 modes, and in profile velocity mode bit 13 of the statusword, which it sets there, means slippage.
 0x607D is left alone where the drive has a home offset (0x607C): makers differ in whether the limits
-count before or after it.
+count before or after it; and where sub-indices number axes.
 """
 
 from __future__ import annotations
@@ -216,7 +216,12 @@ def _position(
         f"{lowest} to {highest} counts"
     )
     why = ""
-    if says.home_offset_counts:
+    if settings.axis_subindex:
+        why = (
+            "its ends are sub-indices of 0x607D, which are those of axes where axis_subindex is "
+            "not 0: another axis might get them"
+        )
+    elif says.home_offset_counts:
         why = f"the drive has a home offset of {says.home_offset_counts} (0x607C); set it to 0"
     elif lowest < -(2**31) or highest >= 2**31:
         why = "the counts of the ends do not fit into 32 bits; move zero_counts"

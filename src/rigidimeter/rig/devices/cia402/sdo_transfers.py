@@ -41,9 +41,15 @@ def write_object(sdo: Any, entry: Object, who: str) -> bool:
     Raises
     ------
     DeviceError
-        If the drive does not answer or refuses the value.
+        If the drive does not answer or refuses the value, or the object has no room for it.
     """
-    data = entry.value.to_bytes(entry.size, "little", signed=entry.signed)
+    try:
+        data = entry.value.to_bytes(entry.size, "little", signed=entry.signed)
+    except OverflowError:
+        raise DeviceError(
+            f"{who}: {entry.label} = {entry.value} does not fit into its {entry.size} bytes; "
+            "velocity, ramps or their units in the rig file are too large"
+        ) from None
     try:
         sdo.download(entry.index, entry.subindex, data)
     except library("canopen").SdoAbortedError as error:
