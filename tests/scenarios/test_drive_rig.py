@@ -44,6 +44,25 @@ def test_the_drive_is_found_and_the_joint_with_it(rig):
 
 @pytest.mark.parametrize(
     "rig",
+    [
+        DriveRig("PI with lag", 200.0),
+        DriveRig("friction", 1000.0),
+        DriveRig("PI", 100.0, lowpass_hz=30.0),
+    ],
+    ids=str,
+)
+def test_the_angle_shows_the_drive_where_no_velocity_was_recorded(rig):
+    settings = parse_settings({"estimation": {"torque_lowpass_hz": rig.lowpass_hz}})
+    recorded = run(rig, 1)
+    kept = {name: one for name, one in recorded.channels.items() if name != "velocity_rad_s"}
+    (fit,) = estimate([replace(recorded, channels=kept)], "iv", settings=settings).fits
+    assert np.all(np.abs(fit.value / TRUTH - 1) < MOST)
+    assert np.all((fit.low <= TRUTH) & (fit.high >= TRUTH))
+    assert "between_samples" not in {finding.name for finding in fit.findings}
+
+
+@pytest.mark.parametrize(
+    "rig",
     [DriveRig("friction", 200.0), DriveRig("friction", 333.0), DriveRig("PI", 100.0)],
     ids=str,
 )

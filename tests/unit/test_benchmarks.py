@@ -31,6 +31,7 @@ SMALLEST = {
     "file_faults": "--files 8",
     "held_at_limit": "--hours 1e-5",
     "lack_of_fit": "--recordings 1",
+    "late_drive": "1",
     "model_terms": "--epochs 1 --only relaxed",
     "null_studies": "--studies 1 --processes 1",
     "scenarios.__main__": "--only relaxed --recordings 1 --methods bandlimited",
@@ -52,6 +53,9 @@ def smaller(name: str, module: ModuleType, folder: Path) -> Mapping[str, Any]:
     """Return what a module is to do less of than its arguments can say, and where to write."""
     if name == "between_samples":
         return {"TABLE": folder / "page.md", "FIRST_HZ": (100.0,), "FILTERS_HZ": (0.0,)}
+    if name == "late_drive":
+        some = {key: module.RECORDED[key] for key in list(module.RECORDED)[:1]}
+        return {"EPOCHS": 1, "LIMBS": {"human": (*module.RIGS,)[1:]}, "RECORDED": some}
     if name == "archive":
         return {"apart": module.measured}
     if name in ("drive_torque", "false_alarms"):

@@ -160,8 +160,13 @@ def _settled(
     is left takes only part of it away. Where the perturbation is not known, the measured motion is
     its own instrument. The error of the zero is that of what is left over its slope,
     by how much a move of the torque changes it. The search begins `near` a delay and J, B and K.
+
+    Behind a drive whose acceleration jumps at each command and then decays, torque that is late by
+    less than a tick sees the same course with another J, so there are zeros at every such delay:
+    where nothing is left at the stamps themselves, none is sought.
     """
     longest_s = epochs[0].settings.estimation.max_delay_s
+    jumps = any(one.driven_at is not None and one.driven_at.drive.jump for one in motions)
 
     def left_after(move_s: float, near: Array | None = None) -> LineFit:
         moved = [epoch.moved(move_s) if move_s else epoch for epoch in epochs]
@@ -178,8 +183,8 @@ def _settled(
     for _ in range(ROUNDS):
         fit = left_after(total_s, begin)
         left_s, error_s = float(fit.values[-1]), float(fit.standard_errors[-1])
-        if near is None and not (perturbed or tried or matters(left_s, error_s)):
-            return left_s, error_s, fit.values[:-1]  # least squares shows it without a move
+        if near is None and not ((perturbed and not jumps) or tried or matters(left_s, error_s)):
+            return left_s, error_s, fit.values[:-1]  # it shows without a move
         begin = fit.values if abs(left_s) < IN_VALLEY_S else None
         stretch = 1.0
         if tried and abs(left_s) < abs(tried[-1][1]):

@@ -186,8 +186,6 @@ def analyse_prepared(
     for prepared in () if fits_alone else preparation.imposed(as_recorded=as_recorded):
         scores.append(score_prepared(prepared))
         progress(costs.score)
-    if estimator.uses_perturbation:
-        reason += _without_drive(fitted, bool(reason))
 
     def fitted_by(
         epochs: Sequence[PreparedEpoch], inertia_kg_m2: float | None, pooled: bool
@@ -264,20 +262,6 @@ def _of_recordings(fits: Sequence[Fit]) -> Iterator[Finding]:
         facts: dict[str, Fact] = {"high": names[high], "high_j": medians[high]}
         facts |= {"low": names[low], "low_j": medians[low]}
         yield found_between("inertia_of_recordings", facts, percent, DIFFERENT_INERTIA_PERCENT)
-
-
-def _without_drive(epochs: Sequence[PreparedEpoch], after: bool) -> str:
-    """Say of which sources the drive is unknown, and what that costs."""
-    sources = {prepared.epoch.source: prepared.source for prepared in epochs}
-    unknown = [name for name, source in sources.items() if source.drive is None]
-    if not unknown:
-        return ""
-    return (
-        f"{'. ' if after else ''}In {', '.join(unknown)} command and velocity do not show the "
-        "drive, so the motion between samples is interpolated: J comes out low, by about 1 % with "
-        "a drive of second order and 50 Hz at 1000 ticks/s, by 14 % with a PI drive, and by far "
-        "more at lower rates; where something but the robot pushes, B may be some percent high"
-    )
 
 
 def estimate(

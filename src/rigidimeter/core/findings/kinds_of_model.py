@@ -43,13 +43,14 @@ MODEL_KINDS = (
     ),
     Kind(
         "between_samples",
-        "largest change of J, B or K, in %, with another drive that explains the velocity by the "
-        "command as well ([why](../explanation/between-samples.md)); also found where the command "
-        "was recorded but no drive explains the velocity, or where it was not and the drive of the "
-        "settings would change J by more, or the torque holds a friction below 2 % of its SD, as a "
-        "drive with friction leaves",
+        "largest change of J, B or K, in %, with another drive that explains the motion by the "
+        "command as well, if it is more than the standard error "
+        "([why](../explanation/between-samples.md)); also how far J may be too low where command "
+        "or perturbation was recorded and the drive is not known, where neither was and the drive "
+        "of the settings would change J by more, or where the torque holds a friction below 2 % of "
+        "its SD, as a drive with friction leaves",
         headline="{symbol} may be {value:.2g} % off: motion between samples is not known",
-        measured="Drives that explain the velocity equally well give {symbol} up to {value:.2g} % "
+        measured="Drives that explain the motion equally well give {symbol} up to {value:.2g} % "
         "away (at most {limit:g} %).",
         meaning="The samples do not show how the joint moved between them, so {symbol} may be as "
         "much too high or too low.",
@@ -59,15 +60,17 @@ MODEL_KINDS = (
             "of_settings": {
                 "measured": "At the samples of the torque the drive of the settings makes {symbol} "
                 "{value:.2g} % wrong (at most {limit:g} %).",
-                "meaning": "Without velocity and command that is not corrected, so {symbol} may be "
+                "meaning": "Without command and motion that is not corrected, so {symbol} may be "
                 "as much too high or too low.",
             },
-            "no_drive": {
-                "headline": "No drive explains the velocity: J may be far too low",
-                "measured": "No drive explains the recorded velocity by the command.",
-                "meaning": "How the joint moved between the samples is not known, and J may be far "
-                "too low.",
-                "remedy": "Record the command at every tick at which it is sent, or "
+            "unknown_drive": {
+                "headline": "J may be {low_j:.3g} to {high_j:.3g} kg·m²: the drive is not known",
+                "measured": "Drives of up to {bandwidth_hz:g} Hz that the recording allows give J "
+                "from {low_j:.3g} to {high_j:.3g} kg·m², up to {value:.2g} % more (at most "
+                "{limit:g} %).",
+                "meaning": "The torque was sampled when commands were sent, and sees less than the "
+                "mean acceleration between them.",
+                "remedy": "Record the velocity command at every tick, beside angle or velocity, or "
                 + _SAMPLE_FASTER,
             },
             "friction": {
@@ -87,7 +90,14 @@ MODEL_KINDS = (
                 "sample faster.",
             },
         },
-        example={"value": 4.0, "limit": 1.0, "symbol": "J"},
+        example={
+            "value": 4.0,
+            "limit": 1.0,
+            "symbol": "J",
+            "low_j": 0.0721,
+            "high_j": 0.075,
+            "bandwidth_hz": 50.0,
+        },
     ),
     Kind(
         "missing_term",

@@ -208,7 +208,7 @@ class Fit:
         )
 
     def _repr_html_(self) -> str:
-        """Return J, B and K with their standard errors and 95 % intervals as a table."""
+        """Return J, B and K with their 95 % intervals as a table, and what the cautions say."""
         rows = [
             [
                 f"{p.symbol}, {p.title}",
@@ -220,7 +220,9 @@ class Fit:
             )
         ]
         table = html_table(["", "estimate ± standard error", "95\xa0% interval", "unit"], rows)
-        return f"{table}\n<p>{escape(self.words)}</p>"
+        serious = [one for one in self.findings if one.level != "note"]
+        said = [escape(f"{one.level}: {one.headline}") for one in serious]
+        return "\n".join([table, *(f"<p>{text}</p>" for text in (escape(self.words), *said))])
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -88,6 +88,8 @@ def beyond_samples(
     omega_rad_s: Array,
     interval_s: float,
     after_s: float,
+    *,
+    angle_alone: bool = False,
 ) -> Beyond:
     """Return what the torque sees beyond the samples; epochs of one layout share it.
 
@@ -101,9 +103,13 @@ def beyond_samples(
         Of the ticks.
     after_s : float
         How long after each tick torque and motion were sampled.
+    angle_alone : bool
+        Whether acceleration and velocity are those of the angle's samples, −ω² F (H/s)* and
+        jω F (H/s)*.
     """
     lines = float(omega_rad_s[0]), float(omega_rad_s[-1]), omega_rad_s.size
-    return _beyond(drive, torque_filter, lines, float(f"{interval_s:.9g}"), round(after_s, 9))
+    interval_s, after_s = float(f"{interval_s:.9g}"), round(after_s, 9)
+    return _beyond(drive, torque_filter, lines, interval_s, after_s, angle_alone)
 
 
 @lru_cache(maxsize=128)
@@ -113,6 +119,7 @@ def _beyond(
     lines: tuple[float, float, int],
     interval_s: float,
     after_s: float,
+    angle_alone: bool,
 ) -> Beyond:
     omega_rad_s = np.linspace(*lines)
     z = np.exp(1j * omega_rad_s * interval_s)
@@ -120,7 +127,8 @@ def _beyond(
     if torque_filter is not None:
         seen = behind(drive, torque_filter).transfer(z, interval_s, after_s)
     through = filtered(torque_filter, omega_rad_s)
-    sampled = through * np.stack([1j * omega_rad_s * motion[1], motion[1], motion[2]]).T
+    velocity = 1j * omega_rad_s * motion[2] if angle_alone else motion[1]
+    sampled = through * np.stack([1j * omega_rad_s * velocity, velocity, motion[2]]).T
     return Beyond(seen.T - sampled, sampled[:, 1:2])
 
 

@@ -8,7 +8,8 @@ included, and δ is at least twice what it changes. δ is added to both ends of 
     low = p̂ − t s − δ        high = p̂ + t s + δ
 
 with s the standard error and t Student's quantile; pooled epochs share the drive, so δ does not
-fall with their number. Where δ is more than a share of the parameter, it has the finding.
+fall with their number. Where δ is more than a share of the parameter, and more than its standard
+error, it has the finding.
 """
 
 from __future__ import annotations
@@ -58,6 +59,7 @@ def between_samples(
     observation: Observation,
     values: Array,
     between: Array,
+    standard_errors: Array,
     settings: DiagnosticsSettings,
 ) -> tuple[Finding, ...]:
     """Return the finding `between_samples` of a fit; none where it hangs on nothing unknown.
@@ -68,17 +70,21 @@ def between_samples(
     observation : Observation
     values, between : array, shape (p,)
         The parameters, J first unless it was held, and how far they may be elsewhere.
+    standard_errors : array, shape (p,)
+        Where δ is below them the interval is hardly wider by it.
     settings : DiagnosticsSettings
     """
     most, known = settings.max_between_samples_percent, observation.drive_known
     condition = epoch.condition
-    if not known and {"velocity_command_rad_s", "velocity_rad_s"} <= set(epoch.channels):
-        return (found(NAME, settings, np.nan, most, condition=condition, variant="no_drive"),)
-    share = 100.0 * between / np.abs(values)
-    percent = np.concatenate([np.zeros(3 - values.size), share])  # J that was held is not moved
+    in_loop = observation.perturbation is not None or "velocity_command_rad_s" in epoch.channels
+    if in_loop and not known:
+        return ()  # `drive_check` says more
+    share, held = 100.0 * between / np.abs(values), np.zeros(3 - values.size)  # is not moved
+    percent = np.concatenate([held, share])
+    shows = np.concatenate([held, np.where(between > standard_errors, share, 0.0)])
     # Of a drive that is not known J says most: it is what the torque does not see between samples.
-    about = int(np.argmax(percent)) if known else 0
-    if percent[about] <= most:
+    about = int(np.argmax(shows)) if known else 0
+    if shows[about] <= most:
         return ()
     J, B, K = percent.tolist()
     return (

@@ -191,7 +191,9 @@ def _fit_of(
         residual_sd_nm=float(np.sqrt(left / sum(counts))),
         n_samples=sum(counts),
         band_hz=observations[0].grid.band_hz,
-        findings=between_samples(epoch, observations[0], fit.values, between, diagnostics),
+        findings=between_samples(
+            epoch, observations[0], fit.values, between, fit.standard_errors, diagnostics
+        ),
         **numbers,
         **amplitude_together(moved, counts)._asdict(),
     )

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation.closedloop.drive_motion import lengths_s, since_ticks
@@ -47,6 +48,9 @@ DOUBLE = 1e-4
 BESIDE = 0.3
 """Where the search for a further pole starts, in times the first."""
 
+PASSED_HZ = 10.0
+"""An angle is used as the velocity through a low-pass of first order and this corner."""
+
 TINY = float(np.finfo(np.float64).tiny)
 
 
@@ -65,6 +69,9 @@ class Samples:
         Its SD.
     sign : Channel or None
         Of the velocity, in parts of a tick, where dry friction acts on the drive.
+    of_angle : bool
+        Whether the angle was measured and not the velocity. `measured` is then `from_angle`, and
+        so is every velocity that is compared with it.
     """
 
     command: Channel
@@ -73,6 +80,7 @@ class Samples:
     measured: Array
     scale: float
     sign: Channel | None = None
+    of_angle: bool = False
     _since: dict[str, tuple[float, tuple[NDArray[np.intp], Array | float]]] = field(
         default_factory=dict, init=False, repr=False
     )
@@ -84,6 +92,46 @@ class Samples:
             tick, after_s = since_ticks(channel, self.time_s, delay_s, even=0.0)
             known = self._since[channel.name] = delay_s, (tick, same_time(after_s))
         return known[1]
+
+
+def mean_interval_s(time_s: Array) -> float:
+    """Return the mean interval of stamps."""
+    return float(time_s[-1] - time_s[0]) / (time_s.size - 1)
+
+
+def from_angle(angle_rad: Array, interval_s: float) -> Array:
+    """Return the velocity through a low-pass, made of the angle without a derivative.
+
+    By parts, with a the corner,
+
+        ∫ e^(−a(t − s)) θ'(s) ds = θ(t) − a ∫ e^(−a(t − s)) θ(s) ds
+
+    plus what the begin leaves. At samples it is y_k = e^(−aT) y_(k−1) + θ_k − θ_(k−1): white noise
+    of the angle stays white above the corner, and neither where the angle begins nor a slow drift
+    counts.
+
+    Parameters
+    ----------
+    angle_rad : array, shape (..., n)
+    interval_s : float
+        T, of the samples.
+    """
+    kept = _kept(interval_s)
+    steps = np.diff(angle_rad, axis=-1, prepend=angle_rad[..., :1])
+    return np.asarray(scipy.signal.lfilter([1.0], [1.0, -kept], steps))
+
+
+def measured_velocity(samples: Samples) -> tuple[Array, Array]:
+    """Return times and velocity as measured; of an angle its differences, midway between stamps."""
+    if not samples.of_angle:
+        return samples.time_s, samples.measured
+    interval_s = mean_interval_s(samples.time_s)
+    steps = samples.measured[1:] - _kept(interval_s) * samples.measured[:-1]
+    return samples.time_s[1:] - 0.5 * interval_s, steps / interval_s
+
+
+def _kept(interval_s: float) -> float:
+    return math.exp(-2 * math.pi * PASSED_HZ * interval_s)
 
 
 class FittedDrive(NamedTuple):
@@ -163,15 +211,29 @@ def velocities(samples: Samples, place: Array, zeros: int) -> Array:
         tick, held_s = samples.since(channel, late_s)
         steps_s = lengths_s(channel)
         total = np.zeros((own_zeros + 1, tick.size))
+        sent = _integral(channel, steps_s, tick, held_s) if samples.of_angle else None
         for pole, shape in zip(poles, _shapes(poles, own_zeros), strict=True):
             before = state_at_ticks(pole, channel.values, steps_s)[tick]
             state = state_later(pole, before, channel.values[tick], held_s)
+            if sent is not None:  # ∫x dt, as x' = λ x + c
+                state = np.asarray((state - sent) / (pole if pole.imag else pole.real))
             weight = shape * (2.0 if pole.imag else 1.0)
             total += np.outer(weight.real, state.real)
             if pole.imag:
                 total -= np.outer(weight.imag, state.imag)
         rows.append(total)
-    return np.concatenate(rows)
+    made = np.concatenate(rows)
+    if samples.of_angle:
+        return from_angle(made, mean_interval_s(samples.time_s))
+    return made
+
+
+def _integral(
+    channel: Channel, steps_s: float | Array, tick: NDArray[np.intp], held_s: Array | float
+) -> Array:
+    """Return ∫ c dt of a held command."""
+    summed = np.concatenate(([0.0], np.cumsum(channel.values[:-1] * steps_s)))
+    return np.asarray(summed[tick] + held_s * channel.values[tick])
 
 
 def coordinates(drive: DriveModel, interval_s: float, poles: int) -> Array:

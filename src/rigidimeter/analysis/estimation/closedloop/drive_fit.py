@@ -15,6 +15,7 @@ Its rivals are the others that do, and its own neighbours (`drive_search`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -27,6 +28,9 @@ from rigidimeter.analysis.estimation.closedloop.drive_answer import (
     Samples,
     answer,
     coordinates,
+    from_angle,
+    mean_interval_s,
+    measured_velocity,
     velocities,
 )
 from rigidimeter.analysis.estimation.closedloop.drive_motion import since_ticks
@@ -62,6 +66,15 @@ RIVAL, COLOURED = 4.0, 2.0
 """If what the best leaves is not noise, alike over so many samples, one that leaves so many times
 its power might be there."""
 
+UNLIKELY = 6.0
+"""Where it is noise, a drive whose information criterion is above the best by more (Kass and
+Raftery 1995: strong evidence against it) does not explain as well. Its power alone does not say so:
+a larger drive always leaves less of the noise."""
+
+SLOW = 1.0
+"""In rad a tick: where a pole is faster the samples hardly show how many there are, and all that
+explain as well are rivals."""
+
 UNSEEN = 2e-5
 """Drives that leave no more than this share of the velocity's SD are alike."""
 
@@ -72,12 +85,15 @@ down to this share."""
 SIGNS = 3
 """So many times the sign of the velocity is made from the drive, and the drive from the sign."""
 
+NOISY = 0.01
+"""Where a velocity leaves noise above this share of its SD, the angle may show the drive better."""
+
 LARGEST_MISFIT = 0.1
 """Above this share of the velocity's standard deviation the command does not explain it."""
 
 FEWEST_SAMPLES, MOST_SAMPLES, MOST_TICKS = 50, 3000, 8000
-"""Of the velocity and of the command; more do not make a drive known any better that is not quite
-linear."""
+"""Of the velocity, and of command and angle; more do not make a drive known any better that is not
+quite linear."""
 
 SETTLED_S = 0.3
 """An epoch may begin in motion, and the model begins at rest. After commands that are lost it is
@@ -104,7 +120,9 @@ class FoundDrive(NamedTuple):
 
 
 def fit_drive(epoch: Epoch, start: DriveModel) -> FoundDrive | None:
-    """Identify the drive from command and velocity; None where they do not show it.
+    """Identify the drive from command and motion; None where they do not show it.
+
+    The motion is the velocity, or the angle where that is all there is or has less noise.
 
     Parameters
     ----------
@@ -115,11 +133,30 @@ def fit_drive(epoch: Epoch, start: DriveModel) -> FoundDrive | None:
     Returns
     -------
     FoundDrive or None
-        None if command or velocity was not recorded, if no drive explains the velocity, or if the
-        command seems to have been logged more slowly than it was sent, which a loop of ours does
+        None if the command was not recorded, if no drive explains the motion, or if the command
+        seems to have been logged more slowly than it was sent, which a loop of ours does
         not do.
     """
-    samples = _samples(epoch)
+    velocity, angle = (epoch.channels.get(name) for name in ("velocity_rad_s", "angle_rad"))
+    first, second = (velocity, angle) if velocity is not None else (angle, None)
+    one = None if first is None else _identified(epoch, first, start)
+    if one is None or second is None or not one.noise or one.power < NOISY**2:
+        return one and one.drive
+    other = _identified(epoch, second, start)
+    return (other if other is not None and other.power < one.power else one).drive
+
+
+class Identified(NamedTuple):
+    """A drive, the power that it leaves of the motion, and whether that is noise."""
+
+    drive: FoundDrive
+    power: float
+    noise: bool
+
+
+def _identified(epoch: Epoch, motion: Channel, start: DriveModel) -> Identified | None:
+    """Return the drive that one channel of the motion shows; None where it shows none."""
+    samples = _samples(epoch, motion)
     if samples is None:
         return None
     start = _as_fast(samples, start)
@@ -139,11 +176,22 @@ def fit_drive(epoch: Epoch, start: DriveModel) -> FoundDrive | None:
     left = min(found, key=power_of).left
     noise = correlation_samples(left[:, None]).item() < COLOURED
     most = (times if noise else RIVAL) * least + UNSEEN**2
-    rivals = [one.model for one in found if one is not chosen and one.power <= most]
+    others = [one for one in found if one is not chosen and one.power <= most]
+    fastest = max(map(abs, chosen.model.poles_rad_s))
+    if noise and fastest * samples.interval_s < SLOW:
+        likely = min(map(_information, found)) + UNLIKELY
+        others = [one for one in others if _information(one) <= likely]
+    rivals = [one.model for one in others]
     rivals += neighbours(chosen)
     if not noise:
         rivals += _of_halves(chosen)
-    return FoundDrive(chosen.model, tuple(rivals))
+    return Identified(FoundDrive(chosen.model, tuple(rivals)), chosen.power, noise)
+
+
+def _information(one: FittedDrive) -> float:
+    """Return n ln σ² + k ln n (Schwarz 1978), with k poles, numerator and delay."""
+    n, k = one.left.size, one.place.size - 1 + one.numerator.size + (one.place[-1] > 0.0)
+    return float(n * math.log(one.power + UNSEEN**2) + k * math.log(n))
 
 
 def _of_halves(one: FittedDrive) -> Iterator[DriveModel]:
@@ -171,6 +219,9 @@ def _climbed(samples: Samples, starts: Sequence[DriveModel]) -> list[FittedDrive
     One pole more where the best has a delay: a lag looks like it at the samples. The search begins
     at the poles of `starts`, and then also at those of the drives before.
     """
+    slowest = [min(abs(pole) for pole in one.poles_rad_s) for one in starts]
+    places = [np.log([pole * samples.interval_s]) for pole in slowest]
+    single = best_drive(samples, places, 0)
     found: list[FittedDrive] = []
     enough = False
     for poles in range(2, MOST_POLES + 1):
@@ -187,7 +238,7 @@ def _climbed(samples: Samples, starts: Sequence[DriveModel]) -> list[FittedDrive
         if enough or (spent and best.place[-1] == 0.0):
             break
         enough = spent
-    return found
+    return [single, *found]
 
 
 def _with_friction(
@@ -197,27 +248,31 @@ def _with_friction(
     least = min(one.power for one in found)
     if least < QUIET**2:
         return samples, found
-    starts = [start, *(one.model for one in found[:2])]
-    rubbed = replace(samples, sign=_sign(samples, samples.measured))
+    starts = [start, *(one.model for one in found[1:3])]
+    rubbed = replace(samples, sign=_sign(samples))
     # The velocity's samples do not show when its sign changed; a drive does, and is found by it.
     for _ in range(SIGNS):
         places = [np.append(coordinates(one, samples.interval_s, 2), 0.0) for one in starts]
         first = min((searched(rubbed, one, 1, delayed=False) for one in places), key=power_of)
         starts = [first.model]
-        rubbed = replace(rubbed, sign=_sign(rubbed, first.left, first))
+        rubbed = replace(rubbed, sign=_sign(rubbed, first))
     return (samples, found) if first.power > RUBS * least else (rubbed, _climbed(rubbed, starts))
 
 
-def _sign(samples: Samples, left: Array, one: FittedDrive | None = None) -> Channel:
+def _sign(samples: Samples, one: FittedDrive | None = None) -> Channel:
     """Return the mean sign of the velocity in parts of a tick.
 
-    The velocity is what a drive makes there, and straight between the samples what it leaves.
+    The velocity is what a drive makes there, and straight between the samples what it leaves; of
+    an angle, what the drive makes.
     """
     time_s = _finer(samples.command.time_s)
-    velocity = np.interp(time_s, samples.time_s, left)
-    if one is not None:
-        there = replace(samples, time_s=time_s)
-        velocity = one.numerator @ velocities(there, one.place, one.zeros) - velocity
+    if one is None:
+        velocity = np.interp(time_s, *measured_velocity(samples))
+    else:
+        there = replace(samples, time_s=time_s, of_angle=False)
+        velocity = one.numerator @ velocities(there, one.place, one.zeros)
+        if not samples.of_angle:
+            velocity -= np.interp(time_s, samples.time_s, one.left)
     after = np.append(velocity[1:], velocity[-1])
     larger = np.maximum(np.abs(velocity) + np.abs(after), TINY)
     return Channel("velocity_rad_s", time_s, (velocity + after) / larger)
@@ -261,26 +316,31 @@ def _power_between_lines(samples: Samples, start: DriveModel) -> float:
     return min(best_drive(finer, begins, zeros).power for zeros in (0, 1))
 
 
-def _samples(epoch: Epoch) -> Samples | None:
+def _samples(epoch: Epoch, motion: Channel) -> Samples | None:
     """Return what the drive is identified from; None where there is too little."""
     command = epoch.channels.get("velocity_command_rad_s")
-    velocity = epoch.channels.get("velocity_rad_s")
-    if command is None or velocity is None or len(command) < 2 * FEWEST_SAMPLES:
+    if command is None or len(command) < 2 * FEWEST_SAMPLES:
         return None
     start_s = command.time_s[0] + SETTLED_S
     last_s = command.time_s[:MOST_TICKS][-1]
-    inside = (velocity.time_s >= start_s) & (velocity.time_s <= last_s)
-    inside &= sound(epoch, velocity.time_s)
+    inside = (motion.time_s >= start_s) & (motion.time_s <= last_s)
+    inside &= sound(epoch, motion.time_s)
     for stretch in epoch.left_out:
         if stretch.lost:
-            inside &= (velocity.time_s < stretch.stop_s) | (
-                velocity.time_s > stretch.stop_s + SETTLED_S
+            inside &= (motion.time_s < stretch.stop_s) | (
+                motion.time_s > stretch.stop_s + SETTLED_S
             )
-    time_s = velocity.time_s[inside][:MOST_SAMPLES]
-    measured = velocity.values[inside][:MOST_SAMPLES]
-    scale = float(np.std(measured)) if time_s.size else 0.0
-    if time_s.size < FEWEST_SAMPLES or scale == 0.0:
+    of_angle = motion.name == "angle_rad"
+    most = MOST_TICKS if of_angle else MOST_SAMPLES
+    time_s, measured = motion.time_s[inside][:most], motion.values[inside][:most]
+    if time_s.size < FEWEST_SAMPLES:
+        return None
+    if of_angle:
+        measured = from_angle(measured, mean_interval_s(time_s))
+    scale = float(np.std(measured))
+    if scale == 0.0:
         return None
     ticks = int(np.searchsorted(command.time_s, time_s[-1], side="right"))
     used = Channel(command.name, command.time_s[:ticks], command.values[:ticks])
-    return Samples(used, 1.0 / command.mean_rate_hz, time_s, measured / scale, scale)
+    interval_s = 1.0 / command.mean_rate_hz
+    return Samples(used, interval_s, time_s, measured / scale, scale, of_angle=of_angle)

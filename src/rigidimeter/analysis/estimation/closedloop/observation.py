@@ -181,7 +181,7 @@ def epoch_lines(
         else:
             tick, after_s = since_ticks(command, time_s, 0.0)
         interval_s, mean_s = 1.0 / command.mean_rate_hz, float(np.mean(after_s))
-        recorded &= velocity is not None and in_step(tick, after_s, interval_s)
+        recorded &= in_step(tick, after_s, interval_s)
         caused = [command.values[tick]]
         if not recorded:
             # At the stamps of the torque, and from there like the torque.
@@ -200,8 +200,9 @@ def epoch_lines(
         return Observation(grid, first, lines, noises)
     sent = Sent(others[0][:, None], interval_s, mean_s, stamps_s)
     if recorded:
-        at = grid.omega_rad_s, interval_s, mean_s
-        lines += sent.command * beyond_samples(motion.driven_at.drive, torque_filter, *at).seen
+        at, alone = (grid.omega_rad_s, interval_s, mean_s), velocity is None
+        drive = motion.driven_at.drive
+        lines += sent.command * beyond_samples(drive, torque_filter, *at, angle_alone=alone).seen
     else:
         lines += np.stack(others[1:], axis=-1)
     return Observation(grid, first, lines, noises, sent)

@@ -209,9 +209,11 @@ def _otherwise(prepared: PreparedEpoch, seen: Observation) -> list[Complex]:
         return [np.zeros_like(change), change]
 
     interval_s, after_s = sent.interval_s, sent.after_s
+    alone = "velocity_rad_s" not in prepared.epoch.channels
 
     def beyond_by(drive: DriveModel, late_s: float = sent.mean_s) -> Beyond:
-        return beyond_samples(drive, torque_filter, omega, interval_s, late_s)
+        at = omega, interval_s, late_s
+        return beyond_samples(drive, torque_filter, *at, angle_alone=alone)
 
     ours, velocity = beyond_by(found.model)
     changes = [-ours, -INEXACT * ours, *(beyond_by(rival).seen - ours for rival in found.rivals)]

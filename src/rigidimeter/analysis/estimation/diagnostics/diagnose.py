@@ -16,6 +16,7 @@ from rigidimeter.analysis.estimation.diagnostics.computed_torque_checks import (
 )
 from rigidimeter.analysis.estimation.diagnostics.controller_checks import CONTROLLER_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.delay_check import DELAY_CHECKS
+from rigidimeter.analysis.estimation.diagnostics.drive_check import DRIVE_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.excitation_checks import EXCITATION_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.fit_checks import PARAMETER_CHECKS, RESIDUAL_CHECKS
 from rigidimeter.analysis.estimation.diagnostics.least_squares_checks import (
@@ -50,6 +51,7 @@ CHECKS: list[Check] = [
     *PARAMETER_CHECKS,
     *CONTROLLER_CHECKS,
     *DELAY_CHECKS,
+    *DRIVE_CHECKS,
 ]
 """Every check of an epoch. Code from outside the package may append its own."""
 

@@ -251,5 +251,4 @@ MISSING_TERM_CHECKS = (
         lambda c: c.once(missing_term),
         harmless=lambda _, look: HARMFUL if look.value > look.limit else ("within", {}),
     ),
-    Check("between_samples", (), friction_of_drive),
 )

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.analysis.estimation.closedloop.between_samples import acceleration_beyond_slope
+from rigidimeter.analysis.estimation.closedloop.drive_answer import from_angle
 from rigidimeter.analysis.estimation.closedloop.drive_fit import fit_drive
 from rigidimeter.analysis.estimation.closedloop.drive_motion import driven, since_ticks
 from rigidimeter.core.records import Channel, Epoch, Ticks
@@ -69,6 +70,34 @@ def test_the_drive_is_found_from_command_and_velocity(delay_s):
     assert abs(pole) == pytest.approx(2 * math.pi * 23.0, rel=1e-3)
     assert -pole.real / abs(pole) == pytest.approx(0.6, rel=1e-3)
     assert found.model.delay_s == pytest.approx(delay_s, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        DriveModel((complex(-1 / 0.006),), (complex(1 / 0.006),)),
+        DriveModel.second_order(25.0, 0.7, 0.0023),
+    ],
+    ids=["first order, 6 ms", "second order, late"],
+)
+def test_the_drive_is_found_from_command_and_angle(model):
+    n, step_rad = 5000, 2 * math.pi / 2**17
+    command = Channel("velocity_command_rad_s", np.arange(n) / 500.0, smooth_commands(n))
+    angle = driven(model, command, command.time_s).angle_rad + 0.3
+    angle = np.round(angle / step_rad) * step_rad
+    channels = {command.name: command, "angle_rad": Channel("angle_rad", command.time_s, angle)}
+    found = fit_drive(Epoch("file", "1", channels), SECOND_ORDER).model
+    assert found.poles_rad_s == pytest.approx(model.poles_rad_s, rel=5e-3)
+    assert found.delay_s == pytest.approx(model.delay_s, abs=3e-5)
+    assert found.gain == pytest.approx(1.0, abs=1e-3)
+
+
+def test_an_angle_is_used_as_the_velocity_through_a_low_pass():
+    """θ = sin ωt: ∫ e^(-a(t - s)) ω cos ωs ds → ω (a cos ωt + ω sin ωt) / (a² + ω²)."""
+    a, omega, t = 2 * math.pi * 10.0, 2 * math.pi * 3.0, np.arange(20_000) / 20_000
+    made = from_angle(np.sin(omega * t), 1 / 20_000)
+    closed = omega * (a * np.cos(omega * t) + omega * np.sin(omega * t)) / (a**2 + omega**2)
+    np.testing.assert_allclose(made[10_000:], closed[10_000:], atol=2e-3)
 
 
 @pytest.mark.parametrize("bandwidth_hz", [5.0, 10.0, 20.0])
