@@ -194,5 +194,5 @@ def test_a_plan_keeps_every_epoch_and_can_be_made_again(
     ]
     assert {epoch.rest_s for epoch in session.epochs} <= set(settings.rests_s)
     assert session.total_s == pytest.approx(
-        sum(epoch.duration_s + epoch.rest_s for epoch in session.epochs)
+        sum(epoch.duration_s + settings.return_s + epoch.rest_s for epoch in session.epochs)
     )

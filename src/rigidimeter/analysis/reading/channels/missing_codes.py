@@ -64,6 +64,11 @@ def missing_codes(values: Array) -> list[Code]:
     >>> [(code.value, code.rows.tolist()) for code in missing_codes(torque)]
     [(-999.0, [50, 120, 200, 301])]
     """
+    with np.errstate(all="ignore"):  # of numbers that are refused elsewhere
+        return _codes(values)
+
+
+def _codes(values: Array) -> list[Code]:
     held = held_rows(values)  # of a slower sensor each sample is several rows
     samples = held if held.size else np.arange(values.size)
     left, found = values.copy(), list[Code]()

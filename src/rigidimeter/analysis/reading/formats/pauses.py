@@ -32,7 +32,8 @@ def bridged_s(channels: Sequence[tuple[Array, Array]]) -> float:
     channels : sequence of (array, array)
         Time in s and values of torque and motion, without NaN.
     """
-    fastest_hz = [_fastest_hz(time_s, values) for time_s, values in channels]
+    with np.errstate(all="ignore"):  # of numbers that are refused elsewhere
+        fastest_hz = [_fastest_hz(time_s, values) for time_s, values in channels]
     if not fastest_hz or not all(hz > 0 for hz in fastest_hz):
         return 0.0
     return min(BRIDGED_CYCLES / max(fastest_hz), MOST_S)
