@@ -148,9 +148,10 @@ class ControllerRun:
     def may_go_on(self) -> bool:
         """Whether the run may go on. Where the guard stopped it or holds it unattended, it ends.
 
-        Where the guard holds the rig and an operator is there, the run pauses.
+        Where the guard holds the rig and an operator is there, the run pauses. A halt is the end,
+        also of a hold.
         """
-        if self.stopped_by_guard():
+        if self.stopped_by_guard() or self.is_in(State.FAULTED):
             return False
         if self.loop.dose_reached:
             self.outcome = "fail"

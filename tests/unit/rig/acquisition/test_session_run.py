@@ -283,6 +283,17 @@ def test_a_halt_takes_the_power_away_in_its_tick():
     assert ran.states[-1].state is State.FAULTED
 
 
+@pytest.mark.parametrize("hold", [{20: Cause.TORQUE_HIGH}, {59: Cause.TORQUE_HIGH}])
+def test_a_halt_while_the_guard_holds_is_the_end_too(hold):
+    """Nothing resumes it; 20 is in the first epoch, 59 just before the order."""
+    ran = session(Desk(hold, {60: Command.HALT, 90: Command.RESUME}))
+    assert (ran.result.outcome, ran.result.cause) == ("fail", Cause.OPERATOR_HALT)
+    assert len(ran.epochs) == 1
+    assert ran.states[-1].state is State.FAULTED
+    assert len(ran.sink.samples) < 90
+    assert not any(s.velocity_command_rad_s for s in ran.sink.samples[60:])
+
+
 def test_an_order_is_told_with_its_state_and_what_it_changed():
     change = Order(Command.CHANGE, "perturbation_scale", 0.5)
     ran = session(Desk(orders={10: change, 20: Command.PAUSE}))
