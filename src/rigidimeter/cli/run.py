@@ -11,6 +11,15 @@ from rigidimeter.cli.options import CPU, NEW_SESSION, PRIORITY, RIG, SEED
 from rigidimeter.cli.output import echo
 from rigidimeter.core.errors import UserError
 
+_RANGE_FORM = "enter the range of motion of this person in the form of the page"
+_ON_THE_PAGE = {
+    "--range-deg": _RANGE_FORM,
+    "--lead-range": _RANGE_FORM,
+    "--blinded": "tick Blinded in the form of the page",
+    "--confirm": "it is for --unattended, and somebody leads the page",
+}
+"""What to do on the page instead of giving an option."""
+
 
 def run(
     out: Path = NEW_SESSION,
@@ -83,7 +92,6 @@ def run(
     for line in complete_left():
         echo(line, err=True)
     planned = planned_session(protocol, resume, seed, virtual=rig is None)
-    planned = planned.blinded() if blinded else planned
     require_packages(planned.settings)
     offer_to_continue(out)
     if page:
@@ -92,6 +100,15 @@ def run(
                 "--console goes with neither --unattended nor --resume; continue a session under "
                 "After on the page of `rigidimeter console`"
             )
+        of_the_form = {
+            "--range-deg": range_deg is not None,
+            "--lead-range": lead_range,
+            "--blinded": blinded,
+            "--confirm": bool(confirm),
+        }
+        for option, given in of_the_form.items():
+            if given:
+                raise UserError(f"{option} does not go with --console; {_ON_THE_PAGE[option]}")
         from rigidimeter.cli.page_session import PageAddress, serve_page
         from rigidimeter.rig.console.page import Place
 
@@ -104,6 +121,7 @@ def run(
             raise UserError("the program was stopped before a session was run")
         conclude(led, out, rig, nwb=False)
         return
+    planned = planned.blinded() if blinded else planned
     planned = planned.within(entered_range(range_deg, rig, planned.settings, lead=lead_range))
     planned = checked_rig(planned, rig)
     attended, confirmed = attendance(rig, unattended=unattended, confirm=confirm)

@@ -318,6 +318,24 @@ def test_a_page_is_for_a_new_session_with_an_operator(tmp_path, rigidimeter):
     assert "--console goes with neither --unattended nor --resume" in result.err
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--range-deg", "-30", "60"), "--range-deg does not go with --console"),
+        (("--lead-range",), "--lead-range does not go with --console"),
+        (("--blinded",), "--blinded does not go with --console"),
+        (("--confirm", "nobody in the rig"), "--confirm does not go with --console"),
+    ],
+)
+def test_what_the_form_asks_for_is_not_passed_over_among_the_options(
+    tmp_path, monkeypatch, rigidimeter, options, words
+):
+    monkeypatch.setattr("rigidimeter.cli.page_session.serve_page", None)
+    result = rigidimeter("run", "--out", tmp_path / "s", "--console", *options)
+    assert result.status == 1
+    assert words in result.err
+
+
 def test_a_session_on_the_page_runs_only_while_the_page_is_there(tmp_path, monkeypatch):
     told = {}
 
