@@ -192,11 +192,11 @@ def compiled() -> Callable[..., tuple[int, float, float]]:
     def made(function: Callable[..., Any], **helpers: Any) -> Any:
         return njit(with_helpers(function, helpers), error_model="numpy", nogil=True)
 
-    allowed = made(allowed_nm)
+    allowed, causes = made(allowed_nm), enum_numbers(Cause)
     one_step = made(
         drive_torque.one_step,
         allowed_nm=allowed,
-        Cause=enum_numbers(Cause),
+        Cause=causes,
         lowpassed=made(lowpassed),
         from_drive=made(drive_torque.from_drive),
         beyond=made(drive_torque.beyond),
@@ -208,7 +208,7 @@ def compiled() -> Callable[..., tuple[int, float, float]]:
         drive_step=made(drive_step),
         drive_side_step=made(drive_side_step),
         reported_torque_nm=made(reported_torque_nm, quantised=made(quantised)),
-        drive_torque_step=made(drive_torque_step, means_ended=ended),
+        drive_torque_step=made(drive_torque_step, means_ended=ended, Cause=causes),
     )
 
 

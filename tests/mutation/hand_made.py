@@ -59,8 +59,8 @@ HAND_MADE = tuple(
     HandMade(*fault)
     for fault in (
         # The drive's own torque
-        (TORQUES, "if size > most or slope", "if slope", "an offset is never found"),
-        (TORQUES, "or slope * slope > most * most * square", "", "a gain is found later"),
+        (TORQUES, "size <= most and slope", "slope", "an offset is never found"),
+        (TORQUES, "and slope * slope <= most * most * square", "", "a gain is found later"),
         (TORQUES, "- model.friction_nm * terms.sign", "+ model.friction_nm * terms.sign", "false"),
         (TORQUES, "+ model.zero_nm\n", "", "a sensor with a zero of its own is stopped"),
         (TORQUES, "allowed = terms.unknown * model.friction_nm", "allowed = 0.0", "false at rest"),

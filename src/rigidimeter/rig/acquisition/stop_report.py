@@ -257,6 +257,9 @@ def _silent(latched: Latched) -> Found:
 
 def _apart(latched: Latched) -> Found:
     steps, model = latched.compared.steps, latched.torques.model
+    silent_s = latched.compared.ticks * latched.torques.interval_s
+    if silent_s > WINDOW_S:
+        return Found(silent_s, WINDOW_S, "s without the drive's torque")
     slope_nm = abs(steps.slope_nm2) / math.sqrt(steps.model_nm2) if steps.model_nm2 > 0.0 else 0.0
     value_nm = max(steps.size_nm, slope_nm)
     return Found(value_nm, allowed_nm(model, steps.own_nm2), "N·m", WINDOW_S)

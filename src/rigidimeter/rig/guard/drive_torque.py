@@ -22,9 +22,10 @@ may each be 4 times the scatter of e that `commission` measured: a constant part
 varies with the angle, and a share of the drive's own torques. A slope scatters by no more than e,
 and by as much where the subject's torque goes with the error.
 
-The model is `commission`'s. Without it, or without a torque of the drive, nothing is found. A step
-only adds, multiplies, divides, compares and takes square roots; it knows nothing of the controller.
-The window is written in place: a state is used once.
+The model is `commission`'s. Without it, or where the drive never reported a torque, nothing is
+found; where it no longer does for `WINDOW_S`, that is the same cause. A step only adds, multiplies,
+divides, compares and takes square roots; it knows nothing of the controller. The window is written
+in place: a state is used once.
 """
 
 from __future__ import annotations
@@ -262,6 +263,8 @@ def drive_torque_step(
         after, of_this = means_ended(limits, after)
         if cause == _NO_CAUSE:
             cause = of_this
+    elif readings == 0 and steps.settled_s > 0.0 and ticks * limits.interval_s > WINDOW_S:
+        cause = int(Cause.TORQUE_DISAGREES)
     return after, cause
 
 
@@ -382,7 +385,8 @@ def one_step(
         row[0], row[1], row[2] = abs(e), e * by_drive_nm, by_drive_nm * by_drive_nm
         row[3] = drives_nm2
         most = allowed_nm(model, own)
-        if size > most or slope * slope > most * most * square:
+        # Not so of what is no number, either.
+        if not (size <= most and slope * slope <= most * most * square):
             cause = int(Cause.TORQUE_DISAGREES)
     after = StepsState(
         window,

@@ -90,6 +90,24 @@ def test_without_a_model_nothing_is_compared():
     assert loop.compared.steps.settled_s == 0.0
 
 
+def test_a_drive_that_no_longer_reports_its_torque_stops_the_rig_and_says_so():
+    rig = spoiled_rig(lambda sample: sample.torque_nm)
+    read, ticks = rig.read, [0]
+
+    def reading(elapsed=1):
+        ticks[0] += elapsed
+        gone = {"drive_torque_nm": math.nan, "drive_torque_time_s": math.nan}
+        return read(elapsed)._replace(**(gone if ticks[0] > 1000 else {}))
+
+    rig.read = reading
+    loop = ControlLoop(SETTINGS, rig, SimulatedClock(), lambda _: None, drive_model=MODEL)
+    rig.enable()
+    hold(loop, 2.0)
+    assert loop.cause is Cause.TORQUE_DISAGREES
+    assert loop.tick == pytest.approx(1500, abs=60)
+    assert "0.5 s without the drive's torque" in loop.stop.sentence
+
+
 def test_what_the_zeroing_took_off_is_taken_off_the_model():
     """A sensor that is off by 0.9 N·m as it was when the rig was commissioned is no fault."""
     rig = SimulatedRig(SETTINGS.rig, SETTINGS.subject["OFF"], np.random.default_rng(3))

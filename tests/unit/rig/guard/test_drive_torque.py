@@ -354,6 +354,29 @@ def test_a_drive_without_a_torque_is_never_compared():
     assert ran.state.steps.settled_s == 0.0
 
 
+@pytest.mark.parametrize(("silent_s", "stops"), [(0.49, False), (0.51, True)])
+def test_a_drive_that_reports_no_torque_any_more_stops_the_rig(silent_s, stops):
+    """A second witness that has gone must not go unnoticed."""
+    rig = Rig()
+    rig.drive, sound = lambda t: math.nan if 1.0 < t <= 1.0 + silent_s else sound(t), rig.drive
+    ran = rig.run(3.0)
+    assert ran.cause is (Cause.TORQUE_DISAGREES if stops else Cause.NONE)
+    assert ran.time_s == pytest.approx(1.0 + WINDOW_S if stops else 3.0, abs=0.009)
+
+
+def test_a_torque_beyond_arithmetic_does_not_end_the_law():
+    """Its square is infinite, and so what the window holds is no number from then on."""
+    rig = Rig()
+    rig.drive, sound = lambda t: 1e200 if abs(t - 1.0) < 0.5 * DT else sound(t), rig.drive
+    ran = rig.run(3.0)
+    assert ran.cause is Cause.TORQUE_DISAGREES
+
+
+@pytest.mark.parametrize("name", ["friction_nm", "zero_nm", "scatter_nm"])
+def test_a_model_that_is_no_number_lets_nothing_pass(name):
+    assert Rig().run(3.0, limits(MODEL._replace(**{name: math.nan}))).cause != Cause.NONE
+
+
 def test_without_a_model_the_law_is_off():
     off = drive_torque_limits(parse_settings({}))
     assert off.model == DriveModel()
