@@ -90,6 +90,20 @@ def test_a_command_line_is_one_that_exists(where: str, words: list[str]) -> None
         assert words[0] == "head", where
 
 
+def test_a_session_on_hardware_is_shown_with_the_range_that_it_needs() -> None:
+    """Or with that of the session that it continues; the emulated rig needs none."""
+    emulated = "docs/how-to/try-without-hardware.md"
+    shown = [
+        (where, words)
+        for where, words in SHELL
+        if words[:2] == ["rigidimeter", "run"] and "--rig" in words
+        if not where.startswith(emulated) and "--resume" not in words and "--console" not in words
+    ]
+    assert shown
+    needed = {"--lead-range", "--range-deg"}
+    assert [where for where, words in shown if not needed & set(words)] == []
+
+
 def test_the_readme_begins_with_make_demo_and_make_test() -> None:
     first = next(block for block in blocks(ROOT / "README.md") if block.info == "sh")
     assert first.text.split("\n") == ["make demo", "make test", ""]
