@@ -55,7 +55,7 @@ def smaller(name: str, module: ModuleType, folder: Path) -> Mapping[str, Any]:
         return {"TABLE": folder / "page.md", "FIRST_HZ": (100.0,), "FILTERS_HZ": (0.0,)}
     if name == "late_drive":
         some = {key: module.RECORDED[key] for key in list(module.RECORDED)[:1]}
-        return {"EPOCHS": 1, "LIMBS": {"human": (*module.RIGS,)[1:]}, "RECORDED": some}
+        return {"EPOCHS": 2, "LIMBS": {"human": (*module.RIGS,)[1:]}, "RECORDED": some}
     if name == "archive":
         return {"apart": module.measured}
     if name in ("drive_torque", "false_alarms"):
