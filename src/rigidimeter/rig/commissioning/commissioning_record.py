@@ -326,9 +326,15 @@ def _same_devices(path: Path, before: Mapping[str, Any], now: Mapping[str, Any])
                 )
         old, new = old.get("values", {}), new.get("values", {})
         for key in sorted({*old, *new}):
-            if old.get(key) != new.get(key):
+            if key not in old:  # a driver of an older version did not read it
                 raise UserError(
-                    f"{path}: {role} had {key} = {old.get(key)!r} and now has {new.get(key)!r}; "
+                    f"{path}: {role} now has {key} = {new[key]!r}, which the record does not "
+                    "name; commission the rig again"
+                )
+            if key not in new or old[key] != new[key]:
+                now_has = f"now has {new[key]!r}" if key in new else "no longer names it"
+                raise UserError(
+                    f"{path}: {role} had {key} = {old[key]!r} and {now_has}; "
                     "set it back, or commission the rig again"
                 )
 

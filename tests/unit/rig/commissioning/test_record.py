@@ -148,6 +148,14 @@ def test_another_rig_file_is_refused(rigfile: RigFile, record: CommissioningReco
             changed("torque_sensor", "values", {"counts_per_torque": 2e6}),
             "counts_per_torque = 1000000.0 and now has 2000000.0",
         ),
+        (
+            changed("torque_sensor", "values", {"counts_per_torque": 1e6, "range_nm": 50.0}),
+            "torque_sensor now has range_nm = 50.0, which the record does not name; commission the",
+        ),
+        (
+            changed("torque_sensor", "values", {}),
+            "torque_sensor had counts_per_torque = 1000000.0 and no longer names it; set it back",
+        ),
         ({**FACTS, "enable_line": FACTS["drive"]}, "enable_line"),
     ],
 )
