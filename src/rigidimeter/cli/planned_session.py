@@ -157,7 +157,8 @@ def checked_rig(planned: PlannedSession, rig: Path | None) -> PlannedSession:
     ------
     UserError
         If the protocol asks for more than the dose of one session, or the rig was not commissioned
-        or not checked, or another program has it.
+        or not checked, or another program has it, or the range of motion is missing, of another
+        subject, beyond the stops or without the virtual joint's angle.
     """
     if too_much := _beyond_dose(planned):
         raise UserError(f"{planned.source or 'the session'}: {too_much}")
@@ -165,6 +166,12 @@ def checked_rig(planned: PlannedSession, rig: Path | None) -> PlannedSession:
         # Imported late: it loads what only a check needs.
         from rigidimeter.cli.virtual_check import measured_drive_side
 
+        found = planned.motion_range
+        if found is not None and not found.low_deg < 0.0 < found.high_deg:
+            raise UserError(
+                f"{found.words}: the joint of the virtual rig stands at 0 deg, which must be "
+                "between both ends"
+            )
         return replace(planned, drive_model=measured_drive_side(planned.settings))
     rigfile, settings = load_rig(rig), planned.settings
     commissioned = check_record(rigfile, None, settings)

@@ -318,6 +318,17 @@ def test_a_page_is_for_a_new_session_with_an_operator(tmp_path, rigidimeter):
     assert "--console goes with neither --unattended nor --resume" in result.err
 
 
+@pytest.mark.parametrize("ends", [("10", "40"), ("-40", "0")])
+def test_a_range_without_the_start_is_refused_on_the_virtual_rig_too(
+    tmp_path, monkeypatch, rigidimeter, ends
+):
+    monkeypatch.setattr("rigidimeter.cli.planned_session.supervise", None)
+    result = rigidimeter("run", "--out", tmp_path / "s", "--range-deg", *ends)
+    assert result.status == 1
+    assert "the joint of the virtual rig stands at 0 deg, which must be between both" in result.err
+    assert not (tmp_path / "s").exists()
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
