@@ -44,7 +44,12 @@ from rigidimeter.rig.devices.bounds import (
     drive_bounds,
 )
 from rigidimeter.rig.devices.cia402.drive import Cia402Drive
-from rigidimeter.rig.devices.cia402.drive_bounds import DriveSays, bound_objects, wanted_bounds
+from rigidimeter.rig.devices.cia402.drive_bounds import (
+    DriveSays,
+    bound_objects,
+    wanted_bounds,
+    write_bounds,
+)
 from rigidimeter.rig.devices.cia402.drive_objects import DriveObject, drive_objects
 from rigidimeter.rig.devices.cia402.eds import compare_eds
 from rigidimeter.rig.devices.cia402.sdo_transfers import read_back, write_object

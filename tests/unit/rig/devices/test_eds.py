@@ -9,6 +9,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import parse_settings
 from rigidimeter.rig.devices import (
     Cia402Settings,
+    DriveSays,
     Object,
     bound_objects,
     compare_eds,
@@ -16,6 +17,8 @@ from rigidimeter.rig.devices import (
     drive_bounds,
     objects,
     read_back,
+    wanted_bounds,
+    write_bounds,
     write_object,
 )
 from rigidimeter.rig.devices.base import DeviceError
@@ -273,6 +276,34 @@ def test_a_value_that_its_object_has_no_room_for_is_refused_in_one_sentence(unit
     entries = (*objects(settings), *bound_objects(settings, bounds))
     with pytest.raises(DeviceError, match=rf"{name} = \d+ does not fit into its 4 bytes"):
         all(write_object(Drive({}), entry, "drive") for entry in entries)
+
+
+class Ordered(Drive):
+    """Its upper position limit must never be below its lower one."""
+
+    def download(self, index, subindex, data):
+        before = dict(self.values)
+        super().download(index, subindex, data)
+        low, high = (int.from_bytes(self.values[0x607D, k], "little", signed=True) for k in (1, 2))
+        if low > high:
+            self.values = before
+            raise canopen.SdoAbortedError(0x06090036)
+
+
+@pytest.mark.parametrize("position_counts", [0, 500_000, -500_000])
+def test_position_limits_of_before_do_not_keep_out_those_of_now(position_counts):
+    """The person before sat elsewhere, so that both new limits are beyond one of the old ones."""
+    before = {(0x607D, 1): -1000, (0x607D, 2): 1000}
+    drive = Ordered({at: value.to_bytes(4, "little", signed=True) for at, value in before.items()})
+    wanted = wanted_bounds(
+        Cia402Settings(),
+        drive_bounds(parse_settings({})),
+        DriveSays(position_counts, None, None),
+    )
+    _, entries = write_bounds(drive, wanted, "drive")
+    ends = [entry for entry in entries if entry.index == 0x607D]
+    assert [entry.subindex for entry in ends] == [1, 2]
+    assert read_back(drive, ends, "drive")
 
 
 def test_max_profile_velocity_is_optional_and_the_watchdog_is_not():

@@ -127,7 +127,7 @@ def write_bounds(
         name, alternatives, words, why_not, *torque_and_ramp = bound
         there: tuple[Object, ...] = ()
         if not why_not:
-            holds = (each for each in alternatives if all(write_object(sdo, o, who) for o in each))
+            holds = (each for each in alternatives if _taken(sdo, each, who))
             there = next(holds, ())
             names = " or ".join(f"0x{entries[0].index:04X}" for entries in alternatives)
             why_not = "" if there else f"the drive has no {names}"
@@ -135,6 +135,19 @@ def write_bounds(
         where = f"0x{there[0].index:04X}" if there else ""
         found.append(BoundFound(name, where, why_not or words, LOST[name], *torque_and_ramp))
     return tuple(found), tuple(written)
+
+
+def _taken(sdo: Any, entries: tuple[Object, ...], who: str) -> bool:
+    """Write both ends of a bound or its one value; return whether the drive has all of them.
+
+    A lower end above the upper end of before may be refused until the new upper end is there.
+    """
+    try:
+        return all(write_object(sdo, entry, who) for entry in entries)
+    except DeviceError:
+        if len(entries) == 1:
+            raise
+    return all(write_object(sdo, entry, who) for entry in reversed(entries))
 
 
 def bound_objects(settings: Cia402Settings, bounds: DriveBounds) -> tuple[Object, ...]:
