@@ -57,9 +57,9 @@ class ProtocolSettings(Section):
     """Blocks of epochs in order, with random rests in between.
 
     After an epoch, and after a pause once it is resumed, the arm is led back to where epochs begin.
-    That takes `return_s`, or longer where its peak speed would exceed `return_speed_deg_s`. A rest
-    begins after it. With `repeat_limited`, an epoch in which the arm came to a limit is run again
-    at the end, once.
+    That takes `return_s`, or longer where its peak speed would exceed `return_speed_deg_s` or the
+    guard's speed limit. A rest begins after it. With `repeat_limited`, an epoch in which the arm
+    came to a limit is run again at the end, once.
     """
 
     blocks: list[BlockSettings] = Field(

@@ -17,7 +17,8 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
-from rigidimeter.core.settings import LONGEST_STEP, ControllerSettings
+from rigidimeter.core.settings import LONGEST_STEP, ControllerSettings, Settings
+from rigidimeter.core.units import rad_from_deg
 from rigidimeter.model import admittance_step, minimum_jerk, tracking_step
 from rigidimeter.rig.acquisition.decision import STALLED
 from rigidimeter.rig.acquisition.run_states import Order
@@ -83,6 +84,12 @@ def follow(
         return tracking_step(gain, then, velocity_rad_s[k], reading.angle_rad), 0.0, target
 
     return run_ticks(loop, epoch, len(angle_rad), command)
+
+
+def return_speed_rad_s(settings: Settings) -> float:
+    """Return the peak speed of a return: its own limit, or the guard's, which holds it back."""
+    slower = min(settings.protocol.return_speed_deg_s, settings.guard.speed_limit_deg_s)
+    return rad_from_deg(slower)
 
 
 def return_duration_s(angle_rad: float, return_s: float, speed_rad_s: float) -> float:

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.core.settings import Settings
-from rigidimeter.core.units import deg_from_rad, rad_from_deg
+from rigidimeter.core.units import deg_from_rad
 from rigidimeter.model import minimum_jerk
 from rigidimeter.planning import beyond_range, demand
-from rigidimeter.rig.acquisition.control_modes import return_duration_s
+from rigidimeter.rig.acquisition.control_modes import return_duration_s, return_speed_rad_s
 from rigidimeter.rig.acquisition.tick import ControlLoop
 from rigidimeter.rig.guard import within_range
 
@@ -60,8 +60,7 @@ def motion_beyond(loop: ControlLoop, settings: Settings, imposed: Motion) -> str
 def _way_back(settings: Settings, from_rad: float) -> Motion:
     """Return the motion from an end of the range to the start, by minimum jerk."""
     protocol, rate_hz = settings.protocol, settings.rig.tick_rate_hz
-    speed_rad_s = rad_from_deg(protocol.return_speed_deg_s)
-    duration_s = return_duration_s(from_rad, protocol.return_s, speed_rad_s)
+    duration_s = return_duration_s(from_rad, protocol.return_s, return_speed_rad_s(settings))
     times_s = np.arange(round(duration_s * rate_hz) + 1) / rate_hz
     way = np.array([minimum_jerk(from_rad, duration_s, time_s) for time_s in times_s.tolist()])
     return way[:, 0], way[:, 1]

@@ -11,7 +11,6 @@ from typing import Any
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import Ending, PlannedEpoch, Protocol
 from rigidimeter.core.settings import Settings
-from rigidimeter.core.units import rad_from_deg
 from rigidimeter.planning import NO_DOSE, Dose, dose_reached, prbs_nm, sinusoid
 from rigidimeter.rig.acquisition.clock import Clock
 from rigidimeter.rig.acquisition.control_modes import (
@@ -22,6 +21,7 @@ from rigidimeter.rig.acquisition.control_modes import (
     release,
     rest,
     return_duration_s,
+    return_speed_rad_s,
     skip_passed_ticks,
 )
 from rigidimeter.rig.acquisition.controller_run import ControllerRun
@@ -206,7 +206,7 @@ def _run_epochs(session: _Session) -> None:
             # A pause on the way back leaves the rest out: the run goes back again, and then on.
             if run.is_in(State.RUNNING) and not run.run.stop_next:
                 run.begin(Phase.REST)
-                rest(run.loop, planned.rest_s, _return_speed_rad_s(session))
+                rest(run.loop, planned.rest_s, return_speed_rad_s(session.settings))
                 if not run.may_go_on():
                     return
 
@@ -251,7 +251,7 @@ def _go_back(session: _Session) -> bool:
     if loop.reaction is Reaction.HOLD:  # no release without one: the guard would forget arrivals
         release(loop)
     if not run.run.stop_next:
-        speed_rad_s = _return_speed_rad_s(session)
+        speed_rad_s = return_speed_rad_s(session.settings)
         duration_s = return_duration_s(loop.angle_rad, protocol.return_s, speed_rad_s)
         session.sink.event(
             "return_started",
@@ -269,10 +269,6 @@ def _go_back(session: _Session) -> bool:
 def _moved(session: _Session, since_s: float) -> None:
     motion_s = session.dose.motion_s + session.run.loop.time_s - since_s
     session.dose = session.dose._replace(motion_s=motion_s)
-
-
-def _return_speed_rad_s(session: _Session) -> float:
-    return rad_from_deg(session.settings.protocol.return_speed_deg_s)
 
 
 def _stand_by(run: ControllerRun) -> bool:

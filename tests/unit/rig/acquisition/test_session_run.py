@@ -188,6 +188,22 @@ def test_a_return_is_no_faster_than_its_limit(speed_deg_s, lasts_s):
     assert abs(way[-1].angle_rad) < math.radians(0.1)
 
 
+def test_a_return_takes_the_time_that_the_guard_leaves_it():
+    """Where the speed limit is below the return's own, the arm must still be back for the epoch."""
+    values = {
+        "protocol": {**VALUES["protocol"], "return_speed_deg_s": 40.0},
+        "guard": {**VALUES.get("guard", {}), "speed_limit_deg_s": 4.0},
+    }
+    desk = Desk(orders={60: Command.PAUSE_NOW, 90: Command.RESUME})
+    ran = session(desk, values=values)
+    told = ran.sink.of("return_started")[0]
+    lasts_s = 15.0 / 8.0 * abs(told["from_rad"]) / math.radians(4.0)
+    assert told["duration_s"] == pytest.approx(lasts_s)
+    assert lasts_s > VALUES["protocol"]["return_s"]
+    second = round(ran.sink.of("epoch_started")[1]["time_s"] * RATE_HZ)
+    assert abs(ran.sink.samples[second].angle_rad) < math.radians(0.1)
+
+
 def test_a_pause_on_the_way_back_holds_there_and_the_next_way_back_begins_there():
     pause = EPOCH + STOP + RETURN // 2
     ran = session(Desk(orders={pause: Command.PAUSE_NOW, 200: Command.RESUME}))
