@@ -54,6 +54,9 @@ KEYS_HELP = (
 AGAIN_S = 5.0
 """For so long a key that asks for itself again waits."""
 
+REPEAT_S = 0.15
+"""A key that comes again so soon may be held down: it does not answer what it was asked."""
+
 TYPING_S = 15.0
 """After so long without a key, keys are orders again."""
 
@@ -187,7 +190,7 @@ class KeyView(LineView):
         super().__init__(None, None, plan, now)
         self._tty = tty
         self._prompt: str | None = None
-        self._key_s = self._asked_s = -1e9
+        self._key_s = self._asked_s = self._resume_s = -1e9
         self._there, self._bell_due = True, False
         self._say(KEYS_HELP)
 
@@ -258,10 +261,14 @@ class KeyView(LineView):
         """
         loop = status.loop()
         goes_on = loop is not None and loop.tick >= 0 and loop.state == State.RUNNING
-        if goes_on or self._now() - self._asked_s <= AGAIN_S:
+        now_s = self._now()
+        held_down, self._resume_s = now_s - self._resume_s < REPEAT_S, now_s
+        asked = now_s - self._asked_s <= AGAIN_S
+        if goes_on or (asked and not held_down):
             return False
-        self._asked_s = self._now()
-        self._say("press r again within 5 s: the arm will move")
+        self._asked_s = now_s
+        if not asked:
+            self._say("press r again within 5 s: the arm will move")
         return True
 
     def _show(self, facts: Facts) -> bool:

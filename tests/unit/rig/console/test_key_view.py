@@ -269,6 +269,22 @@ def test_what_sets_the_arm_going_asks_for_its_key_again(person):
     assert person.orders() == []
 
 
+def test_a_key_that_is_held_down_does_not_end_a_hold(person):
+    """It repeats 10 to 30 times a second, and would answer its own question."""
+    person.press(b"r")
+    assert person.orders() == [Command.RESUME]
+    person.status.show_loop(RUNNING._replace(state=State.PAUSED))
+    for _ in range(100):
+        person.now_s -= 0.95  # of the second that each look takes
+        person.press(b"r")
+    assert person.orders() == []
+    person.press(b"rr")  # let go, and pressed again: the first of both
+    assert person.orders() == [Command.RESUME]
+    person.now_s += 10.0
+    person.press(b"rr")
+    assert person.orders() == []
+
+
 def test_what_takes_more_than_a_key_is_typed_after_a_colon(person):
     person.press(b":set perturbation_scale 0.x\x7f5")
     assert person.reads()[-1].startswith(": set perturbation_scale 0.5_")
