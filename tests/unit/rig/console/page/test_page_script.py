@@ -250,3 +250,14 @@ def test_each_button_orders_what_it_says(operator: Operator) -> None:
         button = operator.page.locator(f"[data-order={name}]")
         button.evaluate("(at) => { at.disabled = false; at.click(); }")
         assert operator.sent() == [{"kind": "order", "command": name}]
+
+
+def test_a_key_that_is_held_down_on_a_button_orders_once(operator: Operator) -> None:
+    """Held on *Resume* it would end each hold at once."""
+    operator.page.locator("#view-during").evaluate("(at) => { at.hidden = false; }")
+    button = operator.page.locator("[data-order=resume]")
+    button.evaluate("(at) => { at.disabled = false; at.focus(); }")
+    for _ in range(5):
+        operator.page.keyboard.down("Enter")
+    operator.page.keyboard.up("Enter")
+    assert operator.sent() == [{"kind": "order", "command": "resume"}]

@@ -163,7 +163,11 @@
   function begin() {
     page = document.querySelector("meta[name=rig-page]").content;
     for (const one of document.querySelectorAll(".tab")) one.onclick = () => view(one.dataset.view);
-    for (const one of document.querySelectorAll("[data-order]")) one.onclick = () => say({ kind: "order", command: one.dataset.order });
+    for (const one of document.querySelectorAll("[data-order]")) {
+      one.onclick = () => say({ kind: "order", command: one.dataset.order });
+      // A key that is held down repeats: on Resume it would end each hold at once.
+      one.onkeydown = (event) => { if (event.repeat) event.preventDefault(); };
+    }
     $("emergency").onpointerdown = emergency;
     $("emergency").onclick = (event) => { if (event.detail === 0) emergency(); };
     addEventListener("keydown", (event) => { if (event.key === "Escape") emergency(); }, true);
