@@ -76,7 +76,7 @@ window.rigTraces = (() => {
     for (const at of shown) {
       const made = pane($("panes"), PANES[at]), torque = at === 0 || at === DRIVE;
       add(made, () => [data[0], data[at + 1]], [{}], cyclic && at === last);
-      if (torque) plots[plots.length - 1].rig.said = () => { made.firstChild.textContent = PANES[at] + newest(data[at + 1]); };
+      if (torque) plots[plots.length - 1].rig.said = () => { made.firstChild.firstChild.data = PANES[at] + newest(data[at + 1]); };
     }
     if (cyclic) plots.push(loopPlot(pane($("panes"), "torque [N·m] over angle [deg], last 10 s", "pane loop")));
     else {
