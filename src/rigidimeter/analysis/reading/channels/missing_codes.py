@@ -3,11 +3,12 @@
 Such a code is a value that recurs exactly, alone, and far from the values beside it. A sample x
 stands out from p before and q after it by
 
-    D = min(|x − p|, |x − q|)    where x is above both or below both, else 0.
+    D = min(|x − p|, |x − q|, |x − c|)    where x is above both or below both, else 0,
 
-A step of the torque has no D. The column without one of its values v has the D of its noise and of
-its turns; where those of v, each from the column without it, are many times what nine in ten of
-the others are, and nothing else stands out to near v, v is a code.
+with c the cubic through the two samples on either side. A step of the torque has no D, since x lies
+between, and a turn of the motion hardly any, since the cubic follows it. The column without one of
+its values v has the D of its noise; where those of v, each from the column without it, are many
+times what nine in ten of the others are, and nothing else stands out to near v, v is a code.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ LONGEST_RUN = 3
 """In samples; a value that lasts longer is not alone."""
 TIMES_OTHERS = 6.0
 """Of what nine in ten of the others that stand out do so by."""
-TIMES_BEND = 4.0
-"""Of the median bend between three samples; a smooth motion turns by half of one."""
+TIMES_CUBIC = 4.0
+"""Of the median distance of a sample from the cubic through those beside it."""
 TIMES_STEP = 3.0
 """Of the sensor's resolution."""
 FEWEST, FEWEST_OUTSIDE = 3, 2
@@ -89,7 +90,7 @@ def _one_code(values: Array) -> float | None:
     if levels.size < 2:
         return None
     step = float(np.median(np.diff(levels)))
-    usual = TIMES_STEP * step + TIMES_BEND * float(np.median(np.abs(np.diff(values, 2))))
+    usual = TIMES_STEP * step + TIMES_CUBIC * _from_cubic(values)
     often = np.bincount(level[_stands_out(values) > usual], minlength=levels.size)
     often[times > LARGEST_SHARE * values.size] = 0
     tried = [k for k in np.argsort(-often)[:_MOST_TRIED] if often[k] >= FEWEST_OUTSIDE]
@@ -105,15 +106,16 @@ def _times_far(values: Array, own: NDArray[np.bool_], step: float) -> int:
     others = out[out > 0]
     far = max(
         TIMES_STEP * step,
-        TIMES_BEND * float(np.median(np.abs(np.diff(rest, 2)))),
+        TIMES_CUBIC * _from_cubic(rest),
         TIMES_OTHERS * float(np.quantile(others, 0.9)) if others.size else 0.0,
     )
     edges = np.flatnonzero(np.diff(np.concatenate(([False], own, [False]))))
     start, stop = edges.reshape(-1, 2)[(edges[::2] > 0) & (edges[1::2] < own.size)].T
     before = np.cumsum(~own)[start - 1] - 1  # the place in `rest` of the sample before each run
+    inside = (before > 0) & (before + 2 < rest.size)
+    start, stop, before = start[inside], stop[inside], before[inside]
     value = values[own][0]
-    up, down = value - rest[before], value - rest[before + 1]
-    distance = np.where(up * down > 0, np.minimum(np.abs(up), np.abs(down)), 0.0)
+    distance = _apart(value, *(rest[before + k] for k in (-1, 0, 1, 2)))
     is_far = (distance > far) & (stop - start <= LONGEST_RUN)
     count = int(np.count_nonzero(is_far))
     outside = max(rest.min() - value, value - rest.max()) > np.ptp(rest)
@@ -123,8 +125,20 @@ def _times_far(values: Array, own: NDArray[np.bool_], step: float) -> int:
     return count if 3 * np.count_nonzero(near & (out > far)) < count else 0
 
 
+def _from_cubic(values: Array) -> float:
+    a, b, own, c, d = (values[k : values.size - 4 + k] for k in range(5))
+    return float(np.median(np.abs(own - (4.0 * (b + c) - a - d) / 6.0)))
+
+
 def _stands_out(values: Array) -> Array:
-    """Return by how much each sample is above both or below both beside it, else 0."""
-    before, after = values[1:-1] - values[:-2], values[1:-1] - values[2:]
-    out = np.where(before * after > 0, np.minimum(np.abs(before), np.abs(after)), 0.0)
-    return np.concatenate(([0.0], out, [0.0]))
+    """Return D of each sample, 0 of the two at each end."""
+    a, b, own, c, d = (values[k : values.size - 4 + k] for k in range(5))
+    return np.concatenate(([0.0, 0.0], _apart(own, a, b, c, d), [0.0, 0.0]))
+
+
+def _apart(value: float | Array, a: Array, b: Array, c: Array, d: Array) -> Array:
+    """Return D of a value between b and c, of which a comes before and d after."""
+    up, down = value - b, value - c
+    by_cubic = np.abs(value - (4.0 * (b + c) - a - d) / 6.0)
+    size = np.minimum(np.minimum(np.abs(up), np.abs(down)), by_cubic)
+    return np.where(up * down > 0, size, 0.0)
