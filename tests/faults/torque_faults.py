@@ -139,8 +139,8 @@ def ended(case: Case, spoil: Spoil | None, model: DriveModel | None, seed: int =
     return Ended(loop.cause, after_s, float(np.abs(rig.true_nm).max()))
 
 
-def largest_unseen(case: Case, kind: Kind) -> tuple[float, Ended]:
-    """Return the largest fault of a kind that the epoch survives, and how that went."""
+def largest_unseen(case: Case, kind: Kind) -> tuple[float, float, Ended]:
+    """Return the largest fault of a kind that the epoch survives, the next one, and how it went."""
     good, bad = kind.least, kind.most
     best = ended(case, kind.spoil(good), case.model)
     for _ in range(HALVINGS):
@@ -150,7 +150,7 @@ def largest_unseen(case: Case, kind: Kind) -> tuple[float, Ended]:
             good, best = middle, found
         else:
             bad = middle
-    return good, best
+    return good, bad, best
 
 
 def column(case: Case) -> list[str]:
@@ -163,8 +163,9 @@ def column(case: Case) -> list[str]:
         now, before = ended(case, spoil, case.model), ended(case, spoil, None)
         cells.append(f"{now}<br>before: {before}")
     for kind in KINDS:
-        size, how = largest_unseen(case, kind)
-        cells.append(f"{size:.2f} {kind.unit}, up to {how.largest_nm:.1f} N·m")
+        size, found_at, how = largest_unseen(case, kind)
+        largest = f"below {found_at:.2f}" if size == kind.least else f"{size:.2f}"
+        cells.append(f"{largest} {kind.unit}, up to {how.largest_nm:.1f} N·m")
     return cells
 
 
