@@ -43,8 +43,8 @@ class Field:
 METADATA = (Field("subject", "Subject (code)"), Field("operator", "Operator"))
 NOTE = Field("note", "Note on the session")
 RANGE = (
-    Field("range_low", "Range of motion: lower end, drive's scale", "deg"),
-    Field("range_high", "Range of motion: upper end, drive's scale", "deg"),
+    Field("range_low", "Range of motion: lower end", "deg"),
+    Field("range_high", "Range of motion: upper end", "deg"),
     Field("range_of", "Range of motion: of whom (code)"),
 )
 """Of this person, for this session: never kept, and taken for the subject that it names alone."""
