@@ -2,10 +2,13 @@
 
 import json
 import shutil
+from datetime import date
 from pathlib import Path
 
 import pytest
 from tests.faults.compared_study import compared, errors, only_error
+
+from rigidimeter.core.study_files import PrimaryTable, read_study_toml
 
 __all__ = ["compared"]
 
@@ -25,6 +28,27 @@ __all__ = ["compared"]
         ('title = "Small study"', 'title = "T"\nratings = "/r.csv"', "outside the study folder"),
         ('title = "Small study"', 'title = "T"\nsessions = "../s.csv"', "name a file in it"),
         ("amplitude_ma = 0.32", "amplitude_ma = 0.3\namplitude_v = 2.0", "are both given"),
+        ("[conditions.OFF]", "[primary]\nmeasures = []\n[conditions.OFF]", "at least 1 item"),
+        (
+            "[conditions.OFF]",
+            '[primary]\nmeasures = ["inertia_kg_m2"]\n[conditions.OFF]',
+            "primary.measures[0] = 'inertia_kg_m2': Input should be 'stiffness_nm_rad', 'damping",
+        ),
+        (
+            "[conditions.OFF]",
+            '[primary]\nmeasures = ["work_j", "work_j"]\n[conditions.OFF]',
+            "measures names work_j twice; name each measure once",
+        ),
+        (
+            "[conditions.OFF]",
+            "[primary]\ndifference_percent = 0.2\n[conditions.OFF]",
+            "primary.difference_percent = 0.2: Input should be greater than or equal to 1, in %",
+        ),
+        (
+            "[conditions.OFF]",
+            '[primary]\ndeclared = "November"\n[conditions.OFF]',
+            "primary.declared = 'November': Input should be a valid date",
+        ),
         ('other = "DBS"', 'other = "OFF"', "reference and other are both 'OFF'"),
         ('other = "DBS"', 'other = "DSB"', "there is no [conditions.DSB]"),
         ("study/1", "study/9", "this version reads 'rigidimeter.study/1'"),
@@ -131,6 +155,7 @@ def test_a_new_study_is_complete_and_never_written_over(rigidimeter, tmp_path: P
     assert sorted(path.name for path in folder.iterdir()) == [
         "exclusions.csv", "ratings.csv", "sessions.csv", "study.toml",
     ]  # fmt: skip
+    assert read_study_toml(folder / "study.toml").primary == PrimaryTable(declared=date.today())
     before = (folder / "study.toml").read_bytes()
     ran = rigidimeter("study", "new", folder)
     assert ran.status == 1

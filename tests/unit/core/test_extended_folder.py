@@ -67,6 +67,8 @@ def test_sessions_become_a_study(tmp_path):
     assert (about.reference, about.other) == ("OFF", "DBS")
     assert about.conditions["DBS"].frequency_hz == 130.0
     assert about.conditions["OFF"].frequency_hz is None
+    assert "primary" in about.model_fields_set
+    assert about.primary.declared is None
     before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
     assert extend_study(tmp_path) == []
     assert before == {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}

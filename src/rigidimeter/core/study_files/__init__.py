@@ -7,6 +7,7 @@ from rigidimeter.core.study_files.study_toml import (
     STUDY_FILE,
     STUDY_SCHEMA,
     ConditionTable,
+    PrimaryTable,
     SubjectTable,
     is_outside,
     is_own,

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
+from datetime import date
 from pathlib import Path
 
 from rigidimeter.core.errors import UserError, refused
@@ -28,6 +29,7 @@ from rigidimeter.core.study_files.study_toml import (
     OFF,
     STUDY_FILE,
     ConditionTable,
+    PrimaryTable,
     is_own,
     own_text,
     pair_of,
@@ -66,7 +68,8 @@ def write_new_study(folder: Path, title: str = "") -> None:
         write_text(folder / f"{name}.csv", empty_table(name))
     shown = title.strip() or folder.resolve().name
     conditions = {OFF: ConditionTable(), DBS: ConditionTable()}
-    write_text(folder / STUDY_FILE, study_text(shown, OFF, DBS, conditions))
+    primary = PrimaryTable(declared=date.today())
+    write_text(folder / STUDY_FILE, study_text(shown, OFF, DBS, conditions, primary))
 
 
 def extend_study(
@@ -215,10 +218,13 @@ def _described(
     title, pair = study.resolve().name, pair_of(names, known)
     conditions: dict[str, ConditionTable] = {}
     own = True
+    primary: PrimaryTable | None = PrimaryTable()
     if is_study(study):
         content, about = read_bytes(path, DOCUMENT_BYTES), read_study_toml(path)
         own, title, conditions = is_own(content), about.title, dict(about.conditions)
         pair = pair if own else (about.reference, about.other)
+        # What was made before anything was declared may have been compared.
+        primary = about.primary if "primary" in about.model_fields_set else None
     for name in (*pair, *names):
         conditions.setdefault(name, ConditionTable())
     conditions |= {name: ConditionTable() for name in _new(study, recorded, conditions)}
@@ -243,7 +249,7 @@ def _described(
         for table in ("ratings", "exclusions"):
             if not table_path(study, table).exists():
                 write_text(table_path(study, table), empty_table(table))
-        text = own_text(study_text(title, *pair, conditions))
+        text = own_text(study_text(title, *pair, conditions, primary))
         if not path.exists() or read_bytes(path, DOCUMENT_BYTES) != text.encode():
             write_text(path, text)
     return said

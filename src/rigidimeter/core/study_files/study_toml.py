@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from datetime import date
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -24,7 +25,7 @@ from rigidimeter.core.files import (
     toml_text,
     with_checksum,
 )
-from rigidimeter.core.settings import Section, read_section
+from rigidimeter.core.settings import Section, quantity, read_section
 
 STUDY_FILE = "study.toml"
 STUDY_SCHEMA = "rigidimeter.study/1"
@@ -48,6 +49,14 @@ _NOT_WRITTEN = """\
 # pulse_width_us = 60.0
 # electrodes = "1-2+"
 # wash_in_min = 15.0
+"""
+_PRIMARY = """\
+[primary]
+# What the study concludes from; declare it before the data.
+measures = [{measures}]
+rule = "{rule}"   # or "sequence": each is claimed only if those before it are shown
+difference_percent = {difference}   # the smallest difference worth finding, of the reference
+{declared}   # the day on which it was declared
 """
 _TAIL = """\
 [rating]
@@ -138,6 +147,60 @@ class ArchiveTable(Section):
     keywords: list[str] = Field(default_factory=list, max_length=50)
 
 
+PrimaryMeasure = Literal["stiffness_nm_rad", "damping_nm_s_rad", "impulse_nm_s", "work_j", "rating"]
+"""What a study may conclude from. Inertia is not among them: it checks the instrument."""
+
+_MEASURES: list[PrimaryMeasure] = ["stiffness_nm_rad", "damping_nm_s_rad"]
+
+
+class PrimaryTable(Section):
+    """``[primary]``: what the study concludes from, declared before the data.
+
+    Parameters
+    ----------
+    measures : list of str
+        Names as in the tables.
+    rule : str
+        ``holm``, or ``sequence``: tested in this order, each at the full level, and claimed only if
+        all before it are shown.
+    difference_percent : float
+        The smallest difference worth finding, of the reference.
+    declared : date or None
+        The day on which it was declared.
+    """
+
+    measures: list[PrimaryMeasure] = Field(
+        default_factory=_MEASURES.copy, min_length=1, max_length=5
+    )
+    rule: Literal["holm", "sequence"] = "holm"
+    difference_percent: float = quantity(20.0, "%", 1.0, 100.0)
+    declared: date | None = None
+
+    @model_validator(mode="after")
+    def _each_once(self) -> Self:
+        for name in self.measures:
+            if self.measures.count(name) > 1:
+                raise ValueError(f"measures names {name} twice; name each measure once")
+        return self
+
+    def first_level(self, alpha: float, comparisons: int = 1) -> float:
+        """Return the level of the first test of the family.
+
+        Parameters
+        ----------
+        alpha : float
+            Of the family, between 0 and 1.
+        comparisons : int
+            Of conditions with the reference.
+
+        Examples
+        --------
+        >>> PrimaryTable().first_level(0.05), PrimaryTable(rule="sequence").first_level(0.05)
+        (0.025, 0.05)
+        """
+        return alpha / (comparisons * (len(self.measures) if self.rule == "holm" else 1))
+
+
 class AnalysisTable(Section):
     """``[analysis]``: how the study is analysed.
 
@@ -169,6 +232,7 @@ class StudyToml(Section):
     rating: RatingTable = RatingTable()
     subjects: dict[str, SubjectTable] = Field(default_factory=dict)
     archive: ArchiveTable = ArchiveTable()
+    primary: PrimaryTable = PrimaryTable()
     analysis: AnalysisTable = AnalysisTable()
 
     @model_validator(mode="after")
@@ -220,7 +284,11 @@ def read_study_toml(path: Path) -> StudyToml:
 
 
 def study_text(
-    title: str, reference: str, other: str, conditions: Mapping[str, ConditionTable]
+    title: str,
+    reference: str,
+    other: str,
+    conditions: Mapping[str, ConditionTable],
+    primary: PrimaryTable | None = None,
 ) -> str:
     """Return a `study.toml`, with comments on what may be filled in.
 
@@ -229,11 +297,14 @@ def study_text(
     title, reference, other : str
     conditions : mapping of str to ConditionTable
         What is known of the stimulation in each; reference and other at least.
+    primary : PrimaryTable, optional
+        What the study concludes from; without it nothing is declared.
     """
     about = toml_text({"schema": STUDY_SCHEMA, "title": title})
     pair = _REFERENCE + toml_text({"reference": reference, "other": other})
     described = (_condition(*one, reference) for one in conditions.items())
-    return "\n".join([about, pair, _TABLES, *described, _TAIL])
+    declared = [] if primary is None else [_declaration(primary)]
+    return "\n".join([about, pair, _TABLES, *described, *declared, _TAIL])
 
 
 def own_text(text: str) -> str:
@@ -266,3 +337,13 @@ def _condition(name: str, table: ConditionTable, reference: str) -> str:
     title = table.title or _TITLES.get(name, "")
     written = toml_text({"conditions": {name: {"title": title, **given}}})
     return written + (_NOT_WRITTEN if not given and name != reference else "")
+
+
+def _declaration(primary: PrimaryTable) -> str:
+    day = primary.declared
+    return _PRIMARY.format(
+        measures=", ".join(f'"{name}"' for name in primary.measures),
+        rule=primary.rule,
+        difference=primary.difference_percent,
+        declared="# declared = 2026-01-31" if day is None else f"declared = {day}",
+    )
