@@ -110,7 +110,9 @@ def test_a_fit_and_an_analysis_are_printed_as_one_line():
 
 def test_which_stiffness_it_is_and_at_what_motion_is_said_in_few_words():
     assert analysis(fits=(), fixed_inertia=(), pooled=()).stiffness_words == ""
-    assert analysis().stiffness_words == "holds the limb's weight"
+    weight = "includes the slope of the limb's weight"
+    assert analysis(axis="horizontal").stiffness_words == f"{weight} (not corrected)"
+    assert analysis(axis="vertical").stiffness_words == ""
     failed = replace(FIT, value=np.full(3, np.nan))
     none = analysis(fits=(failed,), fixed_inertia=(failed,), pooled=())
     assert none.stiffness_words == ""
@@ -121,14 +123,14 @@ def test_which_stiffness_it_is_and_at_what_motion_is_said_in_few_words():
         replace(swung, epoch="pooled"),
         replace(swung, condition="DBS", angle_rms_rad=3 * rad),
     )
-    one = analysis(fits=(swung,), fixed_inertia=(swung,), pooled=pooled[:1])
-    assert one.stiffness_words == "holds the limb's weight; angle SD 2.00°, range up to 9.00°"
+    one = analysis(fits=(swung,), fixed_inertia=(swung,), pooled=pooled[:1], axis="vertical")
+    assert one.stiffness_words == "measured at angle SD 2.00°, range up to 9.00°"
     weighed = replace(swung, findings=(Finding("gravity", "note", 1.4, np.nan),))
     fits = (weighed, replace(swung, angle_range_rad=12 * rad))
     two = analysis(fits=fits, fixed_inertia=fits, pooled=pooled)
     assert two.stiffness_words == (
-        "holds the limb's weight (note gravity: without); "
-        "angle SD 2.00° in OFF, 3.00° in DBS, range up to 12.0°"
+        f"{weight} (K without it: note gravity); "
+        "measured at angle SD 2.00° in OFF, 3.00° in DBS, range up to 12.0°"
     )
     assert two.stiffness_words in two._repr_html_().replace("&#x27;", "'")
     assert "VAF 99.6 %, angle SD 2.00°; epoch 1 OFF" in repr(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast, get_args
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import (
@@ -25,6 +25,7 @@ from rigidimeter.core.records import (
     PARAMETERS,
     STATISTICS,
     Analysis,
+    Axis,
     BandEstimate,
     Delay,
     Fit,
@@ -46,6 +47,7 @@ def estimates_document(analysis: Analysis) -> dict[str, Any]:
         "schema": ESTIMATES_SCHEMA,
         "method": analysis.method,
         "method_reason": analysis.method_reason,
+        "axis": analysis.axis,
         "weight_in_stiffness": analysis.weight_in_stiffness,
         "delays": [vars(delay) for delay in analysis.delays],
         "pooled": _pooled(analysis.pooled),
@@ -114,11 +116,20 @@ def read_estimates(path: Path) -> Analysis:
             str(document["method_reason"]),
             tuple(_band_estimate(row) for row in document["sensitivity"]),
             tuple(map(finding_from, document.get("across", ()))),
+            _axis(document),
         )
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise UserError(
             f"{path}: is not a complete {ESTIMATES_SCHEMA} document ({error})"
         ) from None
+
+
+def _axis(document: Mapping[str, Any]) -> Axis:
+    """Return how the axis stands, which older documents do not state."""
+    stated = document.get("axis", "unknown")
+    if stated not in get_args(Axis):
+        raise ValueError(f"axis {stated!r}")
+    return cast("Axis", stated)
 
 
 def _number(value: Any) -> float:

@@ -22,7 +22,7 @@ from rigidimeter.analysis.estimation import METHODS, Method
 from rigidimeter.analysis.report.references import Cited, Prose
 from rigidimeter.analysis.study import RATING, Condition, StudyResult
 from rigidimeter.analysis.study.drawing import channel_facts
-from rigidimeter.core.records import WEIGHT_IN_STIFFNESS, Epoch, Fit
+from rigidimeter.core.records import Epoch, Fit
 from rigidimeter.core.version import __version__
 from rigidimeter.core.words import condition_name, number, plural, series
 
@@ -72,7 +72,6 @@ def _template() -> jinja2.Template:
         "own": _own,
         "plural": plural,
         "version": __version__,
-        "weight": WEIGHT_IN_STIFFNESS,
         "were": lambda n: "was" if n == 1 else "were",
     }
     place = resources.files("rigidimeter.analysis.report") / "methods.txt"

@@ -28,7 +28,7 @@ from rigidimeter.analysis.estimation.stretches import longest_part
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.findings import Fact, Finding, found_between
-from rigidimeter.core.records import Analysis, BandEstimate, Delay, Epoch, Fit, Task
+from rigidimeter.core.records import Analysis, Axis, BandEstimate, Delay, Epoch, Fit, Task
 from rigidimeter.core.settings import Settings, settings_from
 from rigidimeter.core.words import short_names
 
@@ -234,7 +234,15 @@ def analyse_prepared(
         reason,
         tuple(sensitivity),
         () if fits_alone else tuple(_of_recordings(fits)),
+        _axis(preparation),
     )
+
+
+def _axis(preparation: Preparation) -> Axis:
+    """Return how the joint's axis stands: as the settings state it; that of the virtual rig."""
+    stated = preparation.settings.diagnostics.axis
+    virtual = all(epoch.virtual for epoch in preparation.epochs)
+    return "vertical" if stated == "unknown" and virtual else stated
 
 
 def _with_differences(

@@ -38,8 +38,8 @@ from rigidimeter.analysis.study.sessions import Gathered, gather
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Analysis, Epoch, Notice
-from rigidimeter.core.settings import Settings
-from rigidimeter.core.study_files import StudyFolder, TableRow, read_study_folder
+from rigidimeter.core.settings import Settings, changed_settings
+from rigidimeter.core.study_files import STUDY_FILE, StudyFolder, TableRow, read_study_folder
 
 MEASURE_MS, RESAMPLE_MS = 50.0, 0.01
 """What the tests of a measure cost, beside the steps of `analysis.step_costs`."""
@@ -113,6 +113,7 @@ def read_study(
     if chosen not in method_names():
         where = "--method" if method != "auto" else f"{folder / 'study.toml'}: analysis.method ="
         raise UserError(f"{where} {chosen}: {no_such_method(chosen)}")
+    stated = read.about.analysis.axis
     names, said = naming(read)
     if pair != (None, None):
         wanted = pair[0] or names.pair[0], pair[1] or names.pair[1]
@@ -121,13 +122,17 @@ def read_study(
     gathered = gather(read, names, progress=progress)
     epochs, operator, excluded = operators_exclusions(read, gathered)
     there = {epoch.condition for epoch in epochs} - {*names.pair}
+    settings = settings or gathered.settings or Settings()
+    if stated != "unknown":
+        about = f"{folder / STUDY_FILE}: analysis.axis"
+        settings = changed_settings(settings, {"diagnostics": {"axis": stated}}, about)
     return StudyRead(
         read,
         names,
         gathered,
         epochs,
         operator,
-        settings or gathered.settings or Settings(),
+        settings,
         chosen,
         (*read.notices, *said, *gathered.notices, *excluded),
         tuple(name for name in names.known if name in there) if pair[1] is None else (),
@@ -324,6 +329,7 @@ def _analysed(
         delays=tuple(delay for part in parts.values() for delay in part.delays),
         method_reason=". ".join(filter(None, reasons)),
         across=tuple(across),
+        axis=axes.pop() if len(axes := {part.axis for part in parts.values()}) == 1 else "unknown",
     )
     notices = []
     if included:

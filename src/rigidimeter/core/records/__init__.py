@@ -4,7 +4,6 @@ Every name ends in its unit. Arrays are float64 and read-only once inside a reco
 """
 
 from rigidimeter.core.records.analysis_record import (
-    WEIGHT_IN_STIFFNESS,
     Analysis,
     FindingGroup,
     grouped,
@@ -13,6 +12,7 @@ from rigidimeter.core.records.epochs import (
     CHANNEL_UNITS,
     LATE_TICK,
     LOST_SAMPLES,
+    Axis,
     Channel,
     Epoch,
     LeftOut,

@@ -10,6 +10,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rigidimeter.core.findings import SERIOUS_FIRST, Finding
+from rigidimeter.core.records.epochs import Axis
 from rigidimeter.core.records.estimates import (
     FIT_NUMBERS,
     PARAMETERS,
@@ -55,14 +56,16 @@ MOST_SOURCES = 3
 """The epochs of a finding are named where they are of at most so many recordings."""
 
 
-WEIGHT_IN_STIFFNESS = (
-    "K is the slope of all torque against the angle. Unless the axis is vertical it includes that "
-    "of the weight, m g l cos θ with θ from hanging straight down"
-)
+INCLUDES_WEIGHT = "includes the slope of the limb's weight"
+WEIGHT: Mapping[Axis, str] = {
+    "horizontal": f"{INCLUDES_WEIGHT} (not corrected)",
+    "unknown": f"{INCLUDES_WEIGHT} unless the axis is vertical",
+    "vertical": "",
+}
+"""What K includes of the limb's weight, by the axis of the joint; after "K"."""
 
-
-STIFFNESS_HOLDS = "holds the limb's weight"
-"""`WEIGHT_IN_STIFFNESS` in few words, after "K"."""
+NOT_STATED = "may include limb weight (set diagnostics.axis)"
+"""That about an unknown axis, in half a line of a screen."""
 
 
 class FindingGroup(NamedTuple):
@@ -162,7 +165,8 @@ class Analysis:
     several conditions to all epochs, whose condition is empty. `method_reason` says why a method
     was chosen where it was left open. `sensitivity` is what other bands give, where the
     perturbation was recorded. `across` is what no fit of it carries: of recordings beside each
-    other, and of all epochs of a subject where there are several.
+    other, and of all epochs of a subject where there are several. `axis` is how the joint's axis
+    stands, on which depends whether K includes the limb's weight.
     """
 
     method: str
@@ -175,6 +179,7 @@ class Analysis:
     method_reason: str = ""
     sensitivity: tuple[BandEstimate, ...] = ()
     across: tuple[Finding, ...] = ()
+    axis: Axis = "unknown"
 
     @property
     def results(self) -> tuple[Fit | Score, ...]:
@@ -188,16 +193,12 @@ class Analysis:
 
     @property
     def weight_in_stiffness(self) -> str:
-        """What K holds of the limb's weight, as a sentence without its stop; empty without fits."""
-        if not self.fits:
+        """What K includes of the limb's weight, after "K"; empty where that is nothing."""
+        if not any(math.isfinite(fit.stiffness_nm_rad) for fit in self.fits):
             return ""
-        if self._weight_known:
-            return f"{WEIGHT_IN_STIFFNESS}; the note `gravity` of each epoch gives K without it"
-        return f"{WEIGHT_IN_STIFFNESS}; set diagnostics.gravity_nm to have K without it too"
-
-    @property
-    def _weight_known(self) -> bool:
-        return any(group.finding.name == "gravity" for group in self.findings)
+        if any(group.finding.name == "gravity" for group in self.findings):
+            return f"{INCLUDES_WEIGHT} (K without it: note gravity)"
+        return WEIGHT[self.axis]
 
     @property
     def stiffness_words(self) -> str:
@@ -207,7 +208,6 @@ class Analysis:
         """
         if not any(math.isfinite(fit.stiffness_nm_rad) for fit in self.fits):
             return ""
-        without = " (note gravity: without)" if self._weight_known else ""
         pooled = [fit for fit in self.pooled if fit.condition] or self.pooled[-1:]
         names = " in {}" if len(pooled) > 1 else ""
         sds = [
@@ -221,11 +221,13 @@ class Analysis:
         )
         widest = degrees(widest_rad)
         motion = one_line(
-            f"angle SD {', '.join(sds)}" if sds else "",
+            f"measured at angle SD {', '.join(sds)}" if sds else "",
             f"range up to {widest}°" if widest else "",
             joint=", ",
         )
-        return one_line(f"{STIFFNESS_HOLDS}{without}", motion, joint="; ")
+        weight = self.weight_in_stiffness
+        short = NOT_STATED if weight == WEIGHT["unknown"] else weight
+        return one_line(short, motion, joint="; ")
 
     def rows(self) -> list[dict[str, Any]]:
         """Return one row for each fitted epoch: the fit, and B and K at fixed inertia beside it.

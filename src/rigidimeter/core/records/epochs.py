@@ -12,6 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Task = Literal["prbs", "sinusoid"]
+Axis = Literal["unknown", "vertical", "horizontal"]
+"""How the joint's axis stands: about a vertical one the limb's weight has no moment."""
+
 OutcomeKind = Literal["included", "excluded", "failed"]
 
 CHANNEL_UNITS: Mapping[str, str] = {

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
-from pydantic import create_model
+from pydantic import create_model, model_validator
 
 from rigidimeter.core.findings import KINDS, STUDY_KINDS, Level, default_level
+from rigidimeter.core.records import Axis
 from rigidimeter.core.settings.section import Section, quantity
 
 USABLE_FRACTION_OF_RATE = 0.4
@@ -90,7 +91,8 @@ class DiagnosticLevels(create_model("Levels", __base__=Section, **_LEVELS)):  # 
 class DiagnosticsSettings(Section):
     """Thresholds of the checks. `min_` and `max_` are the ends of what is taken as sound.
 
-    `gravity_nm` is m g l, the moment of the limb's weight about the axis when the limb is
+    `axis` is how the joint's axis stands. About a vertical axis K includes nothing of the limb's
+    weight. `gravity_nm` is m g l, the moment of the limb's weight about the axis when the limb is
     horizontal; 0 where it is not known or the axis is vertical. `gravity_angle_deg` is the limb's
     angle from hanging straight down where the angle that is recorded is 0, in its direction.
     """
@@ -133,6 +135,7 @@ class DiagnosticsSettings(Section):
     max_saturated_percent: float = quantity(0.5, "%", 0.0, 100.0)
     max_frozen_s: float = quantity(0.1, "s", 0.0, 60.0)
     max_left_out_percent: float = quantity(50.0, "%", 0.0, 100.0)
+    axis: Axis = "unknown"
     gravity_nm: float = quantity(0.0, "N·m", 0.0, 1000.0)
     gravity_angle_deg: float = quantity(0.0, "deg", -180.0, 180.0)
     max_velocity_scale_percent: float = quantity(10.0, "%", 0.1, 1000.0)
@@ -147,6 +150,16 @@ class DiagnosticsSettings(Section):
     max_damping_nm_s_rad: float = quantity(50.0, "N·m·s/rad", 0.0, 1000.0, above=True)
     max_stiffness_nm_rad: float = quantity(2000.0, "N·m/rad", 0.0, 100000.0, above=True)
     levels: DiagnosticLevels = DiagnosticLevels()
+
+    @model_validator(mode="after")
+    def _weight_about_axis(self) -> Self:
+        if self.axis == "vertical" and self.gravity_nm > 0:
+            raise ValueError(
+                f'axis = "vertical" and gravity_nm = {self.gravity_nm:g} N·m contradict each '
+                "other, for about a vertical axis the limb's weight has no moment; set axis = "
+                '"horizontal", or gravity_nm = 0'
+            )
+        return self
 
 
 class OnlineSettings(Section):

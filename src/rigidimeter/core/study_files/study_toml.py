@@ -25,6 +25,7 @@ from rigidimeter.core.files import (
     toml_text,
     with_checksum,
 )
+from rigidimeter.core.records import Axis
 from rigidimeter.core.settings import Section, quantity, read_section
 
 STUDY_FILE = "study.toml"
@@ -65,6 +66,7 @@ step = 0.5           # 0 for none
 
 [analysis]
 method = "auto"      # as --method takes it
+axis = "unknown"     # of the joint: vertical or horizontal; unknown: as the sessions state it
 """
 _OWN = (
     "# Written by rigidimeter, which adds conditions and stimulation as sessions are recorded,"
@@ -208,11 +210,15 @@ class AnalysisTable(Section):
     ----------
     method : str
         Of estimation, as ``--method`` takes it.
+    axis : {"unknown", "vertical", "horizontal"}
+        How the joint's axis stands, instead of `diagnostics.axis` of the settings; ``"unknown"``
+        leaves that.
     one_offset_a_day : bool
         Read and without effect: the test by days is chosen by which days have which conditions.
     """
 
     method: str = _text("auto", 1, 40)
+    axis: Axis = "unknown"
     one_offset_a_day: bool = False
 
 

@@ -67,11 +67,11 @@ ANALYSIS = Analysis(
 def test_what_stiffness_holds_of_the_weight_is_said(tmp_path):
     write_estimates_json(tmp_path / "e.json", ANALYSIS)
     said = json.loads((tmp_path / "e.json").read_text())["weight_in_stiffness"]
-    assert "m g l cos θ" in said
-    assert said.endswith("set diagnostics.gravity_nm to have K without it too")
-    note = replace(FOUND, name="gravity", level="note")
-    known = replace(ANALYSIS, fits=(replace(GOOD, findings=(note,)), FAILED))
-    assert "the note `gravity`" in known.weight_in_stiffness
+    assert said.startswith("includes the slope of the limb's weight unless the axis is vertical")
+    upright = replace(ANALYSIS, axis="vertical")
+    write_estimates_json(tmp_path / "e.json", upright)
+    assert read_estimates(tmp_path / "e.json").axis == "vertical"
+    assert upright.weight_in_stiffness == ""
     assert replace(ANALYSIS, fits=(), fixed_inertia=()).weight_in_stiffness == ""
 
 
