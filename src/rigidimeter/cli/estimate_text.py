@@ -10,7 +10,16 @@ from rigidimeter.analysis.study import Precision, StudyResult, condition_precisi
 from rigidimeter.cli.comparison_text import finding_notes, full_blocks, stiffness_notes, two_lines
 from rigidimeter.cli.terminal_tables import ROWS, Block, Heading, Table, text_lines
 from rigidimeter.core.records import PARAMETERS, Analysis, Fit, Score, degrees
-from rigidimeter.core.words import decimals, fixed, number, plural, scaled, short_names, with_error
+from rigidimeter.core.words import (
+    decimals,
+    epoch_name,
+    fixed,
+    number,
+    plural,
+    scaled,
+    short_names,
+    with_error,
+)
 
 MOST_EPOCHS, FIRST_EPOCHS = 8, 4
 """Of more epochs than the first number the second and the last are shown, of several recordings
@@ -166,9 +175,7 @@ def _excluded(analysis: Analysis) -> Iterator[tuple[str, str]]:
         if not one.outcome.included:
             out.setdefault(one.outcome.kind, []).append(one)
     for kind, those in out.items():
-        first = f"epoch {those[0].epoch}"
-        if len(names) > 1:
-            first += f" of {names[those[0].source]}"
+        first = epoch_name(those[0].epoch, those[0].source, names)
         where = first if len(those) == 1 else f"{plural(len(those), 'epoch')}, first {first}"
         reason = those[0].outcome.reason
         yield kind, two_lines(f"{where}: {reason}", f"{where}: {reason.partition('. ')[0]}", where)

@@ -34,6 +34,7 @@ from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.core.findings import Fact, Finding
 from rigidimeter.core.records import PARAMETERS, Fit
 from rigidimeter.core.settings import DiagnosticsSettings
+from rigidimeter.core.words import epoch_name, short_names
 
 FEWEST_EPOCHS = 3
 NAME = "varying_between_epochs"
@@ -142,6 +143,8 @@ def between_epochs(
         return None
     first, *others = large
     labels, about = [fit.epoch for fit in fits], PARAMETERS[first.parameter]
+    names = short_names(fit.source for fit in fits)
+    called = [epoch_name(fit.epoch, fit.source, names) for fit in fits]
     low, high = int(np.argmin(first.drawn)), int(np.argmax(first.drawn))
     trend_percent, trend_p = first.trend()
     way = "rising" if trend_percent > 0 else "falling"
@@ -150,9 +153,9 @@ def between_epochs(
         "symbol": about.symbol,
         "size_unit": about.unit,
         "low": float(first.drawn[low]),
-        "low_at": f"epoch {labels[low]}",
+        "low_at": called[low],
         "high": float(first.drawn[high]),
-        "high_at": f"epoch {labels[high]}",
+        "high_at": called[high],
         "sd": first.sd,
         "trend_percent": trend_percent,
         "trend_p": trend_p,

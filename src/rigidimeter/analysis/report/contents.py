@@ -11,7 +11,7 @@ from matplotlib.figure import Figure as Drawing
 
 from rigidimeter.analysis.study import StudyResult, result_table
 from rigidimeter.core.records import Epoch, Fit, Score
-from rigidimeter.core.words import Column, Table, short_names
+from rigidimeter.core.words import Column, Table, epoch_name, short_names
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,9 @@ class Figure:
         What it shows, for those who cannot see it.
     draw : callable
         Returns the drawing; called when the report is written.
-    size : {"broad", "tall", "small"}
-        On the page; small figures are side by side.
+    size : {"page", "broad", "tall", "small"}
+        On the page: as wide as the page, as wide as its text, as high as a printed sheet, or side
+        by side.
     marks : mapping of str to sequence of (str, str)
         Source and label of the epochs that points stand for, in the order of the points, by the
         `gid` of their line.
@@ -39,7 +40,7 @@ class Figure:
     caption: str
     alt: str
     draw: Callable[[], Drawing]
-    size: Literal["broad", "tall", "small"] = "broad"
+    size: Literal["page", "broad", "tall", "small"] = "broad"
     marks: Mapping[str, Sequence[tuple[str, str]]] = field(default_factory=dict)
 
 
@@ -97,10 +98,10 @@ def from_result(
 
 
 def named(result: StudyResult, one: Epoch | Fit | Score) -> str:
-    """Return epoch and source, since sessions use the same labels."""
+    """Return what the page calls an epoch."""
     names = short_names(epoch.source for epoch in result.epochs)
     label = one.label if isinstance(one, Epoch) else one.epoch
-    return f"epoch {label} of {names.get(one.source, one.source)}"
+    return epoch_name(label, one.source, names)
 
 
 def paragraph(text: str, kind: Literal["", "remark", "banner"] = "") -> Markup:

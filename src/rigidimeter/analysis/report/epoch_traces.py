@@ -10,7 +10,7 @@ from rigidimeter.analysis.study import StudyResult
 from rigidimeter.analysis.study.drawing import epoch_traces
 from rigidimeter.analysis.study.drawn_signals import EpochTrace
 from rigidimeter.core.records import Fit, Score
-from rigidimeter.core.words import amount, condition_name, number, short_names
+from rigidimeter.core.words import amount, condition_name, epoch_name, number, short_names
 
 Trace = dict[str, Any]
 
@@ -34,7 +34,7 @@ def _trace(trace: EpochTrace, one: Fit | Score, names: dict[str, str]) -> Trace:
         words = f"{number(one.work_j)} J and {number(one.impulse_nm_s)} N·m·s per cycle"
     if not one.outcome.included:
         words += f". Does not count: {one.outcome.reason}"
-    where = f"epoch {one.epoch} of {names.get(one.source, one.source)}"
+    where = epoch_name(one.epoch, one.source, names)
     return {
         "title": f"{condition_name(one.condition)}, {where}",
         "words": f"{words}. {shown_words(trace)}".strip(),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from markupsafe import Markup, escape
 
@@ -40,6 +40,7 @@ def inline_svg(
     alt: str,
     marks: Mapping[str, Sequence[tuple[str, str]]],
     places: Mapping[tuple[str, str], int],
+    called: Callable[[str, str], str],
 ) -> Markup:
     """Return an SVG document of `style.svg_text` as an element of the page.
 
@@ -54,11 +55,13 @@ def inline_svg(
         By the group of a line of points: what each of its points stands for, in their order.
     places : mapping of (str, str) to int
         The place of the traces of an epoch, by source and label.
+    called : callable
+        Takes source and label of an epoch; returns what it is called on the page.
     """
     text = _TAG.sub(_shorter, _LEFT_OUT.sub("", svg[svg.index("<svg") :]))
     text = _POINTS.sub(_styled_once, text)
     for group, own in marks.items():
-        text = _marked(text, group, own, places)
+        text = _marked(text, group, own, places, called)
     used = set(_USED.findall(text))
     prefix = re.sub(r"[^A-Za-z0-9_-]", "_", name)
 
@@ -95,6 +98,7 @@ def _marked(
     group: str,
     own: Sequence[tuple[str, str]],
     places: Mapping[tuple[str, str], int],
+    called: Callable[[str, str], str],
 ) -> str:
     """Return the SVG with the epoch of each point of a group, and the place of its traces."""
     start = text.find(f'<g id="{group}">')
@@ -108,6 +112,6 @@ def _marked(
     for attributes, mark in zip(points, own, strict=True):
         place = places.get(mark)
         traces = "" if place is None else f' data-epoch="{place}"'
-        drawn.append(f"<use {attributes}{traces}><title>epoch {escape(mark[1])}</title></use>")
+        drawn.append(f"<use {attributes}{traces}><title>{escape(called(*mark))}</title></use>")
     given = iter(drawn)
     return text[:start] + _POINT.sub(lambda _: next(given), text[start:stop]) + text[stop:]

@@ -24,7 +24,7 @@ from rigidimeter.analysis.study import RATING, Condition, StudyResult
 from rigidimeter.analysis.study.drawing import channel_facts
 from rigidimeter.core.records import Epoch, Fit
 from rigidimeter.core.version import __version__
-from rigidimeter.core.words import condition_name, number, plural, series
+from rigidimeter.core.words import condition_name, decimals, fixed, number, plural, series
 
 _WORDS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
 
@@ -65,6 +65,7 @@ def _template() -> jinja2.Template:
         lstrip_blocks=True,
     )
     environment.globals |= {
+        "commanded": commanded,
         "counted": lambda n, noun: plural(n, noun).replace(str(n), _word(n), 1),
         "g": lambda value, digits=6: f"{value:.{digits}g}",
         "name": condition_name,
@@ -173,6 +174,30 @@ def _rates(result: StudyResult) -> Iterator[str]:
         if found:
             rates.setdefault(number(float(np.median(found)), 3), []).append(name)
     return (f"{series(group)} at {rate} samples/s" for rate, group in rates.items())
+
+
+def commanded(result: StudyResult) -> str:
+    """Return the lowest and the highest commanded torque of the included epochs, as recorded.
+
+    Both as a range where epochs differ; nothing where no included epoch has its perturbation.
+    """
+    out = {(one.source, one.epoch) for one in result.exclusions}
+    reached_nm = [
+        (facts.lowest, facts.highest)
+        for epoch, each in zip(result.epochs, channel_facts(result), strict=True)
+        for facts in each
+        if facts.name == "perturbation_nm" and facts.lowest < facts.highest
+        if (epoch.source, epoch.label) not in out
+    ]
+    if not reached_nm:
+        return ""
+    places = decimals(math.nan, max(abs(nm) for ends in reached_nm for nm in ends)) + 1
+
+    def ends(values_nm: Sequence[float]) -> str:
+        extremes = (min(values_nm), max(values_nm))
+        return " to ".join(dict.fromkeys(fixed(nm, places, sign=True) for nm in extremes))
+
+    return " and ".join(map(ends, zip(*reached_nm, strict=True)))
 
 
 def _band(fits: Iterable[Fit]) -> tuple[float, float] | None:

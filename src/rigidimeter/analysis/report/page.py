@@ -24,7 +24,7 @@ from rigidimeter.analysis.report.style import svg_text
 from rigidimeter.analysis.study import StudyResult, lead, traffic_light
 from rigidimeter.core.files import csv_text, visible
 from rigidimeter.core.version import __version__
-from rigidimeter.core.words import Column, Table, short_names, shown_below, shown_value
+from rigidimeter.core.words import Column, Table, epoch_name, short_names, shown_below, shown_value
 
 Contents = Sequence[tuple[Section, Sequence[Block]]]
 """The sections of a result, each with its text, tables and figures."""
@@ -171,7 +171,7 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
         # The style is this package's own file and needs no escaping.
         css=Markup("\n".join([_text("page.css"), *([_plot(".min.css")] if traces else [])])),
         parts=parts(made),
-        images=_images(made, svg, {key: place for place, key in enumerate(traces)}),
+        images=_images(made, svg, {key: place for place, key in enumerate(traces)}, names),
         traces=Markup(traces_json(traces.values())) if traces else "",
         script=Markup(script),
         script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii"),
@@ -205,11 +205,18 @@ def _template() -> jinja2.Template:
 
 
 def _images(
-    made: Contents, svg: Mapping[str, str], places: Mapping[tuple[str, str], int]
+    made: Contents,
+    svg: Mapping[str, str],
+    places: Mapping[tuple[str, str], int],
+    names: Mapping[str, str],
 ) -> dict[str, Markup]:
     """Return the figures that are drawn as elements of the page."""
+
+    def called(source: str, label: str) -> str:
+        return epoch_name(label, source, names)
+
     return {
-        block.name: inline_svg(svg[block.name], block.name, block.alt, block.marks, places)
+        block.name: inline_svg(svg[block.name], block.name, block.alt, block.marks, places, called)
         for _, blocks in made
         for block in blocks
         if isinstance(block, Figure) and block.name in svg

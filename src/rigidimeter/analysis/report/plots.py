@@ -36,7 +36,7 @@ from rigidimeter.analysis.report.points import draw_comparisons, draw_days
 from rigidimeter.analysis.report.style import condition_colours, drawable, styled
 from rigidimeter.analysis.study import Comparison, StudyResult
 from rigidimeter.core.records import Analysis, Channel, Epoch, Fit
-from rigidimeter.core.words import condition_name, short_names
+from rigidimeter.core.words import condition_name, epoch_name, short_names
 from rigidimeter.planning import Design, tick_times_s
 
 Panels = NDArray[Any]
@@ -209,5 +209,5 @@ def _compared(result: StudyResult, measure: str) -> Comparison:
 
 
 def _title(recording: Recording, source: str, epoch: str, condition: str) -> str:
-    name = short_names(each.source for each in recording.epochs)[source]
-    return f"epoch {epoch} of {name}" + (f", {condition}" if condition else "")
+    name = epoch_name(epoch, source, short_names(each.source for each in recording.epochs))
+    return f"{name}, {condition}" if condition else name

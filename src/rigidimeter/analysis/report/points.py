@@ -205,7 +205,8 @@ def draw_days(panels: Sequence[Axes], c: Comparison, order: Sequence[str]) -> No
         axes.set_ylim(low, high + 0.12 * (high - low) * several)
         axes.set_ylabel(f"{c.measure.title}\n({unit})")
     panels[-1].set_xlabel("Day, in the order of recording")
-    for name in dict.fromkeys(condition_name(m.condition) for m in c.day_medians):
+    shown = sorted({m.condition for m in c.day_medians}, key=lambda name: _side(c, name))
+    for name in map(condition_name, shown):
         panels[0].plot([], [], markers[name], color=colours[name], ms=6, label=listed(name))
     legend_above(panels[0])
 
@@ -213,6 +214,11 @@ def draw_days(panels: Sequence[Axes], c: Comparison, order: Sequence[str]) -> No
 def longest_day(c: Comparison) -> int:
     """Return the length of the longest name of a day."""
     return max(len(m.day) for m in c.day_medians)
+
+
+def _side(c: Comparison, condition: str) -> tuple[int, str]:
+    """Return where a condition stands: the reference left of the other, whichever came first."""
+    return (c.pair.index(condition) if condition in c.pair else len(c.pair), condition)
 
 
 def _day(
@@ -224,8 +230,9 @@ def _day(
     colours: Mapping[str, str],
     markers: Mapping[str, str],
 ) -> None:
-    """Draw the conditions of one day side by side, their medians joined."""
+    """Draw the conditions of one day side by side, the reference left, their medians joined."""
     own = [(k, m) for k, m in enumerate(c.day_medians) if (m.subject, m.day) == slot]
+    own.sort(key=lambda each: _side(c, each[1].condition))
     width = 1.0 / len(own)
     centres = place + 0.9 * width * (np.arange(len(own)) - (len(own) - 1) / 2)
     for centre, (k, m) in zip(centres, own, strict=True):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -24,18 +25,24 @@ class ChannelFacts:
         As `Channel` has them.
     span_s : float
         From the first sample to the last; NaN without one.
+    lowest, highest : float
+        Of its finite samples, in its unit; NaN without one.
     """
 
     name: str
     rate_hz: float
     mean_rate_hz: float
     span_s: float
+    lowest: float = math.nan
+    highest: float = math.nan
 
 
 def facts_of(channel: Channel) -> ChannelFacts:
     """Return what tables say of a channel."""
     span_s = float(channel.time_s[-1] - channel.time_s[0]) if len(channel) else float("nan")
-    return ChannelFacts(channel.name, channel.rate_hz, channel.mean_rate_hz, span_s)
+    finite = channel.values[np.isfinite(channel.values)]
+    ends = (float(finite.min()), float(finite.max())) if finite.size else (math.nan, math.nan)
+    return ChannelFacts(channel.name, channel.rate_hz, channel.mean_rate_hz, span_s, *ends)
 
 
 @dataclass(frozen=True)

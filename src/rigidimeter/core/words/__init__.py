@@ -30,6 +30,7 @@ from rigidimeter.core.words.tables import (
     shown_value,
 )
 from rigidimeter.core.words.text import (
+    epoch_name,
     epochs_text,
     html_table,
     one_cell,

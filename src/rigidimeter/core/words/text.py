@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import PurePath
 
@@ -33,6 +33,19 @@ def epochs_text(labels: Sequence[str]) -> str:
         f"epoch{'s' if len(labels) > 1 else ''} {', '.join(parts)}"
         f"{f' and {more} more' if more else ''}"
     )
+
+
+def epoch_name(label: str, source: str, names: Mapping[str, str]) -> str:
+    """Return what an epoch is called: with its source where there are several, which share labels.
+
+    Examples
+    --------
+    >>> epoch_name("3", "/data/day-1", {"/data/day-1": "day-1", "/data/day-2": "day-2"})
+    'epoch 3 of day-1'
+    >>> epoch_name("3", "/data/day-1", {"/data/day-1": "day-1"})
+    'epoch 3'
+    """
+    return f"epoch {label}" + (f" of {names.get(source, source)}" if len(names) > 1 else "")
 
 
 def plural(count: int, noun: str) -> str:

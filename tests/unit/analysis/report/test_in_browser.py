@@ -81,6 +81,16 @@ def test_the_first_screen_holds_stiffness_and_the_traffic_light(
     page.close()
 
 
+def test_the_figures_of_the_days_are_as_wide_as_the_page(on_a_desk: Page) -> None:
+    wide = on_a_desk.locator("main").evaluate("one => one.clientWidth")
+    figures = on_a_desk.locator("#days svg").all()
+    assert len(figures) == 5
+    for figure in figures:
+        box = figure.bounding_box()
+        assert box is not None
+        assert box["width"] == pytest.approx(wide, abs=1)
+
+
 def test_every_link_leads_somewhere(on_a_desk: Page, reports: dict[str, Path]) -> None:
     page = on_a_desk
     links = page.locator("a").evaluate_all("all => all.map(a => a.getAttribute('href'))")
@@ -144,7 +154,7 @@ def test_a_point_names_its_epoch_and_opens_its_traces(on_a_desk: Page) -> None:
     point.scroll_into_view_if_needed()
     point.hover()
     tip = page.locator("#tip")
-    assert re.match(r"epoch \w+ – click for its traces", tip.inner_text())
+    assert re.match(r"epoch \w+ of M1-day-\d\d – click for its traces", tip.inner_text())
     point.click()
     dialog = page.locator("#epoch")
     assert "K " in dialog.locator(".remark").inner_text()

@@ -23,14 +23,17 @@ def drawn(
     values: list[float], marks: list[tuple[str, str]], places: dict[tuple[str, str], int]
 ) -> str:
     figure = figure_of((3.0, 3.0), draw_distribution, "y (1)", {NAME: values}, {NAME: "#0072B2"})
-    return inline_svg(svg_text(figure), "a/b", 'A "drawing"', {"epochs-0": marks}, places)
+    document = svg_text(figure)
+    return inline_svg(
+        document, "a/b", 'A "drawing"', {"epochs-0": marks}, places, "epoch {1} of {0}".format
+    )
 
 
 def test_points_carry_the_names_and_traces_of_their_epochs_in_order() -> None:
     marks = [("s", f"{k} <&>") for k in range(3)]
     text = drawn([1.0, 3.0, 2.0], marks, {("s", "2 <&>"): 7})
     assert re.findall(r"<title>(.*?)</title>", text) == [
-        f"epoch {escape(label)}" for _, label in marks
+        f"epoch {escape(label)} of s" for _, label in marks
     ]
     uses = re.findall(r"<use ([^>]*)><title>", text)
     assert ["data-epoch" in use for use in uses] == [False, False, True]

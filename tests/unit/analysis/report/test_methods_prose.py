@@ -35,6 +35,36 @@ def test_methods_hold_the_facts_of_the_study(study: StudyResult) -> None:
     assert "Newcombe" not in text
 
 
+def test_methods_state_the_torque_that_was_commanded_to_the_epochs_that_count(
+    study: StudyResult,
+) -> None:
+    out = {(one.source, one.epoch) for one in study.exclusions}
+
+    def shifted(by_nm: float) -> StudyResult:
+        epochs = []
+        for k, epoch in enumerate(study.epochs):
+            given = epoch.channels["perturbation_nm"]
+            more_nm = 2.0 if (epoch.source, epoch.label) in out else by_nm * (k % 2)
+            values = given.values - 0.05 + more_nm
+            channels = epoch.channels | {given.name: dataclasses.replace(given, values=values)}
+            epochs.append(dataclasses.replace(epoch, channels=channels))
+        return dataclasses.replace(study, epochs=tuple(epochs))
+
+    assert (
+        "binary torque of −1.05 and +0.95 N·m (commanded, as recorded) for 20 s"
+        in methods_prose(shifted(0.0)).text
+    )
+    assert "torque of −1.05 to −0.95 and +0.95 to +1.05 N·m (" in methods_prose(shifted(0.1)).text
+    bare = [
+        dataclasses.replace(
+            epoch, channels={k: c for k, c in epoch.channels.items() if k != "perturbation_nm"}
+        )
+        for epoch in study.epochs
+    ]
+    unknown = methods_prose(dataclasses.replace(study, epochs=tuple(bare))).text
+    assert "binary torque of ±1 N·m (as set) for 20 s" in unknown
+
+
 def test_methods_take_the_text_of_an_estimator_from_outside(study: StudyResult) -> None:
     toy = Method("toy", "a guess", (), "by a guess of ours", METHODS[0].fit, references=("bca",))
     by_toy = dataclasses.replace(study, analysis=dataclasses.replace(study.analysis, method="toy"))

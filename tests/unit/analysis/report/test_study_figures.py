@@ -102,6 +102,19 @@ def test_both_conditions_of_one_day_share_its_place_side_by_side() -> None:
     assert list(joined.get_ydata()) == [1.0, 2.0]
 
 
+def test_the_reference_is_at_the_left_on_a_day_that_began_with_the_other() -> None:
+    (axes,) = days(
+        strip("1", "DBS", 2.0), strip("1", "OFF", 1.0), strip("2", "OFF", 1.0), strip("2", "DBS", 2)
+    ).axes
+    off, dbs = (
+        [x for line in axes.lines if line.get_marker() == MARKERS[n] for x in line.get_xdata()]
+        for n in NAMES
+    )
+    assert max(x for x in off if x < 0.5) < min(x for x in dbs)
+    assert max(off) < max(dbs)
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["OFF", "DBS"]
+
+
 def test_subjects_stand_apart_and_many_days_go_on_in_another_row() -> None:
     strips = [strip(str(k), "OFF", float(k), subject=s) for s in ("M", "N") for k in range(20)]
     figure = days(*strips)

@@ -4,6 +4,7 @@ import dataclasses
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tests.unit.analysis.report.cohorts import Design, altered, made_study, untested
 from tests.unit.analysis.report.parsed_page import ParsedPage
@@ -76,6 +77,20 @@ def test_an_epoch_that_is_not_accounted_for_is_named(study: StudyResult) -> None
     fewer = dataclasses.replace(study, exclusions=study.exclusions[1:])
     text = shown(fewer).words("exclusions")
     assert "1 recorded epoch is neither included nor listed as excluded" in text
+
+
+def test_numbers_with_the_inertia_held_are_in_the_table_of_that_name_alone(
+    study: StudyResult,
+) -> None:
+    fits = study.analysis.fits
+    held = tuple(dataclasses.replace(f, value=np.array([0.0045, 55.55, 98.76])) for f in fits)
+    analysis = dataclasses.replace(study.analysis, fixed_inertia=held)
+    other = dataclasses.replace(study, analysis=analysis)
+    page = render_page(other, contents(other), {})
+    own = ParsedPage(page).table("Damping and stiffness with the inertia fixed at its median")
+    assert len(own) > 1
+    assert page.count("98.76") == page.count("55.55") == len(own) - 1
+    assert "with the inertia fixed." not in page
 
 
 def test_sensitivity_and_changes(study: StudyResult, page: ParsedPage) -> None:

@@ -169,10 +169,11 @@ def test_epochs_whose_stiffness_differs_are_named_in_the_pooled_fit():
     factors = (0.7, 1.3, 0.8, 1.1)
     joints = [JointDynamics(0.0045, 0.1368, 1.751 * factor) for factor in factors]
     batch = simulate_epochs(settings, 4, joints=joints, conditions="OFF", seed=2)
-    analysis = estimate([batch.epoch(i) for i in range(4)], "iv", settings=settings)
+    days = [replace(batch.epoch(i), source=f"/data/day-{i // 2}") for i in range(4)]
+    analysis = estimate(days, "iv", settings=settings)
     (finding,) = (f for f in analysis.pooled[0].findings if f.name == "varying_between_epochs")
     assert finding.value == pytest.approx(60 / 0.975, rel=0.05)
-    assert (finding.facts["symbol"], finding.facts["low_at"]) == ("K", "epoch 0")
+    assert (finding.facts["symbol"], finding.facts["low_at"]) == ("K", "epoch 0 of day-0")
     assert finding.facts["high"] == pytest.approx(2.25, abs=0.05)
     # A joint is not the same twice: a number, and no warning unless the settings ask for one.
     assert finding.level == "note"

@@ -234,8 +234,7 @@ def _distributions(result: StudyResult) -> Iterator[Block]:
         "Each point is an included epoch; the thin line through it is its 95 % interval. The bar "
         "goes from the lower to the upper quartile, and the diamond is the median. An open square "
         "is the estimate from all epochs of the condition together, with its 95 % interval. "
-        "Damping and stiffness of the points were estimated with the inertia fixed; the squares "
-        "are from fits of J, B and K together."
+        "J, B and K were estimated together, in the points and in the squares."
     )
     colours = condition_colours(result.condition_names)
     for c in shown:

@@ -32,6 +32,9 @@ from rigidimeter.core.words import (
     series,
 )
 
+DAYS_WIDTH = 9.6
+"""In inches, between the width of the page on a screen and that of a sheet of paper."""
+
 UNFOLDING = Markup(
     '<details class="finding">\n<summary><span class="outcome is-{level}">{level}</span> '
     "<strong>{name}</strong> {headline}; {where}</summary>\n"
@@ -82,12 +85,13 @@ def _days(result: StudyResult) -> Iterator[Block]:
         count = sum(map(len, groups.values()))
         n_days = len({(m.subject, m.day) for m in c.day_medians})
         rows = len(day_rows(c))
-        size = 7.4, 0.35 + (2.1 + 0.5 * (longest_day(c) > 3)) * rows
+        size = DAYS_WIDTH, 0.35 + (2.1 + 0.5 * (longest_day(c) > 3)) * rows
         yield Figure(
             f"days_{c.measure.name}",
             f"{c.measure.title}: {plural(count, 'included epoch')} of {plural(n_days, 'day')}.",
             f"{c.measure.title} by day. {words} ({c.measure.unit}).",
             partial(drawn, size, draw_days, c, order, rows=rows, sharey=True),
+            "page",
             marks=groups,
         )
 

@@ -46,9 +46,9 @@ def _torque(result: StudyResult) -> Iterator[Block]:
     if not found:
         return
     text = (
-        "The model is the fit with the inertia fixed. The panels of inertia, damping and stiffness "
-        "show, in grey, what is left for that term to explain: the measured torque less the other "
-        "two terms. These panels have the same axis in all conditions."
+        "The model is the J, B and K of that epoch, as in the results. The panels of inertia, "
+        "damping and stiffness show, in grey, what is left for that term to explain: the measured "
+        "torque less the other two terms. These panels have the same axis in all conditions."
     )
     if method_of(result.analysis.method).uses_perturbation:
         text += (
@@ -69,7 +69,7 @@ def _torque(result: StudyResult) -> Iterator[Block]:
             f"{name}: {named(result, fit)}, the included epoch with the median stiffness "
             f"({stiffness}); its first {WINDOW_S:g} s in the band {_hz(signals.band_hz)}"
             f"{_fitted_elsewhere(signals, fit)}.",
-            f"{name}: measured and modelled torque of epoch {fit.epoch}, what the model leaves, "
+            f"{name}: measured and modelled torque of {named(result, fit)}, what the model leaves, "
             f"and the terms of inertia, damping and stiffness. K {stiffness}, VAF {vaf}.",
             partial(drawn, TORQUE_SIZE, draw_torque, *shown, rows=5, **below),
             "tall",
