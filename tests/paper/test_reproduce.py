@@ -81,18 +81,20 @@ def test_another_paper_would_get_another_verdict(
     monkeypatch.setattr(printed, "APP_A_DAMPING_TOTAL", 0.088)
     monkeypatch.setattr(printed, "APP_A_INERTIA_TOTAL", 0.0057)
     monkeypatch.setattr(printed, "POSITION_SD_DEG", 16.0)
+    monkeypatch.setattr(printed, "WASH_OUT_MIN", 60.0)
     monkeypatch.setattr(printed, "EQUATION_8", JointDynamics(0.0026, 0.044, 0.85))
     monkeypatch.setattr(printed, "SEC_34_SD", (8e-6, 2.63e-4, 1.39e-3))
     now = {
         row_id: MAKERS[row_id](context).verdict
         for row_id in (
             "app-a-damping", "app-a-inertia", "app-a-units", "sec-2.4.2-units", "eq-8",
-            "sec-3.4-sd", "sec-3.4-noise",
+            "sec-3.4-sd", "sec-3.4-noise", "sec-2.5-wash-out",
         )
     }  # fmt: skip
     assert now == {
         "app-a-damping": AGREES,
         "app-a-inertia": AGREES,
+        "sec-2.5-wash-out": AGREES,
         "app-a-units": AGREES,
         "sec-2.4.2-units": DIFFERS,
         "eq-8": DIFFERS,
@@ -123,7 +125,7 @@ def test_verdicts(rows: dict[str, Claim]) -> None:
         "sec-1-voluntary-ols", "sec-2.3-cycles-epoch", "sec-3.1-f-test", "sec-3.2-cancel",
         "sec-3.4-sd", "sec-3.4-noise", "sec-4-better", "sec-4-mupdrs", "k-printed",
         "app-a-units", "app-a-inertia", "app-a-damping", "eq-5", "fig-3b", "table-1",
-        "sec-2.5-sequences", "sec-3.6-order", "sec-3.4-mean",
+        "sec-2.5-sequences", "sec-2.5-wash-out", "sec-3.6-order", "sec-3.4-mean",
     }  # fmt: skip
 
 

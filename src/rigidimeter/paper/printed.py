@@ -53,6 +53,9 @@ FIG_6 = JointDynamics(0.0044, 0.1300, 1.130)
 EPOCHS_A_CONDITION, SESSION_MIN = 15, 10.0
 """Sec. 2.3: epochs of a condition, and how long they last."""
 
+WASH_OUT_MIN = 15.0
+"""Sec. 2.5: from switching DBS off to the measurements in OFF."""
+
 TABLE_1 = {
     "ratings": {"OFF": 27, "DBS": 12},
     "sinusoid": {"OFF": 92, "DBS": 46},

@@ -20,7 +20,7 @@ from rigidimeter.core.records import Channel
 from rigidimeter.core.settings import BlockSettings
 from rigidimeter.core.words import number
 from rigidimeter.paper import printed
-from rigidimeter.paper.comparison_table import Claim, bounded, near, within_percent
+from rigidimeter.paper.comparison_table import Bound, Claim, bounded, near, within_percent
 from rigidimeter.paper.context import Context
 from rigidimeter.paper.score_rows import imposed_epoch
 from rigidimeter.planning import check_band, plan, power_spectrum, prbs_nm
@@ -28,6 +28,9 @@ from rigidimeter.planning import check_band, plan, power_spectrum, prbs_nm
 _CYCLES = 8
 _DAYS = {"OFF": 9, "DBS": 4}
 _EXAMINERS = 3
+
+RIGIDITY_RETURNS_MIN = (30.0, 60.0)
+"""After STN DBS is switched off, in 35 patients (Temperli et al., Neurology 2003;60:78–81)."""
 
 
 def _perturbation(context: Context) -> Channel:
@@ -167,6 +170,19 @@ def sequences(context: Context) -> Claim:
     return Claim(
         ours=f"Sec. 2.5 and Table 1 together: {count} epochs with distinct sequences",
         checks=(near("Sequences", "1", 1, count, 0.0),),
+    )
+
+
+def wash_out(context: Context) -> Claim:
+    """Compare the wait before OFF with the published time in which rigidity returns."""
+    early_min, late_min = RIGIDITY_RETURNS_MIN
+    waited_min = printed.WASH_OUT_MIN
+    return Claim(
+        ours=f"rigidity returned over {early_min:g} to {late_min:g} min in 35 patients (Temperli "
+        "et al., Neurology 2003;60:78–81)",
+        checks=(
+            Bound("Rigidity has returned after", "min", waited_min, late_min, 0.0, waited_min),
+        ),
     )
 
 

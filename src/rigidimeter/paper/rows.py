@@ -97,6 +97,7 @@ MAKERS: Mapping[str, Maker] = {
     "sec-2.4.2-units": partial(controller.units, "per degree"),
     "sec-2.4.3-bandwidth": appendix.bandwidth,
     "sec-2.5-sequences": protocol.sequences,
+    "sec-2.5-wash-out": protocol.wash_out,
     "sec-3.1-f-test": effects.f_test,
     "sec-3.2-cancel": sensitivity.cancelling,
     "p-mupdrs": partial(effects.p_of_text, "mupdrs"),
