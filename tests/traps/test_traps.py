@@ -96,8 +96,8 @@ def test_a_true_difference_is_claimed(recorded):
     rows, sentence = compared(recorded("true", both_each_day(3, OFF, softer)))
     assert rows["stiffness_nm_rad"]["verdict"] == rows["damping_nm_s_rad"]["verdict"] == "lower"
     assert rows["inertia_kg_m2"]["verdict"] == "no difference shown"
-    assert sentence.startswith("Stiffness K was ")
-    assert " % lower in DBS than in OFF (95 % interval " in sentence
+    assert sentence.startswith("In this subject, stiffness K was lower in DBS than in OFF: −")
+    assert "The intervals hold for other days of this subject, not for other subjects." in sentence
     assert "K and B are lower in DBS than in OFF." in sentence
 
 

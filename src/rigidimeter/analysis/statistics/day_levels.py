@@ -251,10 +251,7 @@ def test_by_levels(epochs: SubjectEpochs, names: tuple[str, str], day: str) -> T
     variances = np.array([each.se**2 for each in found]) / n**2
     df = variances.sum() ** 2 / np.sum(variances**2 / [each.df for each in found])
     tests = "; ".join(f"{subject}: {each.words}" for subject, each in zip(both, found, strict=True))
-    words = (
-        f"mean of {_count(n, 'subject')}, each by its {day}s ({tests}){remark}; no conclusion on "
-        "other subjects"
-    )
+    words = f"mean of {_count(n, 'subject')}, each by its {day}s ({tests}){remark}"
     mean_x = math.fsum(each.mean_x for each in found) / n
     mean_y = math.fsum(each.mean_y for each in found) / n
     weights: DayWeights = {}, {}

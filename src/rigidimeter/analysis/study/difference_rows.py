@@ -13,11 +13,12 @@ from rigidimeter.core.words import condition_name, decimals, fixed, number, p_va
 VERDICTS = {
     "lower": "lower",
     "higher": "higher",
-    "no difference shown": "not shown",
+    "no difference shown": "none shown",
     "not supported": "not supported",
     "cannot be decided": "undecided",
 }
-"""What a cell says of each verdict."""
+"""What a cell says of each verdict, under the heading “difference”."""
+UNTESTED = "not tested"
 
 
 class DifferenceRow(NamedTuple):
@@ -77,7 +78,7 @@ def _row(one: Conclusion) -> DifferenceRow:
         "" if one.simulated is None else _simulated(one.simulated, factor),
         ends,
         "" if math.isnan(one.p) else p_value(one.p, 2),
-        VERDICTS[one.verdict],
+        UNTESTED if math.isnan(one.p) else VERDICTS[one.verdict],
     )
 
 

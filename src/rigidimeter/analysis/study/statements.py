@@ -28,6 +28,11 @@ from rigidimeter.core.words import (
 
 LEAST_P = 0.0001
 """Below this a sentence does not say how small p is; tables do."""
+FEWEST_SUBJECTS = 3
+"""Fewer subjects than this stand for themselves alone."""
+MEASUREMENT_ALONE = (
+    "In brackets: 95 % interval from measurement error only, without day-to-day variation."
+)
 
 
 class Statements(NamedTuple):
@@ -59,7 +64,10 @@ def lead(result: StudyResult) -> str:
     shown = concluded.of("lower", "higher")
     said = f"{_measured(concluded)} {_concluded(concluded)[0]}"
     if shown:
-        said = f"{_quoted(shown)}{_adjusted(concluded)}."
+        where, reach = _whom(concluded)
+        quoted = _beginning(where, _quoted(shown))
+        intervals = f" The intervals hold for {reach}." if reach else ""
+        said = f"{quoted}{_adjusted(concluded)}.{intervals}"
     paths = {out.path for out in result.left_out}
     if paths:
         total = len(paths | {session.source for session in result.sessions})
@@ -69,59 +77,93 @@ def lead(result: StudyResult) -> str:
 
 
 def _quoted(shown: Sequence[Conclusion]) -> str:
-    """Return ``Stiffness K was 18 % lower in DBS than in OFF (95 % interval …, p = 0.004)``."""
+    """Return ``stiffness K was lower in DBS than in OFF: −18 % (95 % interval …, p = 0.004)``."""
     parts: list[str] = []
+    before: Conclusion | None = None
     for one in shown:
         c, d = one.comparison, one.difference
         size = _size(d.percent, d.tested, c.measure.unit)
-        against = "" if parts else f" in {c.other} than in {c.reference}"
         inside = [f"95 % interval {size.ends}"] if size.ends else []
-        inside += [one.test] if one.test and one.test != (shown[0].test if parts else "") else []
-        title = within(c.measure.title) if parts else c.measure.title
-        was = " was" if not parts else ""
+        inside += [one.test] if one.test and (before is None or one.test != before.test) else []
         inside.append(p_text(one.p, LEAST_P))
-        parts.append(f"{title}{was} {size.value} {one.verdict}{against} ({', '.join(inside)})")
+        went = ""
+        if before is None:
+            went = f" was {one.verdict} in {c.other} than in {c.reference}:"
+        elif one.verdict != before.verdict:
+            went = f" was {one.verdict}:"
+        parts.append(f"{within(c.measure.title)}{went} {size.value} ({', '.join(inside)})")
+        before = one
     return series(parts)
 
 
+def _whom(concluded: Conclusions) -> tuple[str, str]:
+    """Return whom a conclusion speaks of, and what its intervals hold for beyond the recordings.
+
+    Days sampled of one subject or two say nothing of other subjects. Both are empty where the
+    subjects are not known, or no test sampled days or subjects.
+    """
+    weighed: dict[str, None] = {}
+    units = set()
+    for one in concluded.each:
+        days = one.comparison.days
+        if days is not None and not math.isnan(one.p):
+            units.add(days.unit)
+            weighed.update((subject, None) for own in days.weights for subject, _ in own)
+    if not weighed:
+        weighed.update(
+            (o.subject, None)
+            for one in concluded.each
+            for name in one.comparison.pair
+            for o in one.comparison.of(name)
+        )
+    if not weighed or "" in weighed:
+        return "", ""
+    count = len(weighed)
+    these = {1: "this subject", 2: "these two subjects"}.get(count, f"these {count} subjects")
+    if concluded.basis != "days":
+        return f"in {these}", ""
+    if units == {"subject"} and count >= FEWEST_SUBJECTS:
+        return f"in {these}", "subjects like these"
+    return f"in {these}", f"other days of {these}, not for other subjects"
+
+
+def _beginning(where: str, clause: str) -> str:
+    """Return a clause as the beginning of a sentence, after whom it speaks of."""
+    text = f"{where}, {clause}" if where else clause
+    return text[:1].upper() + text[1:]
+
+
 class _Size(NamedTuple):
-    went: str
     value: str
     ends: str
 
 
 def _size(percent: Three, own: Three, unit: str, two_below: float = 5.0) -> _Size:
-    """Return a difference without its sign, and its interval in the same direction."""
+    """Return a difference and its interval with their signs: other − reference."""
     known = not math.isnan(percent[0])
     estimate, low, high = percent if known else own
     after = " %" if known else f" {unit}".rstrip()
     digits = decimals((high - low) / 2, estimate, two_below)
-    went = "changed" if not round(estimate, digits) else "fell" if estimate < 0 else "rose"
-    if estimate < 0:
-        estimate, low, high = -estimate, -high, -low
-    ends = "" if math.isnan(low) else f"{fixed(low, digits)} to {fixed(high, digits)}{after}"
-    return _Size(went, f"{fixed(estimate, digits)}{after}", ends)
+    value, *ends = (fixed(size, digits, sign=True) for size in (estimate, low, high))
+    return _Size(f"{value}{after}", "" if math.isnan(low) else f"{' to '.join(ends)}{after}")
 
 
 def _measured(concluded: Conclusions) -> str:
-    """Return ``Between these recordings K fell by 26 % (25.9 to 26.1), …``."""
+    """Return ``Between these recordings, DBS − OFF: K −26 % (−26.1 to −25.9), …``."""
     parts: list[str] = []
-    before = ""
     for one in concluded.each:
         c, d = one.comparison, one.difference
         if math.isnan(d.estimate):
             continue
         size = _size(d.measured_percent, d.measured, c.measure.unit, 1.0)
         ends = f" ({size.ends.removesuffix(' %')})" if size.ends else ""
-        went = f" {size.went}" * (size.went != before)
-        parts.append(f"{c.measure.short}{went} by {size.value}{ends}")
-        before = size.went
+        parts.append(f"{c.measure.short} {size.value}{ends}")
     if not parts:
         return "No measure has values in both conditions."
     pair = concluded.each[0].comparison
-    change = f"from {condition_name(pair.reference)} to {condition_name(pair.other)}"
-    alone = " In brackets: 95 % of the measurement alone." if "(" in "".join(parts) else ""
-    return f"Between these recordings, {change}, {series(parts)}.{alone}"
+    difference = f"{condition_name(pair.other)} − {condition_name(pair.reference)}"
+    alone = f" {MEASUREMENT_ALONE}" if "(" in "".join(parts) else ""
+    return f"Between these recordings, {difference}: {series(parts)}.{alone}"
 
 
 def _tested(concluded: Conclusions) -> str:
@@ -141,7 +183,8 @@ def _adjusted(concluded: Conclusions) -> str:
     """Return for how many tests p is adjusted, as the end of a sentence that gives p."""
     count = concluded.adjusted_for
     what = "measures" if count == concluded.tested else "tests"
-    return f"; p adjusted by Holm’s method for {count} {what}, intervals not" if count > 1 else ""
+    of_each = f"p Holm-adjusted over {count} {what}; each interval is an unadjusted 95 % interval"
+    return f"; {of_each}" if count > 1 else ""
 
 
 def _concluded(concluded: Conclusions) -> list[str]:
@@ -149,6 +192,7 @@ def _concluded(concluded: Conclusions) -> list[str]:
     pair = concluded.each[0].comparison
     reference, other = condition_name(pair.reference), condition_name(pair.other)
     both = f"{reference} and {other}"
+    where, reach = _whom(concluded)
 
     def names(members: Iterable[Conclusion]) -> str:
         return series([one.comparison.measure.short for one in members])
@@ -159,6 +203,9 @@ def _concluded(concluded: Conclusions) -> list[str]:
         if own := concluded.of(side):
             are = "is" if len(own) == 1 else "are"
             found.append(f"{names(own)} {are} {side} in {other} than in {reference}")
+    if found and reach:
+        found[-1] += f". This holds for {reach}"
+    of_whom = max(len(found), 1)
     for reason, withheld in _by_reason(concluded.of("not supported")):
         found.append(f"a difference in {names(withheld)} is not supported: {reason}")
     for reason, withheld in _by_reason(concluded.of("no difference shown")):
@@ -169,7 +216,9 @@ def _concluded(concluded: Conclusions) -> list[str]:
             f"whether {both} differ in {names(withheld)} cannot be decided: {reason}"
             f"{_would_decide(withheld)}"
         )
-    return [f"{sentence[:1].upper()}{sentence[1:]}." for sentence in found]
+    return [
+        f"{_beginning(where if k < of_whom else '', sentence)}." for k, sentence in enumerate(found)
+    ]
 
 
 def _would_decide(withheld: Iterable[Conclusion]) -> str:

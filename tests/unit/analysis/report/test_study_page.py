@@ -155,7 +155,7 @@ def test_several_subjects_are_distinguished() -> None:
     page = shown(made_study(design))
     assert "2: M1, M2" in page.words("study")
     assert "6: 6 in OFF and 6 in DBS, 6 in both" in page.words("study")
-    assert "no conclusion on other subjects" in page.words("comparison")
+    assert "In these two subjects, " in page.words()
     assert "J held at the median of the same subject" in page.words()
 
 

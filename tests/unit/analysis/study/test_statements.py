@@ -32,6 +32,12 @@ from rigidimeter.core.records import Analysis, Fit, Outcome
 SMALL = Design(days=(5, 4), epochs=(5, 5), scores=(4, 4))
 K = 1.751
 """N·m/rad, of a relaxed forearm."""
+ALONE = "In brackets: 95 % interval from measurement error only, without day-to-day variation."
+OTHER_DAYS = "other days of this subject, not for other subjects"
+
+
+def adjusted(tests: int) -> str:
+    return f"p Holm-adjusted over {tests} measures; each interval is an unadjusted 95 % interval"
 
 
 def measured(result: StudyResult) -> str:
@@ -117,9 +123,8 @@ class TestMeasured:
         """
         result = recorded_once(1.3)
         assert measured(result) == (
-            "Between these recordings, from OFF to DBS, K fell by 25.8 % (25.7 to 25.9), B changed "
-            "by 0.0 % (−0.1 to 0.1) and J by 0.0 % (−0.1 to 0.1). "
-            "In brackets: 95 % of the measurement alone."
+            "Between these recordings, DBS − OFF: K −25.8 % (−25.9 to −25.7), B 0.0 % (−0.1 to "
+            f"+0.1) and J 0.0 % (−0.1 to +0.1). {ALONE}"
         )
         (stiffness,) = (one for one in conclude(result).each if one.comparison.measure.short == "K")
         assert stiffness.verdict == "cannot be decided"
@@ -136,16 +141,15 @@ class TestMeasured:
 
     def test_its_sign_is_that_of_the_change(self):
         """Of epochs known to 0.01 % half the interval is 0.1 % of the mean: (1 + 1.2576)/2."""
-        assert "K rose by 25.8 % (25.6 to 25.9)" in measured(recorded_once(K * 1.2576, 0.01))
+        assert "K +25.8 % (+25.6 to +25.9)" in measured(recorded_once(K * 1.2576, 0.01))
 
     def test_it_has_the_digits_of_its_interval(self):
-        assert "K fell by 26 % (24 to 27)" in measured(recorded_once(1.3, 3.0))
+        assert "K −26 % (−27 to −24)" in measured(recorded_once(1.3, 3.0))
 
     def test_a_measure_without_an_interval_has_none(self, study):
         assert measured(study) == (
-            "Between these recordings, from OFF to DBS, K fell by 18 % (16 to 19), B by 16 % "
-            "(15 to 17), J by 2 % (1 to 3), impulse by 19 %, work by 19 % and rating by 0.45 "
-            "points. In brackets: 95 % of the measurement alone."
+            "Between these recordings, DBS − OFF: K −18 % (−19 to −16), B −16 % (−17 to −15), "
+            f"J −2 % (−3 to −1), impulse −19 %, work −19 % and rating −0.45 points. {ALONE}"
         )
 
     def test_values_in_one_condition_alone_are_no_difference(self, study):
@@ -170,15 +174,13 @@ class TestTested:
         assert by_what(study) == (
             "Welch's t-test of 5 days of OFF and 4 days of DBS (K, B, J, impulse, work); mixed "
             "model with an offset for each examiner and each day, after Kenward and Roger (rating);"
-            " p adjusted by Holm’s method for 6 measures, intervals not."
+            f" {adjusted(6)}."
         )
 
     def test_p_is_adjusted_for_what_was_tested_alone(self, study):
         lacking = untested(study, "work_j", "one day in each condition")
         assert "(K, B, J, impulse)" in by_what(lacking)
-        assert by_what(lacking).endswith(
-            "p adjusted by Holm’s method for 5 measures, intervals not."
-        )
+        assert by_what(lacking).endswith(f"; {adjusted(5)}.")
 
     def test_one_test_of_one_measure_is_not_adjusted(self, study):
         alone = dataclasses.replace(study, comparisons=study.comparisons[:1])
@@ -187,27 +189,51 @@ class TestTested:
 
 def test_a_clear_effect_is_shown_and_none_is_not(study: StudyResult) -> None:
     assert lead(study) == (
-        "Stiffness K was 18 % lower in DBS than in OFF (95 % interval 7 to 29 %, Welch's t-test of "
-        "5 days of OFF and 4 days of DBS, p = 0.021), viscous damping B 16 % lower (95 % interval "
-        "8 to 24 %, p = 0.015), angular impulse 19 % lower (95 % interval 13 to 25 %, p = 0.0014) "
-        "and work 19 % lower (95 % interval 13 to 25 %, p = 0.0014); p adjusted by Holm’s method "
-        "for 6 measures, intervals not."
+        "In this subject, stiffness K was lower in DBS than in OFF: −18 % (95 % interval −29 to "
+        "−7 %, Welch's t-test of 5 days of OFF and 4 days of DBS, p = 0.021), viscous damping B "
+        "−16 % (95 % interval −24 to −8 %, p = 0.015), angular impulse −19 % (95 % interval −25 to "
+        "−13 %, p = 0.0014) and work −19 % (95 % interval −25 to −13 %, p = 0.0014); "
+        f"{adjusted(6)}. The intervals hold for {OTHER_DAYS}."
     )
     assert concluded(study) == (
-        "K, B, impulse and work are lower in DBS than in OFF.",
+        "In this subject, K, B, impulse and work are lower in DBS than in OFF. This holds for "
+        f"{OTHER_DAYS}.",
         "No difference between OFF and DBS is shown in J and rating.",
     )
     none = made_study(dataclasses.replace(SMALL, effect=0.0))
-    shown = "No difference between OFF and DBS is shown in K, B, J, impulse, work and rating."
+    shown = (
+        "In this subject, no difference between OFF and DBS is shown in K, B, J, impulse, work and "
+        "rating."
+    )
     assert concluded(none) == (shown,)
     assert lead(none) == f"{measured(none)} {shown}"
 
 
+@pytest.mark.parametrize(
+    ("names", "where", "reach"),
+    [
+        ("A", "In this subject, ", "other days of this subject, not for other subjects."),
+        ("AB", "In these two subjects, ", "other days of these two subjects, not for other"),
+        ("ABC", "In these 3 subjects, ", "subjects like these."),
+    ],
+)
+def test_one_subject_or_two_stand_for_no_others(names: str, where: str, reach: str) -> None:
+    """Where days were sampled, other days are all that the interval holds for."""
+    design = dataclasses.replace(SMALL, subjects=tuple(names), scores=(0, 0), day_scatter=0.01)
+    fits = made_study(design)
+    found = dataclasses.replace(
+        fits, comparisons=tuple(c for c in fits.comparisons if c.measure.origin == "fits")
+    )
+    assert lead(found).startswith(f"{where}stiffness K was lower in DBS than in OFF: −")
+    assert f" The intervals hold for {reach}" in lead(found)
+    assert concluded(found)[0].startswith(f"{where}K")
+    assert f" This holds for {reach}" in concluded(found)[0]
+
+
 def test_the_sentence_to_quote_has_the_numbers_of_the_test(study: StudyResult) -> None:
     one = conclude(study).of("lower")[0]
-    estimate, low, high = (-size for size in one.difference.percent)
-    assert f"K was {estimate:.0f} % lower" in lead(study)
-    assert f"(95 % interval {high:.0f} to {low:.0f} %, " in lead(study)
+    estimate, low, high = (f"−{-size:.0f}" for size in one.difference.percent)
+    assert f": {estimate} % (95 % interval {low} to {high} %, " in lead(study)
     assert f"p = {one.p:.2g})" in lead(study)
 
 
@@ -221,12 +247,32 @@ def test_the_sign_is_that_of_the_estimate(study: StudyResult) -> None:
 
     found = altered(study, turned)
     assert lead(found).startswith(
-        "Stiffness K was 18 % higher in DBS than in OFF (95 % interval 7 to 29 %, "
+        "In this subject, stiffness K was higher in DBS than in OFF: +18 % (95 % interval +7 to "
+        "+29 %, "
     )
-    assert concluded(found)[0] == "K, B, impulse and work are higher in DBS than in OFF."
-    assert "K rose by 18 % (16 to 19), B by 16 %" in measured(found)
+    assert "K, B, impulse and work are higher in DBS than in OFF." in concluded(found)[0]
+    assert "K +18 % (+16 to +19), B +16 %" in measured(found)
     assert "lower" not in " ".join([lead(found), *concluded(found)])
-    assert "fell" not in measured(found)
+
+
+def test_measures_of_both_signs_have_each_its_verdict(study: StudyResult) -> None:
+    def turned(c: Comparison) -> Comparison:
+        d = c.days
+        if d is None or c.measure.name != "work_j":
+            return c
+        return dataclasses.replace(
+            c, days=dataclasses.replace(d, estimate=-d.estimate, low=-d.high, high=-d.low)
+        )
+
+    found = altered(study, turned)
+    assert "−19 % (95 % interval −25 to −13 %, p = 0.0014) and work was higher: +19 %" in lead(
+        found
+    )
+    first, second, *_ = concluded(found)
+    assert first == "In this subject, K, B and impulse are lower in DBS than in OFF."
+    assert second == (
+        f"In this subject, work is higher in DBS than in OFF. This holds for {OTHER_DAYS}."
+    )
 
 
 def test_a_p_that_only_one_measure_alone_would_bear_is_not_claimed(study: StudyResult) -> None:
@@ -238,7 +284,8 @@ def test_a_p_that_only_one_measure_alone_would_bear_is_not_claimed(study: StudyR
     found = altered(study, weaker)
     assert conclude(found).each[-2].p == pytest.approx(0.18)
     assert concluded(found) == (
-        "No difference between OFF and DBS is shown in K, B, J, impulse, work and rating.",
+        "In this subject, no difference between OFF and DBS is shown in K, B, J, impulse, work and "
+        "rating.",
     )
     assert "lower" not in lead(found)
 
@@ -253,7 +300,7 @@ def test_prefixes_and_missing_tests(study: StudyResult) -> None:
         "Whether OFF and DBS differ in work cannot be decided: one day in each condition."
     )
     assert "work" not in lead(lacking)
-    assert "work by 19 %" in measured(lacking)
+    assert "work −19 %" in measured(lacking)
 
 
 def test_what_was_left_out_is_in_the_sentence_to_quote(study: StudyResult) -> None:
@@ -322,12 +369,14 @@ def test_what_was_withheld_is_not_in_the_sentence_to_quote(study: StudyResult) -
         "K",
         "B",
     }
-    assert lead(shaken).startswith("Angular impulse was 19 % lower in DBS than in OFF (")
+    assert lead(shaken).startswith(
+        "In this subject, angular impulse was lower in DBS than in OFF: −19 % ("
+    )
     for word in ("stiffness", "damping", " K ", " B ", "not supported"):
         assert word not in lead(shaken)
-    assert "K fell by 18 % (16 to 19), B by 16 % (15 to 17)" in measured(shaken)
+    assert "K −18 % (−19 to −16), B −16 % (−17 to −15)" in measured(shaken)
     first, second, *_ = concluded(shaken)
-    assert first == "Impulse and work are lower in DBS than in OFF."
+    assert first.startswith("In this subject, impulse and work are lower in DBS than in OFF.")
     assert second.startswith("A difference in K and B is not supported: tremor in ")
     assert "0 of 23 epochs in OFF, 19 of 19 in DBS" in second
 

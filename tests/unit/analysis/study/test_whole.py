@@ -219,7 +219,7 @@ def test_three_subjects_are_compared_and_words_say_so(study: Path, rigidimeter) 
     first, _, full = ran.out.partition("\nConditions\n")
     first, full = (" ".join(text.split()) for text in (first, full))
     assert "3 subjects · 6 days · 12 epochs, 12 used" in first
-    assert "tested Paired t-test of 3 subjects; p adjusted by Holm’s method for 2 " in first
+    assert "tested Paired t-test of 3 subjects; p Holm-adjusted over 2 " in first
     assert "more subjects show smaller ones" in first
     assert "Paired t-test of 3 subjects. In brackets: p adjusted for all measures" in full
     assert "by days" not in first + full
@@ -271,7 +271,10 @@ def test_a_third_condition_is_compared_with_the_first_and_p_is_adjusted_for_all(
     ran = rigidimeter("compare", study, "--resamples", "200", "--json", out, "--full")
     assert ran.status == 0, ran.err
     text = " ".join(ran.out.split())
-    assert text.count("p adjusted by Holm’s method for 4 tests, intervals not") == 2
+    assert (
+        text.count("p Holm-adjusted over 4 tests; each interval is an unadjusted 95 % interval")
+        == 2
+    )
     assert "DBS − OFF 95 % interval p, Holm" in text
     assert "LOW − OFF 95 % interval p, Holm" in text
     assert "OFF against LOW: days counted" in text
