@@ -32,6 +32,7 @@ from rigidimeter.cli.export import export
 from rigidimeter.cli.help_pages import HelpCommand
 from rigidimeter.cli.inspect import inspect
 from rigidimeter.cli.model import model
+from rigidimeter.cli.numbers import with_numbers
 from rigidimeter.cli.output import VisibleErrors, echo
 from rigidimeter.cli.ratings import ratings
 from rigidimeter.cli.report import report
@@ -104,6 +105,7 @@ for panel, commands in {
     for command in commands:
         app.command(cls=HelpCommand, rich_help_panel=panel)(command)
 app.add_typer(study, rich_help_panel="Start")
+with_numbers(app)
 
 
 def _terminated(_signal: int, _frame: FrameType | None) -> None:

@@ -27,6 +27,7 @@ that is not the paired t-test alone, so three is the smallest number here.
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -34,6 +35,7 @@ from dataclasses import dataclass, replace
 import scipy
 
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.records import PARAMETERS
 from rigidimeter.core.settings import Settings, SubjectSettings
 from rigidimeter.model import Array
 from rigidimeter.planning.precision import PARAMETER_NAMES, predicted_precision
@@ -125,10 +127,14 @@ class WantedDifference:
         """
         name, equals, amount = text.partition("=")
         number = amount.strip().removesuffix("%")
-        if name.strip() not in _NAMES or not equals:
+        if name.strip() not in _NAMES:
+            near = difflib.get_close_matches(name.strip(), _NAMES, n=1)
+            known = f"did you mean {near[0]}?" if near else "known: " + ", ".join(_NAMES)
+            raise UserError(f'--detect {text}: unknown parameter "{name.strip()}"; {known}')
+        if not equals:
             raise UserError(
-                f"--detect {text} names no difference; write inertia, damping or stiffness, an "
-                "equals sign and a number, such as damping=20% or stiffness=0.3"
+                f"--detect {text}: the difference is missing; write a number behind an equals "
+                f"sign, such as {name.strip()}=20%"
             )
         try:
             value = float(number)
@@ -239,11 +245,8 @@ def detect(
     key = PARAMETER_NAMES[place]
     value = float(getattr(subject, key))
     difference = value * wanted.amount / 100.0 if wanted.percent else wanted.amount
-    if value - difference <= 0.0:
-        raise UserError(
-            f"a {wanted.parameter} lower by {difference:.4g} is not above 0, since subject."
-            f"{condition}.{key} = {value:.4g}; name a smaller difference"
-        )
+    if difference >= value:
+        raise UserError(_too_large(wanted, condition, value))
     errors = [
         predicted_precision(
             perturbation_nm, settings, subject.model_copy(update={key: level})
@@ -377,13 +380,32 @@ def _needed(found: Detection, epochs: tuple[int, int]) -> Needed:
     )
 
 
+def _too_large(wanted: WantedDifference, condition: str, value: float) -> str:
+    """Return why a difference leaves nothing of the parameter."""
+    parameter = PARAMETERS[_NAMES[wanted.parameter]]
+    amount, place = f"{wanted.amount:g}", f"subject.{condition}.{parameter.name} = {value:.4g}"
+    if wanted.percent or wanted.amount >= 100.0:
+        return (
+            f"--detect {wanted.parameter}={amount}{'%' if wanted.percent else ''}: nothing of "
+            f"{parameter.symbol} would be left ({place}); name a smaller difference"
+        )
+    return (
+        f"--detect {wanted.parameter}={amount}: {amount} {parameter.unit} is "
+        f"{'more than' if wanted.amount > value else 'all of'} {parameter.symbol} itself "
+        f"({place}); did you mean {amount} %?"
+    )
+
+
 def _assumed(parameter: str, condition: str, subject: SubjectSettings) -> Scatter:
-    """Return what is assumed, with the SD between epochs that the settings give, if they do."""
-    assumed, key = ASSUMED[parameter], f"{parameter}_cv_percent"
-    if key not in subject.model_fields_set:
+    """Return what is assumed, with the SD between epochs of the settings where it is above 0.
+
+    0 is the default of a virtual joint, and no joint of a person.
+    """
+    assumed, of_epochs = ASSUMED[parameter], float(getattr(subject, f"{parameter}_cv_percent"))
+    if of_epochs == 0.0:
         return assumed
     return replace(
         assumed,
-        between_epochs_percent=float(getattr(subject, key)),
+        between_epochs_percent=of_epochs,
         source=f"epochs: subject.{condition} of the settings; days: {assumed.source}",
     )

@@ -202,7 +202,7 @@ def test_nearly_unstable_is_said_and_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--detect", "rigidity=20%"), "names no difference"),
+        (("--detect", "rigidity=20%"), 'unknown parameter "rigidity"; known: inertia'),
         (("--criterion", "best"), "the criterion 'best' is unknown"),
         (("--detect", "damping=20%", "--power", "1.5"), "--power 1.5"),
     ],

@@ -188,8 +188,9 @@ def test_a_difference_is_read(text: str, wanted: WantedDifference) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("damping", "names no difference; write inertia, damping or stiffness"),
-        ("mass=2", "names no difference"),
+        ("damping", "the difference is missing; write .* such as damping=20%"),
+        ("stifness=18%", '--detect stifness=18%: unknown parameter "stifness"; did you mean stiff'),
+        ("mass=2", 'unknown parameter "mass"; known: inertia, damping, stiffness'),
         ("damping=", "nothing is not a number other than 0"),
         ("damping=much", "much is not a number other than 0"),
         ("damping=0%", "0% is not a number other than 0"),
@@ -227,6 +228,8 @@ def test_settings_that_give_the_scatter_of_epochs_are_used() -> None:
     assert found.scatter.between_epochs_percent == 25.0
     assert found.scatter.condition_in_day_percent == ASSUMED["damping"].condition_in_day_percent
     assert found.scatter.source.startswith("epochs: subject.OFF of the settings; days: Table 2")
+    unvaried = {"subject": {"OFF": {"damping_cv_percent": 0.0}, "DBS": {}}}
+    assert found_for("damping=20%", VARIED | unvaried).scatter == ASSUMED["damping"]
     given = {"damping": Scatter(1.0, 2.0, 3.0, "a study")}
     assert found_for("damping=20%", tables, scatter=given).scatter == given["damping"]
 
@@ -248,8 +251,13 @@ def test_one_condition_has_no_planned_epochs() -> None:
 @pytest.mark.parametrize(
     ("text", "options", "words"),
     [
-        ("damping=100%", {}, "is not above 0, since subject.OFF.damping_nm_s_rad = 0.1368"),
-        ("stiffness=2", {}, "is not above 0, since subject.OFF.stiffness_nm_rad = 1.751"),
+        ("damping=100%", {}, "nothing of B would be left .subject.OFF.damping_nm_s_rad = 0.1368"),
+        (
+            "stiffness=18",
+            {},
+            r"--detect stiffness=18: 18 N·m/rad is more than K itself \(subject.OFF"
+            r".stiffness_nm_rad = 1.751\); did you mean 18 %",
+        ),
         ("damping=5%", {"power": 1.0}, "--power 1 and --alpha 0.05 must both be between 0 and 1"),
         ("damping=5%", {"alpha": 0.0}, "--power 0.8 and --alpha 0 must both"),
     ],
