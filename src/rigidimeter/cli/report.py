@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,11 @@ def report(
         "--title TEXT", "Title of the page. Default: the title of the study, or Joint rigidity."
     ),
     key: Path | None = KEY,
+    overwrite: bool = WRITE.flag(
+        "--overwrite",
+        "Replace the report of something else, and write beside other files.",
+        hidden=True,
+    ),
 ) -> None:
     """Write one HTML page of results, with its tables and figures.
 
@@ -40,6 +46,7 @@ def report(
       rigidimeter report study --out study/report
       rigidimeter report ankle.csv --reaction --epoch-length-s 20 --out report
     """
+    from rigidimeter.analysis.report import inputs_seen_from, why_not_own
     from rigidimeter.analysis.study import lead
     from rigidimeter.cli.inputs import analyse_recordings, analyse_study_folder, study_of
     from rigidimeter.core.session import is_session
@@ -49,6 +56,11 @@ def report(
             f"--out {out}: is or lies in a session folder; name another folder for the report"
         )
     can_be_made(out)
+    names = inputs_seen_from(out, recordings.paths)
+    if not overwrite and (why := why_not_own(out, names, recordings.paths)):
+        raise UserError(
+            f"--out {out}: {why}; name another folder, or write into it with --overwrite"
+        )
     if (folder := study_of(recordings, key)) is not None:
         if out.resolve() in (folder.resolve(), (folder / "analysis").resolve()):
             raise UserError(
@@ -59,7 +71,7 @@ def report(
     else:
         _, analysed = analyse_recordings(recordings)
     try:
-        page = write_page(analysed.result, out, title)
+        page = write_page(analysed.result, out, recordings.paths, title, overwrite=overwrite)
         show([Heading(lead(analysed.result)), ""])
         echo(str(page))
     finally:
@@ -75,12 +87,21 @@ def can_be_made(out: Path) -> None:
         raise UserError(f"--out {out}: the report cannot be written ({there} {why})")
 
 
-def write_page(result: StudyResult, out: Path, title: str | None = None) -> Path:
+def write_page(
+    result: StudyResult,
+    out: Path,
+    inputs: Sequence[Path],
+    title: str | None = None,
+    *,
+    overwrite: bool = False,
+) -> Path:
     """Write the report of a result with progress; return the path of its page."""
     from rigidimeter.analysis import report as reporting
     from rigidimeter.analysis.reading import write_estimates_json
 
     with Meter("report", 1.0) as meter:
-        page = reporting.report(result, out, title, progress=meter.reach)
+        page = reporting.report(
+            result, out, title, inputs=inputs, overwrite=overwrite, progress=meter.reach
+        )
     write_estimates_json(out / "estimates.json", result.analysis)
     return page

@@ -28,6 +28,12 @@ study = typer.Typer(
     help="Make a study folder: empty, of recorded sessions, or virtual.",
 )
 
+STUDY = argument("STUDY", "Study folder.")
+SESSION = argument("SESSION", "Session or recording, as in sessions.csv.")
+EPOCH = argument("EPOCH", "Label of the epoch, as estimate shows it.")
+REASON = OPTIONS.option("--reason TEXT", "Why.", ...)
+BY = OPTIONS.option("--by NAME", "Your name.", ...)
+
 
 @study.command(cls=HelpCommand)
 def new(
@@ -83,6 +89,52 @@ def add(
         echo(line)
     if refused:
         raise UserError(*refused)
+
+
+@study.command(cls=HelpCommand)
+def exclude(
+    folder: Path = STUDY,
+    path: str = SESSION,
+    epoch: str = EPOCH,
+    reason: str = REASON,
+    by: str = BY,
+) -> None:
+    """Leave an epoch out of a study, with a reason and a name.
+
+    A row is added to exclusions.csv; the samples stay as they are. The report shows the epoch, the
+    reason and the name.
+
+    \b
+    For example:
+      rigidimeter study exclude demo-study day-1-OFF 2 --reason cough --by Kim
+      rigidimeter compare demo-study
+    """
+    from rigidimeter.core.study_files import exclude_epoch, row_path
+
+    exclude_epoch(folder, row_path(folder, path, epoch), epoch, reason, by)
+    echo(f"epoch {epoch} of {path} is left out; study include includes it again")
+
+
+@study.command(cls=HelpCommand)
+def include(
+    folder: Path = STUDY,
+    path: str = SESSION,
+    epoch: str = EPOCH,
+    reason: str = REASON,
+    by: str = BY,
+) -> None:
+    """Include an epoch again that was left out, with a reason and a name.
+
+    Its row in exclusions.csv becomes a comment with the date, the reason and the name.
+
+    \b
+    For example:
+      rigidimeter study include demo-study day-1-OFF 2 --reason none --by Kim
+    """
+    from rigidimeter.core.study_files import include_epoch, row_path
+
+    include_epoch(folder, row_path(folder, path, epoch), epoch, reason, by)
+    echo(f"epoch {epoch} of {path} is included again")
 
 
 @study.command(cls=HelpCommand)
@@ -162,7 +214,7 @@ def demo(
     _simulated(out, short_design(days, prbs_epochs, sinusoid_epochs), seed)
     found = analyse_study_folder(out, plain_recordings(out))
     try:
-        page = write_page(found.result, out / "report")
+        page = write_page(found.result, out / "report", [out])
         show(["", *comparison_blocks(found.result), ""])
         echo(f"Done in {time.monotonic() - start_s:.0f} s. Open {page.resolve()}")
         echo(

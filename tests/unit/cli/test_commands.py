@@ -11,10 +11,12 @@ from tests.known_joint import angle_rad, torque_nm
 from tests.unit.analysis.report.parsed_page import ParsedPage
 from tests.unit.virtual.tiny import SHORT
 
+import rigidimeter as rm
 from rigidimeter.analysis.study import compare_analysis
 from rigidimeter.cli.estimate_text import estimate_blocks
 from rigidimeter.cli.study import _simulated
 from rigidimeter.cli.terminal_tables import text_lines
+from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import read_json
 from rigidimeter.core.records import Analysis, Fit, Outcome, Score
 from rigidimeter.virtual import short_design
@@ -252,6 +254,52 @@ def test_a_report_is_not_written_into_a_session(rigidimeter, simulate):
         assert ran.status == 1
         assert "is or lies in a session folder" in ran.err
     assert sorted(folder.rglob("*")) == before
+
+
+@pytest.mark.usefixtures("no_figures")
+def test_a_report_renews_its_own_and_is_not_written_over_anothers(rigidimeter, simulate, tmp_path):
+    one, two = simulate(name="one"), simulate(name="two", seed=2)
+    out = tmp_path / "page"
+
+    def said(*words: object) -> str:
+        ran = rigidimeter("report", *words)
+        assert ran.status == bool(ran.err)
+        return ran.err
+
+    assert said(one, "--out", out) == ""
+    before = (out / "report.html").read_bytes()
+    refusal = said(two, "--out", out)
+    assert f"--out {out}: holds the report of something else (../one); " in refusal
+    assert "name another folder, or write into it with --overwrite" in refusal
+    assert (out / "report.html").read_bytes() == before
+    (out / "note.txt").write_text("mine")  # beside its own report nothing is in the way
+    assert said(one, "--out", out, "--title", "Again") == ""
+    assert b"Again" in (out / "report.html").read_bytes()
+
+    thesis = tmp_path / "thesis"
+    (thesis / "figures").mkdir(parents=True)
+    (thesis / ".hidden").write_text("")
+    refusal = said(one, "--out", thesis)
+    assert f"--out {thesis}: holds files that are not of a report (figures); name" in refusal
+    assert sorted(path.name for path in thesis.iterdir()) == [".hidden", "figures"]
+    with pytest.raises(UserError, match=r"not of a report .* overwrite=True"):
+        rm.report(one, thesis)
+    assert said(two, "--out", out, "--overwrite") == ""
+
+
+@pytest.mark.usefixtures("no_figures")
+def test_the_report_of_an_earlier_version_is_renewed_by_its_own_recording(
+    rigidimeter, simulate, tmp_path
+):
+    """It names its recordings by their paths alone."""
+    one, two, out = simulate(name="one"), simulate(name="two", seed=2), tmp_path / "page"
+    assert rigidimeter("report", one, "--out", out).status == 0
+    table = out / "tables" / "provenance.csv"
+    earlier = [line for line in table.read_text().splitlines() if not line.startswith('"inputs')]
+    assert len(earlier) == len(table.read_text().splitlines()) - 1
+    table.write_text("\n".join(earlier))
+    assert "holds the report of something else" in rigidimeter("report", two, "--out", out).err
+    assert rigidimeter("report", one, "--out", out).status == 0
 
 
 def test_a_session_in_which_an_epoch_failed_is_recorded_and_ends_with_1(rigidimeter, tmp_path):

@@ -11,16 +11,19 @@ if TYPE_CHECKING:
     from rigidimeter.analysis.report.contents import Figure, Section, paragraph
     from rigidimeter.analysis.report.make_report import report
     from rigidimeter.analysis.report.page import shown_tables, source_names
+    from rigidimeter.analysis.report.report_folder import inputs_seen_from, why_not_own
     from rigidimeter.analysis.report.sections import SECTIONS
 
 __all__ = [
     "SECTIONS",
     "Figure",
     "Section",
+    "inputs_seen_from",
     "paragraph",
     "report",
     "shown_tables",
     "source_names",
+    "why_not_own",
 ]
 
 __getattr__ = lazy_names(
@@ -29,6 +32,7 @@ __getattr__ = lazy_names(
         "contents": ("Figure", "Section", "paragraph"),
         "make_report": ("report",),
         "page": ("shown_tables", "source_names"),
+        "report_folder": ("inputs_seen_from", "why_not_own"),
         "sections": ("SECTIONS",),
     },
 )

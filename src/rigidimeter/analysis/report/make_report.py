@@ -8,7 +8,13 @@ from os import PathLike
 from pathlib import Path
 
 from rigidimeter.analysis.reading import Recording, read
-from rigidimeter.analysis.report.page import write_report
+from rigidimeter.analysis.report.page import source_names, write_report
+from rigidimeter.analysis.report.report_folder import (
+    INPUTS,
+    inputs_seen_from,
+    joined_names,
+    why_not_own,
+)
 from rigidimeter.analysis.study import (
     StudyResult,
     compare,
@@ -30,6 +36,8 @@ def report(
     out: AnyPath,
     title: str | None = None,
     *,
+    inputs: Sequence[AnyPath] = (),
+    overwrite: bool = False,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Path:
     """Write a report: one HTML page that needs no other file, its tables and its figures.
@@ -40,9 +48,14 @@ def report(
         What `compare`, `estimate` or `read` returned; or a study folder, session folders and files,
         which are read and analysed. Estimates alone have no figures of the recorded signals.
     out : path
-        The folder; made if it does not exist. Files of the same names are replaced.
+        The folder; made if it does not exist. An older report of the same inputs is replaced.
     title : str, optional
         Default: the title of the study, else "Joint rigidity".
+    inputs : sequence of paths
+        What `result` was read from, if it is a result: the older report of the same is replaced.
+        Default: the names of its recordings.
+    overwrite : bool
+        Write also into a folder with other files, or over the report of something else.
     progress : callable
         Takes the share of the page that is done, from 0 to 1.
 
@@ -54,16 +67,32 @@ def report(
     Raises
     ------
     UserError
-        If something cannot be read, or the folder cannot be written.
+        If something cannot be read, the folder cannot be written, or it holds other files.
     """
+    folder = Path(out)
+    if isinstance(result, (str, PathLike)):
+        inputs = [result]
+    elif not inputs and isinstance(result, Sequence):
+        inputs = [one for one in result if isinstance(one, (str, PathLike))]
+    paths, names = [Path(one) for one in inputs], ""
+    if paths:  # before anything is computed
+        _require_own(folder, names := inputs_seen_from(folder, paths), paths, overwrite)
     shown = _result(result)
-    shown = replace(shown, title=title or shown.title or TITLE)
+    if not paths:
+        _require_own(folder, names := joined_names(source_names(shown)), (), overwrite)
+    facts = {**shown.provenance, INPUTS: names}
+    shown = replace(shown, title=title or shown.title or TITLE, provenance=facts)
     try:
-        return write_report(shown, Path(out), progress)
+        return write_report(shown, folder, progress)
     except OSError as error:
         raise UserError(
             f"{out}: the report cannot be written ({error.strerror or error})"
         ) from None
+
+
+def _require_own(out: Path, names: str, paths: Sequence[Path], overwrite: bool) -> None:
+    if not overwrite and (why := why_not_own(out, names, paths)):
+        raise UserError(f"{out}: {why}; name another folder, or write with overwrite=True")
 
 
 def _result(

@@ -1,5 +1,11 @@
 """The files of a study: `study.toml`, and its tables of sessions, ratings and exclusions."""
 
+from rigidimeter.core.study_files.exclusions import (
+    exclude_epoch,
+    excluded_epochs,
+    include_epoch,
+    row_path,
+)
 from rigidimeter.core.study_files.extended_folder import extend_study, write_new_study
 from rigidimeter.core.study_files.folder import StudyFolder, TableRow, is_study, read_study_folder
 from rigidimeter.core.study_files.recorded_sessions import recorded_session, session_rows
@@ -13,4 +19,4 @@ from rigidimeter.core.study_files.study_toml import (
     is_own,
     read_study_toml,
 )
-from rigidimeter.core.study_files.tables import add_rows, table_path, table_rows
+from rigidimeter.core.study_files.tables import table_path

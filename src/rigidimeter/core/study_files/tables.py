@@ -68,7 +68,7 @@ def table_rows(path: Path, name: str) -> list[dict[str, str]]:
     """
     if not path.exists():
         return []
-    table = _checked(path, name)
+    table = checked_table(path, name)
     return [
         {column: cells[k] for column, cells in table.columns.items()}
         for k in range(len(table.lines))
@@ -98,7 +98,7 @@ def add_rows(path: Path, name: str, rows: Sequence[Mapping[str, str]]) -> None:
         with refused(path, "cannot be made"):
             path.parent.mkdir(parents=True, exist_ok=True)
         write_text(path, empty_table(name))
-    table = _checked(path, name)
+    table = checked_table(path, name)
     for row in rows:
         absent = [
             column
@@ -125,7 +125,13 @@ def add_rows(path: Path, name: str, rows: Sequence[Mapping[str, str]]) -> None:
         replace_file(path, before + between + text_bytes(text.getvalue()))
 
 
-def _checked(path: Path, name: str) -> TextTable:
+def checked_table(path: Path, name: str) -> TextTable:
+    """Read a table that has the columns which it must have, and may have no rows.
+
+    Raises
+    ------
+    UserError
+    """
     table = read_text_table(path, may_be_empty=True)
     missing = [column for column in TABLE_COLUMNS[name][0] if column not in table.columns]
     if missing:

@@ -51,6 +51,7 @@ from rigidimeter.rig.console.page.sessions_found import (
     exclude,
     extended,
     found_sessions,
+    include,
     report_file,
     report_folder,
     report_link,

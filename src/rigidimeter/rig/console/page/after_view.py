@@ -10,7 +10,6 @@ import json
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from rigidimeter.rig.console.page.form_values import parse_line
 from rigidimeter.rig.console.page.jobs import Jobs
 from rigidimeter.rig.console.page.recorded_traces import epoch_panes
 from rigidimeter.rig.console.page.server_state import ServerState, StartRequest
+from rigidimeter.rig.console.page.session_row import Acts, SessionRow
 from rigidimeter.rig.console.page.sessions_found import (
     OF_STUDY,
     PAGE,
@@ -30,6 +30,7 @@ from rigidimeter.rig.console.page.sessions_found import (
     exclude,
     extended,
     found_sessions,
+    include,
     report_file,
     report_folder,
     report_link,
@@ -73,7 +74,8 @@ class AfterView:
             report=self._report,
             show=self._show,
             repeat=self._repeat,
-            leave_out=self._ask_reason,
+            leave_out=self._leave_out,
+            include=self._include,
         )
         several = not state.place.one_session
         ui.label(f"Sessions in {self._root}").classes("text-lg")
@@ -159,27 +161,46 @@ class AfterView:
         folder = f"{session.rpartition('-')[0] or session}-{time.strftime('%H%M%S')}"
         self._state.ask(StartRequest(folder, resume=session, **what))
 
-    def _ask_reason(self, session: FoundSession, epoch: FoundEpoch) -> None:
+    def _leave_out(self, session: FoundSession, epoch: FoundEpoch) -> None:
         """Leave an epoch out, after asking for a reason and a name."""
+        words = f"Leave epoch {epoch.label} of {session.name} out of results; nothing is deleted."
+        self._ask_reason(words, "Leave out", exclude, session, epoch)
+
+    def _include(self, session: FoundSession, epoch: FoundEpoch) -> None:
+        """Include an epoch again that was left out, after asking for a reason and a name."""
+        words = (
+            f"Include epoch {epoch.label} of {session.name} again. It was left out: "
+            f"{epoch.excluded}. The study keeps a record of both."
+        )
+        self._ask_reason(words, "Include again", include, session, epoch)
+
+    def _ask_reason(
+        self,
+        words: str,
+        button: str,
+        act: Callable[[Path, str, str, str, str], None],
+        session: FoundSession,
+        epoch: FoundEpoch,
+    ) -> None:
         with self._dialogs, ui.dialog() as dialog, ui.card():
-            ui.label(
-                f"Leave epoch {epoch.label} of {session.name} out of results; nothing is deleted."
-            )
+            ui.label(words)
             reason = ui.input("Reason").props("maxlength=200 data-field=reason")
             by = ui.input("Your name").props("maxlength=40 data-field=by")
 
-            def leave_out() -> None:
+            def confirm() -> None:
                 if not self._may_act():
                     return
                 try:
-                    exclude(self._root, session.name, epoch.label, reason.value, by.value)
+                    act(self._root, session.name, epoch.label, reason.value, by.value)
                 except UserError as error:
                     ui.notify(str(error))
                     return
                 dialog.close()
                 self._update()
 
-            ui.button("Leave out", on_click=leave_out)
+            with ui.row():
+                ui.button("Cancel", on_click=dialog.close)
+                ui.button(button, on_click=confirm)
         dialog.open()
 
     async def _recover(self, session: FoundSession) -> None:
@@ -258,93 +279,3 @@ class AfterView:
         self._answer.set_content("")
         title = json.dumps(f"{session.name}, epoch {epoch.label}")
         ui.run_javascript(f"rigEpoch({title}, {json.dumps(panes)})")
-
-
-@dataclass(frozen=True)
-class Acts:
-    """What the buttons of a row do, with the session as it was last found."""
-
-    recover: Callable[[FoundSession], Any]
-    run_rest: Callable[[FoundSession], Any]
-    estimate: Callable[[FoundSession], Any]
-    report: Callable[[FoundSession], Any]
-    show: Callable[[FoundSession, FoundEpoch], Any]
-    repeat: Callable[[FoundSession, FoundEpoch], Any]
-    leave_out: Callable[[FoundSession, FoundEpoch], Any]
-
-
-class SessionRow:
-    """The row of a session, made in the present container.
-
-    Parameters
-    ----------
-    acts : Acts
-    session : FoundSession
-
-    Attributes
-    ----------
-    session : FoundSession
-        As it was last found.
-    frame : expansion
-        What is unfolded.
-    """
-
-    def __init__(self, acts: Acts, session: FoundSession) -> None:
-        self._acts, self.session = acts, session
-        self._epochs: dict[str, _EpochRow] = {}
-        self.frame = ui.expansion().classes("w-full session")
-        with self.frame:
-            self._reason = ui.label()
-            with ui.row():
-                self._recover = self._button("Recover", acts.recover)
-                self._rest = self._button("", acts.run_rest)
-                self._button("Estimate", acts.estimate)
-                self._button("Report", acts.report)
-                target = report_link(report_folder(session.name))
-                self._link = ui.link("Open its report", target, new_tab=True)
-
-    def _button(self, words: str, act: Callable[[FoundSession], Any]) -> ui.button:
-        return ui.button(words, on_click=lambda: act(self.session))
-
-    def show(self, session: FoundSession, *, reported: bool) -> None:
-        """Show what is known of the session now."""
-        self.session = session
-        how = session.outcome or session.reason
-        self.frame.text = f"{session.name}: {session.good} of {session.planned} epochs good, {how}"
-        _show(self._reason, in_buttons(session.reason))
-        self._recover.set_visibility(not session.outcome and not session.recording)
-        _show(self._rest, f"Run what is left: {len(session.left)}" if session.left else "")
-        self._link.set_visibility(reported)
-        for epoch in session.epochs:
-            if epoch.label not in self._epochs:
-                with self.frame:
-                    self._epochs[epoch.label] = _EpochRow(self._acts)
-            self._epochs[epoch.label].show(session, epoch)
-
-
-class _EpochRow:
-    def __init__(self, acts: Acts) -> None:
-        with ui.row().classes("items-center w-full"):
-            self._words = ui.label().classes("grow")
-            self._button("Show", acts.show)
-            self._repeat = self._button("Repeat", acts.repeat)
-            self._leave_out = self._button("Leave out", acts.leave_out)
-
-    def _button(self, words: str, act: Callable[[FoundSession, FoundEpoch], Any]) -> ui.button:
-        return ui.button(words, on_click=lambda: act(*self._found))
-
-    def show(self, session: FoundSession, epoch: FoundEpoch) -> None:
-        self._found = session, epoch
-        parts = [f"epoch {epoch.label}", epoch.condition, epoch.task, epoch.outcome, epoch.reason]
-        if epoch.rating:
-            parts.append(f"rated {epoch.rating}")
-        if epoch.excluded:
-            parts.append(f"left out: {epoch.excluded}")
-        self._words.text = " · ".join(filter(None, parts))
-        self._repeat.set_visibility(bool(session.outcome))
-        self._leave_out.set_visibility(not epoch.excluded)
-
-
-def _show(at: ui.label | ui.button, words: str) -> None:
-    at.text = words
-    at.set_visibility(bool(words))

@@ -1,7 +1,8 @@
 """The folder of the console: its sessions, the study that they make, and their reports.
 
 Nothing here changes a session. An epoch is left out of results by a row in `exclusions.csv`, as in
-a study folder: path, epoch, reason, by. The samples stay as they are.
+a study folder: path, epoch, reason, by. The samples stay as they are. The row of an epoch that is
+included again becomes a comment that says when, by whom and why.
 
 Of reports only folders that hold a `report.html` are served. A report comes with
 `Content-Security-Policy: sandbox`, so whatever stands in it can neither read the operator's page
@@ -29,11 +30,11 @@ from rigidimeter.core.session import (
 )
 from rigidimeter.core.study_files import (
     STUDY_FILE,
-    add_rows,
+    exclude_epoch,
+    excluded_epochs,
     extend_study,
+    include_epoch,
     read_study_toml,
-    table_path,
-    table_rows,
 )
 from rigidimeter.rig.console.page.form_values import parse_line, parse_name
 from rigidimeter.rig.console.page.server_state import Place
@@ -119,13 +120,9 @@ def found_sessions(root: Path) -> tuple[list[FoundSession], list[str]]:
     folders = sorted(folders, key=lambda path: path.stat().st_mtime, reverse=True)
     problems: list[str] = []
     try:
-        rows = _rows(table_path(root, "exclusions"))
+        excluded = excluded_epochs(root)
     except UserError as error:
-        rows, problems = [], [str(error)]
-    excluded = {
-        (row["path"], row["epoch"]): row["reason"] + (f" ({row['by']})" if row.get("by") else "")
-        for row in rows
-    }
+        excluded, problems = {}, [str(error)]
     found = []
     for folder in folders[:MAX_SESSIONS]:
         try:
@@ -160,18 +157,26 @@ def exclude(root: Path, session: str, epoch: str, reason: str, by: str) -> None:
     UserError
         If there is no such epoch, it is left out already, or reason or name is missing.
     """
-    folder = root / parse_name(session, "session")
-    found = _session(folder, {})
-    reason, by = parse_line(reason, "reason"), parse_line(by, "name", 40)
-    if not reason or not by:
-        raise UserError("to leave an epoch out, give a reason and your name")
+    found = _session(root / parse_name(session, "session"), {})
+    reason, by = _asked(reason, by)
     if epoch not in {one.label for one in found.epochs}:
         raise UserError(f"{session} has no epoch {epoch}")
-    path = table_path(root, "exclusions")
-    if any((row["path"], row["epoch"]) == (session, epoch) for row in _rows(path)):
-        raise UserError(f"epoch {epoch} of {session} is left out already")
-    row = {"path": session, "epoch": epoch, "reason": reason, "by": by}
-    add_rows(path, "exclusions", [row])
+    exclude_epoch(root, session, epoch, reason, by)
+
+
+def include(root: Path, session: str, epoch: str, reason: str, by: str) -> None:
+    """Include an epoch again that was left out; its row stays in the table as a comment.
+
+    Raises
+    ------
+    UserError
+        If it is not left out, or reason or name is missing.
+    """
+    include_epoch(root, parse_name(session, "session"), epoch, *_asked(reason, by))
+
+
+def _asked(reason: str, by: str) -> tuple[str, str]:
+    return parse_line(reason, "reason"), parse_line(by, "name", 40)
 
 
 def _session(folder: Path, excluded: dict[tuple[str, str], str]) -> FoundSession:
@@ -233,12 +238,6 @@ def _epochs(
         for begun in events
         if begun["event"] == "epoch_started"
     ]
-
-
-def _rows(path: Path) -> list[dict[str, str]]:
-    """Return the exclusions that were written down, each path as `found_sessions` names it."""
-    rows = table_rows(path, "exclusions")
-    return [row | {"path": os.path.normpath(row["path"])} for row in rows]
 
 
 def extended(place: Place) -> list[str]:

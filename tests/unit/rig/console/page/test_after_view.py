@@ -81,6 +81,48 @@ def test_rows_say_what_is_known_now(client, tmp_path):
     assert list(shown(client, ui.button).values()).count("Repeat") == 2
 
 
+def test_leaving_out_is_cancelled_confirmed_and_taken_back(client, tmp_path):
+    ended(session(tmp_path, "S01-1"))
+    AfterView(ServerState(Place(tmp_path, Settings(), "")), Jobs(), lambda: True, ui.label())
+
+    def click(words: str) -> None:
+        """Click the newest button of these words: that of the dialogue, if one is open."""
+        number = max(n for n, text in shown(client, ui.button).items() if text == words)
+        handlers = client.elements[number]._event_listeners.values()
+        with client:
+            for one in handlers:
+                one.handler(None)
+
+    def answer(reason: str, by: str) -> None:
+        fields = [one for one in client.elements.values() if isinstance(one, ui.input)]
+        for name, value in (("reason", reason), ("by", by)):
+            [one for one in fields if one.props.get("data-field") == name][-1].value = value
+
+    def dialogue() -> bool:
+        return [one for one in client.elements.values() if isinstance(one, ui.dialog)][-1].value
+
+    table = tmp_path / "exclusions.csv"
+    click("Leave out")
+    answer("coughed", "Kim")
+    click("Cancel")
+    assert not dialogue()
+    assert not table.exists()
+    click("Leave out")
+    answer("coughed", "Kim")
+    click("Leave out")
+    assert not dialogue()
+    assert "left out: coughed (Kim)" in " ".join(shown(client, ui.label).values())
+    click("Include again")
+    assert "It was left out: coughed (Kim)." in " ".join(shown(client, ui.label).values())
+    answer("in the rest", "Lee")
+    click("Include again")
+    assert not dialogue()
+    assert "by Lee (in the rest): S01-1,1,coughed,Kim" in table.read_text("utf-8")
+    assert "left out: coughed" not in " ".join(
+        words for words in shown(client, ui.label).values() if words.startswith("epoch 1")
+    )
+
+
 def test_a_double_click_runs_a_command_once(client, tmp_path):
     asked = []
 

@@ -1,6 +1,7 @@
 """The sessions of a folder, and epochs that are left out of results."""
 
 import json
+import re
 from dataclasses import asdict
 
 import pytest
@@ -9,7 +10,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import SessionWriter, again, read_manifest
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.planning import plan
-from rigidimeter.rig.console.page import epoch_panes, exclude, found_sessions
+from rigidimeter.rig.console.page import epoch_panes, exclude, found_sessions, include
 
 EXCLUSIONS = "exclusions.csv"
 TWICE = parse_settings({"protocol": {"blocks": [{"epochs": 4}], "rests_s": [4.0]}})
@@ -103,6 +104,57 @@ def test_a_table_as_a_spreadsheet_left_it_keeps_its_form_and_its_comments(root):
     (found,), problems = found_sessions(root)
     assert [epoch.excluded for epoch in found.epochs] == ["moved (Op)", "cough; twice (Op)"]
     assert problems == []
+
+
+def test_an_epoch_that_is_included_again_leaves_who_when_and_why(root):
+    exclude(root, "S01-1", "2", 'a "cough", twice', "Op")
+    exclude(root, "S01-1", "1", "moved", "Op")
+    include(root, "S01-1", "2", "it was in the rest", "Kim")
+    (found,), problems = found_sessions(root)
+    assert ([epoch.excluded for epoch in found.epochs], problems) == (["moved (Op)", ""], [])
+    *_, trace, kept = (root / EXCLUSIONS).read_text().splitlines()
+    assert kept == "S01-1,1,moved,Op"
+    assert re.fullmatch(
+        r"# included again \d{4}-\d\d-\d\d \d\d:\d\d UTC by Kim \(it was in the rest\): "
+        r'S01-1,2,"a ""cough"", twice",Op',
+        trace,
+    )
+    with pytest.raises(UserError, match="epoch 2 of S01-1 is not left out"):
+        include(root, "S01-1", "2", "r", "b")
+    with pytest.raises(UserError, match="give a reason and your name"):
+        include(root, "S01-1", "1", "r", " ")
+    exclude(root, "S01-1", "2", "once more", "Op")
+    assert [epoch.excluded for epoch in found_sessions(root)[0][0].epochs][1] == "once more (Op)"
+
+
+def test_including_again_keeps_the_rest_of_a_spreadsheets_table(root):
+    rows = ["path;epoch;reason;by", "# Müller", 'S01-1;1;"two\nlines";Op', "./S01-1;2;moved;Op"]
+    (root / EXCLUSIONS).write_bytes(("\ufeff" + "\n".join(rows)).replace("\n", "\r\n").encode())
+    include(root, "S01-1", "1", "r", "Kim")
+    lines = (root / EXCLUSIONS).read_bytes().decode().split("\r\n")
+    assert lines[:2] == ["\ufeff" + rows[0], rows[1]]
+    assert lines[2].startswith("# included again ")
+    assert lines[3:] == ['# lines";Op', rows[3]]
+    include(root, "S01-1", "2", "r", "Kim")
+    assert [epoch.excluded for epoch in found_sessions(root)[0][0].epochs] == ["", ""]
+
+
+def test_an_epoch_of_a_study_is_left_out_and_included_by_commands(root, rigidimeter):
+    assert rigidimeter("study", "add", root, "--subject", "S01").status == 0
+    who = ("--reason", "coughed", "--by", "Kim")
+    for path in ("S01-1", root / "S01-1"):
+        assert rigidimeter("study", "exclude", root, path, "2", *who).status == 0
+        (found,), _ = found_sessions(root)
+        assert [epoch.excluded for epoch in found.epochs] == ["", "coughed (Kim)"]
+        assert rigidimeter("study", "include", root, path, "2", *who).status == 0
+        assert [epoch.excluded for epoch in found_sessions(root)[0][0].epochs] == ["", ""]
+    for path, epoch, said in (
+        ("S01-2", "1", "S01-2: is not in .*sessions.csv; the nearest is S01-1"),
+        ("S01-1", "7", "S01-1 has no epoch 7; its epochs are 1, 2"),
+    ):
+        ran = rigidimeter("study", "exclude", root, path, epoch, *who)
+        assert ran.status == 1
+        assert re.search(said, ran.err)
 
 
 def test_a_table_that_is_none_is_not_written_over(root):
