@@ -63,6 +63,9 @@ def _plotted(
         return np.array(panels)
     import matplotlib.pyplot as plt
 
+    # A backend sets global state as it is loaded (a notebook's: interactive, and what shows the
+    # figures of a cell), which `styled` would undo for good. It is loaded before.
+    plt.switch_backend(mpl.get_backend())
     with styled():
         rows, columns = -(-count // columns), min(columns, count)
         figure, made = plt.subplots(rows, columns, figsize=size, squeeze=False, **options)

@@ -225,12 +225,36 @@ def test_a_condition_in_dollars_is_no_formula(make_analysis) -> None:
     assert not text.get_parse_math()
 
 
-def test_results_load_no_matplotlib_until_they_are_drawn() -> None:
-    code = (
-        "import sys, rigidimeter.analysis.study, rigidimeter.planning as p;"
-        "assert 'matplotlib' not in sys.modules;"
-        "import matplotlib; matplotlib.use('agg'); axes = p.design().plot();"
-        "print(len(axes))"
+def test_matplotlib_is_loaded_late_and_a_notebook_shows_every_figure(tmp_path: Path) -> None:
+    """Like that of Jupyter: turned interactive as it is loaded, and shows what is made then."""
+    (tmp_path / "notebook_like.py").write_text(
+        "import matplotlib as mpl\n"
+        "from matplotlib.backend_bases import FigureManagerBase\n"
+        "from matplotlib.backends.backend_agg import FigureCanvasAgg as FigureCanvas\n"
+        "shown = []\n"
+        "mpl.interactive(True)\n"
+        "mpl.rcParams['figure.dpi'] = 72\n"
+        "def show(*, block=None):\n"
+        "    pass\n"
+        "def new_figure_manager_given_figure(number, figure):\n"
+        "    if mpl.is_interactive():\n"
+        "        shown.append(number)\n"
+        "    return FigureManagerBase(FigureCanvas(figure), number)\n"
+        "def new_figure_manager(number, *args, FigureClass, **options):\n"
+        "    return new_figure_manager_given_figure(number, FigureClass(*args, **options))\n"
     )
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert ran.stdout == "3\n"
+    code = (
+        "import os, sys; os.environ['MPLBACKEND'] = 'module://notebook_like'\n"
+        "import rigidimeter as rm, rigidimeter.analysis.study\n"
+        "planned = rm.design(prbs={'duration_s': 8.0})\n"
+        "assert 'matplotlib' not in sys.modules\n"
+        "planned.plot(); planned.plot()\n"
+        "import matplotlib as mpl, matplotlib.pyplot as plt\n"
+        "plt.subplots()\n"
+        "import notebook_like\n"
+        "print(notebook_like.shown, mpl.get_backend(), mpl.rcParams['figure.dpi'])\n"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path
+    )
+    assert ran.stdout == "[1, 2, 3] module://notebook_like 72.0\n"
