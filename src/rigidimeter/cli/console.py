@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 
 from rigidimeter.cli.help_pages import OPTIONS, PAGE, argument
 from rigidimeter.cli.options import CPU, PRIORITY, RIG
 from rigidimeter.cli.output import echo
+from rigidimeter.core.errors import UserError
 
 HOST = PAGE.option(
     "--host ADDRESS",
@@ -23,6 +25,22 @@ NO_TOKEN = PAGE.flag(
     "--no-token",
     "No token, on a computer of one user. Every program and user of it can then lead the rig.",
 )
+
+
+def require_page() -> None:
+    """Refuse to begin where packages of the page are missing.
+
+    Raises
+    ------
+    UserError
+        With the command that installs them.
+    """
+    missing = [n for n in ("fastapi", "nicegui", "starlette", "uvicorn") if find_spec(n) is None]
+    if missing:
+        raise UserError(
+            f"the page needs more packages ({', '.join(missing)}): "
+            "pip install 'rigidimeter[console]'; `rigidimeter run` shows a session in the terminal"
+        )
 
 
 def console(
@@ -49,6 +67,7 @@ def console(
       rigidimeter console
       rigidimeter console protocol.toml --rig rig.toml --out study
     """
+    require_page()
     from rigidimeter.cli.page_session import PageAddress, serve_page
     from rigidimeter.core.settings import load_settings
     from rigidimeter.rig.acquisition.processes import Realtime, complete_left

@@ -31,7 +31,8 @@ def inspect(
 ) -> None:
     """Show what is in a file and how it would be read.
 
-    Nothing is estimated. The exit status is 1 if a file cannot be read without more options.
+    Nothing is estimated. What only you can state, such as a unit, is listed. The exit status is 1
+    if a file cannot be opened.
 
     \b
     For example:
@@ -47,7 +48,7 @@ def inspect(
     for paths in groups:
         try:
             columns = full or len(groups) == 1
-            status |= _inspect(paths, recordings, write_mapping, plot, columns=columns)
+            _inspect(paths, recordings, write_mapping, plot, columns=columns)
         except UserError as error:
             for line in error.lines:
                 echo(f"error: {line}", err=True)
@@ -62,8 +63,8 @@ def _inspect(
     plot: Path | None,
     *,
     columns: bool,
-) -> int:
-    """Inspect one file, or the files of one recording; return the exit status.
+) -> None:
+    """Inspect one file, or the files of one recording.
 
     Without `columns` it is shown in a line and the command that reads it.
     """
@@ -96,7 +97,7 @@ def _inspect(
             echo(f"{name}: {kind} with {len(epochs)} epochs")
             say(notices)
             echo(f"reads it: {command_for(paths, [])}")
-            return 0
+            return
         table = content
     found = inspect_table(table, options)
     rows = max((column.size for column in table.columns.values()), default=0)
@@ -113,7 +114,6 @@ def _inspect(
         from rigidimeter.analysis.report.inspected_columns import draw_columns
 
         draw_columns(found, plot)
-    return int(bool(found.proposal.unsaid))
 
 
 def _joining_words(recordings: Recordings, given: ReadOptions) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 import time
 from collections.abc import Callable
@@ -88,13 +87,8 @@ def serve_page(place: Place, realtime: Realtime, address: PageAddress) -> Ended 
     Raises
     ------
     UserError
-        If the packages of the page are missing, or it cannot be served there.
+        If it cannot be served there.
     """
-    if importlib.util.find_spec("nicegui") is None:
-        raise UserError(
-            "the page needs more packages: pip install 'rigidimeter[console]'; "
-            "`rigidimeter run` shows a session in the terminal"
-        )
     from rigidimeter.cli.rig_steps import rig_steps
 
     token = address.token()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from rigidimeter.cli.console import HOST, NO_TOKEN, PORT, TOKEN_FILE
+from rigidimeter.cli.console import HOST, NO_TOKEN, PORT, TOKEN_FILE, require_page
 from rigidimeter.cli.help_pages import OPTIONS, RUN, argument
 from rigidimeter.cli.options import CPU, NEW_SESSION, PRIORITY, RIG, SEED
 from rigidimeter.cli.output import echo
@@ -95,6 +95,7 @@ def run(
     require_packages(planned.settings)
     offer_to_continue(out)
     if page:
+        require_page()
         if unattended or resume is not None:
             raise UserError(
                 "--console goes with neither --unattended nor --resume; continue a session under "

@@ -29,7 +29,7 @@ def stiffness(out):
 
 def test_inspect_then_the_command_and_the_mapping_that_it_gives(path, tmp_path, rigidimeter):
     asked = rigidimeter("inspect", path)
-    assert asked.status == 1
+    assert asked.status == 0
     assert "has no column torque_nm" in " ".join(asked.out.split())
     lab, image = tmp_path / "lab.toml", tmp_path / "elbow.png"
     ran = rigidimeter("inspect", path, *SAID, "--write-mapping", lab, "--plot", image)
@@ -117,7 +117,7 @@ def test_a_calibration_in_a_comment_is_shown(rigidimeter, tmp_path):
     head = "# recorded by A\n# gain 0.0024 Nm/count\n# elbow\ntime_s,torque_counts,angle_deg\n"
     path.write_text(head + rows)
     ran = rigidimeter("inspect", path)
-    assert ran.status == 1
+    assert ran.status == 0
     said = " ".join(ran.out.split())
     assert "the file says 'gain 0.0024 Nm/count'" in said
     assert "is in counts, and torque is needed in Nm: say --scale 'torque=0.0024 Nm/count'" in said
@@ -158,6 +158,36 @@ def test_a_velocity_that_is_not_the_derivative_of_the_angle_is_refused(tmp_path,
     insists = ("--unit", "velocity=rad/s", "--unit", "angle=rad")
     believed = rigidimeter("estimate", path, *insists)
     assert "it is read as the unit that was given says" in believed.err
+
+
+@pytest.mark.parametrize(
+    ("block_s", "epochs"),
+    [(16, ["0", "1", "2", "3", "4", "5"]), (12, ["1"])],
+    ids=["trials within blocks", "a block ends within a trial"],
+)
+def test_the_command_that_is_printed_takes_trials_for_epochs_and_finds_the_perturbation(
+    block_s, epochs, tmp_path, rigidimeter
+):
+    """Without them it would cut at 20 and 40 s, across trials of 8 s."""
+    time_s = np.arange(4800) / 100.0
+    torque = torque_nm(time_s)
+    moves_nm = 0.01 * angle_rad(time_s, derivative=2) + 0.5 * angle_rad(time_s, derivative=1)
+    path = _written(
+        tmp_path / "r.csv",
+        "time [s],torque [Nm],angle [rad],PRBS command [Nm],block,Trial No.",
+        *(time_s, torque, angle_rad(time_s), moves_nm - torque, time_s // block_s, time_s // 8),
+    )
+    ran = rigidimeter("inspect", path)
+    (line,) = [line for line in ran.out.splitlines() if line.startswith("reads it: ")]
+    out = tmp_path / "out.json"
+    command = shlex.split(line.removeprefix("reads it: "))
+    assert rigidimeter(*command[1:], "--json", out).status == 0
+    document = json.loads(out.read_text())
+    found = document["epochs"]
+    assert [one["epoch"] for one in found] == epochs
+    assert document["method"] == "iv"
+    for one in found:
+        assert one["stiffness_nm_rad"] == pytest.approx(STIFFNESS_NM_RAD, rel=0.02)
 
 
 def test_columns_of_trials_that_change_together_have_one_warning(tmp_path, rigidimeter):

@@ -16,7 +16,7 @@ from rigidimeter.analysis.reading.channels.choice import MOTION
 from rigidimeter.analysis.reading.channels.column_facts import ColumnFacts, column_facts
 from rigidimeter.analysis.reading.channels.lever_arm import lever_arm
 from rigidimeter.analysis.reading.channels.proposal import Proposal, propose
-from rigidimeter.analysis.reading.channels.quantities import BY_STANDARD
+from rigidimeter.analysis.reading.channels.quantities import BY_STANDARD, names_epochs
 from rigidimeter.analysis.reading.channels.readings import look_text
 from rigidimeter.analysis.reading.formats.columns import numbers
 from rigidimeter.analysis.reading.formats.read_options import ReadOptions
@@ -147,8 +147,11 @@ def option_words(found: Inspection) -> list[str]:
         words += ["--task", options.task]
     length_s = options.epoch_length_s
     seen = found.proposal.seen
-    if length_s is None and "epoch" not in found.proposal.choice.taken and seen is not None:
-        length_s = EPOCH_LENGTH_S if seen.duration_s >= 2 * EPOCH_LENGTH_S else None
+    # Where columns are named as trials are, a length would cut across these.
+    if length_s is None and seen is not None and not any(map(names_epochs, found.table.columns)):
+        has_epochs = "epoch" in found.proposal.choice.taken
+        long = seen.duration_s >= 2 * EPOCH_LENGTH_S
+        length_s = EPOCH_LENGTH_S if long and not has_epochs else None
     return words if length_s is None else [*words, "--epoch-length-s", f"{length_s:g}"]
 
 

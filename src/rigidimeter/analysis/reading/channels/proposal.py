@@ -24,7 +24,7 @@ from rigidimeter.analysis.reading.channels.choice import MOTION, Choice, Taken, 
 from rigidimeter.analysis.reading.channels.headers import SCALED, read_header
 from rigidimeter.analysis.reading.channels.lever_arm import lever_arm
 from rigidimeter.analysis.reading.channels.looks import Array, Look
-from rigidimeter.analysis.reading.channels.quantities import BY_STANDARD
+from rigidimeter.analysis.reading.channels.quantities import BY_STANDARD, names_epochs
 from rigidimeter.analysis.reading.channels.readings import (
     BELIEVED_SPEED_RAD_S,
     doubts,
@@ -32,6 +32,7 @@ from rigidimeter.analysis.reading.channels.readings import (
     usual_units,
 )
 from rigidimeter.analysis.reading.formats.columns import numbers, own_rate, own_rates, restarts
+from rigidimeter.analysis.reading.formats.cutting import label_columns
 from rigidimeter.analysis.reading.formats.read_options import ReadOptions
 from rigidimeter.analysis.reading.formats.table import Table
 from rigidimeter.core.errors import UserError
@@ -154,19 +155,41 @@ def _of_lever_arm(table: Table, options: ReadOptions) -> ReadOptions:
 
 
 def _trials(table: Table, options: ReadOptions, reasons: list[str]) -> ReadOptions:
-    """Take for the epochs the column that changes where the time starts anew, and only there."""
+    """Take for the epochs the column of trials: by where the time starts anew, or by its name.
+
+    Of several that are named so, the one that changes wherever another does: trials within blocks.
+    """
     choice = _chosen(table, options)
     raw, _ = _raw(table, choice, options)
-    starts = restarts(raw["time_s"]) if "time_s" in raw else np.empty(0)
-    if not starts.size or 2 * starts.size > raw["time_s"].size or "epoch" in choice.taken:
+    if "epoch" in choice.taken or not raw:
         return options
-    for name, column in table.columns.items():
-        if name == choice.taken["time_s"].column or column.size != raw["time_s"].size:
-            continue
-        if np.array_equal(np.flatnonzero(column[1:] != column[:-1]) + 1, starts):
-            reasons.append(f"the time starts anew where {name!r} changes")
-            return replace(options, columns={**options.columns, "epoch": name})
-    return options
+    used = {taken.column for taken in choice.taken.values()}
+    n_rows = next(iter(raw.values())).size
+    starts = restarts(raw["time_s"]) if "time_s" in raw else np.empty(0)
+    name = reason = ""
+    if starts.size and 2 * starts.size <= n_rows:
+        changing = (
+            name
+            for name, column in table.columns.items()
+            if column.size == n_rows
+            and np.array_equal(np.flatnonzero(column[1:] != column[:-1]) + 1, starts)
+        )
+        name = next(changing, "")
+        reason = f"the time starts anew where {name!r} changes"
+    elif options.epoch_length_s is None:
+        named = {
+            frozenset(rows): [name for name in columns if names_epochs(name)]
+            for rows, columns in label_columns(table, used, n_rows).items()
+        }
+        named = {rows: names for rows, names in named.items() if names}
+        finest = max(named, key=len, default=frozenset())
+        if all(rows <= finest for rows in named):
+            name = named[finest][0] if named else ""
+        reason = f"the rows of each label of {name!r} follow one another, as an epoch's do"
+    if not name:
+        return options
+    reasons.append(reason)
+    return replace(options, columns={**options.columns, "epoch": name})
 
 
 def _units(table: Table, options: ReadOptions, reasons: list[str]) -> ReadOptions:

@@ -91,13 +91,13 @@ def kind_of(words: list[str]) -> str:
 
     Examples
     --------
-    >>> kind_of(["ellbogenwinkel"]), kind_of(["vitesse", "angulaire"]), kind_of(["sample"])
-    ('angle', 'velocity', '')
+    >>> kind_of(["ellbogenwinkel"]), kind_of(["prbs", "command"]), kind_of(["sample"])
+    ('angle', 'perturbation', '')
     """
     kinds = {_kind(word) for word in words}
     if "no sample" in kinds:
         return ""
-    if "command" in kinds:
+    if "command" in kinds and "perturbation" not in kinds:  # the robot obeys commands of both
         return "velocity_command" if "velocity" in kinds else ""
     order = ("perturbation", "emg", "velocity", "torque", "angle", "force", "time")
     return next((kind for kind in order if kind in kinds), "")

@@ -119,23 +119,18 @@ def by_length(source: str, clock: Rows, length_s: float) -> tuple[list[Stretch],
     return stretches, notices
 
 
-def unused_labels(
-    table: Table, used: Collection[str], n_rows: int, lacking: Collection[str]
-) -> list[Notice]:
-    """Return a warning for each unused column whose few values last long, as labels of rows do.
+def label_columns(
+    table: Table, used: Collection[str], n_rows: int
+) -> dict[tuple[int, ...], dict[str, list[str]]]:
+    """Return the labels of each unused column whose few values last long, as labels of rows do.
 
     A column that is named as trials are may have many. One of a measured quantity has a unit, a
-    name that says so, or values between whole numbers. Columns whose labels change at the same rows
-    have one warning.
+    name that says so, or values between whole numbers.
 
-    Parameters
-    ----------
-    table : Table
-    used : collection of str
-        Columns that are used.
-    n_rows : int
-    lacking : collection of str
-        Of ``epoch`` and ``condition``, those for which no column is used.
+    Returns
+    -------
+    dict
+        By the rows at which labels change, so that columns that change together are together.
     """
     alike: dict[tuple[int, ...], dict[str, list[str]]] = {}
     for name in (one for one in table.columns if one not in used):
@@ -149,8 +144,27 @@ def unused_labels(
         few = len(labels) <= MOST_LABELS and not any(_DECIMALS.fullmatch(one) for one in labels)
         if len(runs) > 1 and labels and (trials or few):
             alike.setdefault(tuple(start for _, start, _ in runs), {})[name] = labels
+    return alike
+
+
+def unused_labels(
+    table: Table, used: Collection[str], n_rows: int, lacking: Collection[str]
+) -> list[Notice]:
+    """Return a warning for each unused column of labels; `label_columns` says which those are.
+
+    Columns whose labels change at the same rows have one warning.
+
+    Parameters
+    ----------
+    table : Table
+    used : collection of str
+        Columns that are used.
+    n_rows : int
+    lacking : collection of str
+        Of ``epoch`` and ``condition``, those for which no column is used.
+    """
     notices = []
-    for columns in alike.values():
+    for columns in label_columns(table, used, n_rows).values():
         name, labels = next(iter(columns.items()))
         options = [
             f"--column {shlex.quote(f'{label}={name}')} {what}"
