@@ -9,7 +9,7 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.report.style import GREY, note, plain_ticks, styled
+from rigidimeter.analysis.report.style import GREY, note, styled
 from rigidimeter.model import JointDynamics
 
 _BODE = (("#222222", "-"), ("#0072B2", (0, (1, 1.5))), ("#D55E00", "--"), ("#009E73", "-."))
@@ -66,7 +66,6 @@ def arm_bode(arms: Mapping[str, JointDynamics]) -> Drawing:
         below.set_ylim(-185.0, 5.0)
         below.axhline(-180.0, color=GREY, linewidth=0.8)
         below.set_xlabel("Frequency (Hz)")
-        plain_ticks(below.xaxis)
         for axes in (above, below):
             axes.grid(visible=False, which="minor")
     return figure

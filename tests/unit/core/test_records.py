@@ -93,7 +93,7 @@ def test_a_fit_and_an_analysis_are_printed_as_one_line():
     value, se = np.array([4.59e-3, 0.159, 1.7]), np.array([1.1e-5, 0.0012, 0.013])
     fit = replace(FIT, band_hz=(0.1, 30.0), vaf_percent=99.61, value=value, se=se)
     assert repr(fit) == (
-        "J 4.590e-3 ± 0.011e-3 kg·m², B 0.1590 ± 0.0012 N·m·s/rad, K 1.700 ± 0.013 N·m/rad; "
+        "J (4.590 ± 0.011)·10⁻³ kg·m², B 0.1590 ± 0.0012 N·m·s/rad, K 1.700 ± 0.013 N·m/rad; "
         "iv, 0.1–30 Hz, VAF 99.6 %; epoch 1 OFF"
     )
     failed = Fit("a.csv", "2\n3", "OFF", "iv", Outcome("failed", "too short"))

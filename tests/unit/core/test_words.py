@@ -24,19 +24,22 @@ def test_the_examples_of_the_docstrings_hold(one) -> None:
         (1.7, 0.00949, "1.7000 ± 0.0095"),
         (-0.5, 12.0, "0 ± 12"),
         (0.0, 0.02, "0.000 ± 0.020"),
-        (-4.5e-3, 8.1e-6, "−4.5000e-3 ± 0.0081e-3"),
-        (123456.0, 789.0, "123.46e3 ± 0.79e3"),
+        (-4.5e-3, 8.1e-6, "(−4.5000 ± 0.0081)·10⁻³"),
+        (123456.0, 789.0, "(123.46 ± 0.79)·10³"),
         (np.float64(1.5), np.float64(math.nan), "1.5"),
         (1.5, 0.0, "1.5"),
-        (-4.53712e-3, math.nan, "−4.537e-3"),
+        (-4.53712e-3, math.nan, "−4.537·10⁻³"),
         (0.0, math.nan, "0"),
         (1.5, math.inf, "1.5 ± inf"),
-        (1.5, 1e-14, "1.5 ± 1e-14"),
+        (1.5, 1e-14, "1.5 ± 1·10⁻¹⁴"),
         (math.nan, 0.1, "–"),
     ],
 )
 def test_a_number_goes_to_the_place_of_the_second_digit_of_its_error(value, error, shown) -> None:
     assert with_error(value, error) == shown
+
+
+LOWERED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 
 def test_what_is_written_reads_as_the_number_within_half_a_digit_of_its_error() -> None:
@@ -48,8 +51,9 @@ def test_what_is_written_reads_as_the_number_within_half_a_digit_of_its_error() 
     ):
         if error < 1e-8 * abs(value):
             continue
-        shown = with_error(value, error).replace("−", "-")
-        found, of_error = map(float, shown.split(" ± "))
+        shown = with_error(value, error).replace("−", "-").translate(LOWERED)
+        numbers, _, power = shown.strip("(").partition(")·10")
+        found, of_error = (float(f"{one}e{power or 0}") for one in numbers.split(" ± "))
         assert of_error == pytest.approx(error, rel=0.051)
         assert abs(found - value) <= 0.051 * error
 

@@ -18,7 +18,6 @@ from rigidimeter.analysis.report.style import (
     legend_outside,
     listed,
     note,
-    plain_ticks,
     write_at,
 )
 from rigidimeter.analysis.study.drawn_signals import Response, Spectrum
@@ -253,12 +252,11 @@ def draw_loops(
 
 
 def frequency_axis(axes: Axes, low: float, high: float) -> None:
-    """Make the horizontal axis one of frequency in Hz, logarithmic with plain numbers."""
+    """Make the horizontal axis one of frequency in Hz, logarithmic."""
     axes.set_xscale("log")
     axes.set_xlim(low, high)
     axes.set_xlabel("Frequency (Hz)")
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    plain_ticks(axes.xaxis)
     axes.grid(visible=False, which="minor")
 
 
@@ -266,7 +264,6 @@ def _density_axis(axes: Axes, low: float, high: float) -> None:
     frequency_axis(axes, low, high)
     axes.set_yscale("log")
     axes.set_ylabel("Power spectral density\n((N·m)²/Hz)")
-    plain_ticks(axes.yaxis)
 
 
 def draw_spectrum(panels: Sequence[Axes], channel: Channel, wanted_hz: tuple[float, float]) -> None:
@@ -412,7 +409,6 @@ def draw_impedance(
     magnitude.set_ylabel("Torque over angle\n(N·m/rad)")
     magnitude.yaxis.set_major_locator(LogLocator(subs=_READABLE, numticks=30))
     magnitude.yaxis.set_minor_locator(NullLocator())
-    plain_ticks(magnitude.yaxis)
     phase.set_ylabel("Phase (deg)")
     phase.set_ylim(-190, 190)
     phase.yaxis.set_major_locator(MultipleLocator(90))

@@ -33,7 +33,7 @@ from rigidimeter.analysis.report.curves import (
 from rigidimeter.analysis.report.estimate_points import draw_epochs, draw_pairs, quantities
 from rigidimeter.analysis.report.interval_rows import draw_effects, effects_label, effects_size
 from rigidimeter.analysis.report.points import draw_comparisons, draw_days
-from rigidimeter.analysis.report.style import condition_colours, drawable, styled
+from rigidimeter.analysis.report.style import condition_colours, drawable, plain_ticks, styled
 from rigidimeter.analysis.study import Comparison, StudyResult
 from rigidimeter.core.records import Analysis, Channel, Epoch, Fit
 from rigidimeter.core.words import condition_name, epoch_name, short_names
@@ -86,6 +86,7 @@ def _draw(
     panels: list[Axes], draw: Callable[..., None], arguments: Sequence[Any], title: str
 ) -> None:
     draw(panels, *arguments)
+    plain_ticks(panels)
     if title:
         panels[0].set_title(drawable(title), loc="left")
 

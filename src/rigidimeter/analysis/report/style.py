@@ -23,10 +23,11 @@ from matplotlib.axis import Axis
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import Formatter, LogFormatter, NullFormatter, ScalarFormatter
 from numpy.typing import ArrayLike, NDArray
 
 from rigidimeter.core.files import visible
+from rigidimeter.core.words import tick_labels
 
 Look = dict[str, Any]
 """Arguments of a line or of points, by name."""
@@ -114,6 +115,7 @@ def svg_text(figure: Figure, mark: str = "") -> str:
     with styled():
         if mark:
             figure.suptitle(mark, x=0.995, ha="right", fontsize=8, style="italic", color=WARN)
+        plain_ticks(figure.axes)
         for text in figure.findobj(Text):  # fonts have no control characters, XML forbids them
             if (shown := visible(text.get_text(), lines=True)) != text.get_text():
                 text.set_text(shown)
@@ -215,14 +217,26 @@ def write_at(
     axes.text(x, y, drawable(text), transform=place, fontsize=8, **style)
 
 
-def plain_ticks(*axes: Axis) -> None:
-    """Label the ticks of logarithmic axes with plain numbers."""
+class _Numbers(Formatter):
+    """Labels the ticks of an axis as every number of the page is written."""
 
-    def plain(value: float, _: object) -> str:
-        return np.format_float_positional(value, 4, trim="-", fractional=False)
+    def __call__(self, value: float, pos: int | None = None) -> str:
+        """Return one number."""
+        return self.format_ticks([value])[0]
 
-    for axis in axes:
-        axis.set_major_formatter(FuncFormatter(plain))
+    def format_ticks(self, values: list[float]) -> list[str]:
+        """Return the numbers of all ticks."""
+        scale = self.axis.get_scale() if isinstance(self.axis, Axis) else ""
+        return tick_labels(values, logarithmic=scale == "log")
+
+
+def plain_ticks(panels: Iterable[Axes]) -> None:
+    """Label the ticks that have no names with numbers, without a factor at the end of the axis."""
+    for axes in panels:
+        for axis in (axes.xaxis, axes.yaxis):
+            if isinstance(axis.get_major_formatter(), ScalarFormatter | LogFormatter):
+                axis.set_major_formatter(_Numbers())
+                axis.set_minor_formatter(NullFormatter())
 
 
 def legend_above(axes: Axes) -> None:

@@ -16,6 +16,7 @@ from rigidimeter.core.words.numbers import (
     p_value,
     scaled,
     series,
+    tick_labels,
     with_error,
     within,
 )

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
 SMALLEST_P = 1e-300
 """Below this a p-value has run out of floating point."""
 
 _PLAIN = (0.01, 1e5)
 """Numbers of this size with their errors are written without a power of ten."""
+_PLAIN_TICKS = (1e-4, 1e5)
+"""The same of the numbers along an axis."""
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float, digits: int = 4) -> str:
@@ -18,21 +23,66 @@ def number(value: float, digits: int = 4) -> str:
     Examples
     --------
     >>> number(0.1368), number(12345.6), number(-2.0), number(1.2e-7)
-    ('0.1368', '12346', '−2.000', '1.200e-07')
+    ('0.1368', '12346', '−2.000', '1.200·10⁻⁷')
     """
     if math.isnan(value):
         return "–"
-    sign = "−" if value < 0 else ""
-    size = abs(value)
-    if math.isinf(size):
-        return f"{sign}∞"
-    if size == 0:
+    if math.isinf(value):
+        return "−∞" if value < 0 else "∞"
+    if value == 0:
         return "0"
-    scientific = f"{size:.{digits - 1}e}"
-    exponent = int(scientific.partition("e")[2])
-    if not -4 <= exponent < 6:
-        return sign + scientific
-    return f"{sign}{size:.{max(digits - 1 - exponent, 0)}f}"
+    scientific = f"{value:.{digits - 1}e}"
+    power = int(scientific.partition("e")[2])
+    if not -4 <= power < 6:
+        return _written(scientific)
+    return _written(f"{value:.{max(digits - 1 - power, 0)}f}")
+
+
+def times_ten(power: int) -> str:
+    """Return the power of ten that follows a number, nothing for 10⁰.
+
+    Examples
+    --------
+    >>> times_ten(-3), times_ten(12), times_ten(0)
+    ('·10⁻³', '·10¹²', '')
+    """
+    return f"·10{str(power).translate(_RAISED)}" if power else ""
+
+
+def _written(text: str) -> str:
+    """Return a number of Python's as people write it."""
+    mantissa, _, power = text.partition("e")
+    return f"{mantissa.replace('-', '−')}{times_ten(int(power or 0))}"
+
+
+def tick_labels(values: Sequence[float], *, logarithmic: bool = False) -> list[str]:
+    """Return the numbers along an axis: all to one place, on a logarithmic one each by itself.
+
+    Examples
+    --------
+    >>> tick_labels([-0.5, 0.0, 0.5]), tick_labels([0.0, 2e-6]), tick_labels([10.0, 20.0])
+    (['−0.5', '0.0', '0.5'], ['0', '2·10⁻⁶'], ['10', '20'])
+    >>> tick_labels([1e-8, 2e-5, 0.01, 5.0, 100.0], logarithmic=True)
+    ['10⁻⁸', '2·10⁻⁵', '0.01', '5', '100']
+    """
+    largest = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
+    if logarithmic or not largest:
+        return [_alone(value) for value in values]
+    power = 0 if _PLAIN_TICKS[0] <= largest < _PLAIN_TICKS[1] else math.floor(math.log10(largest))
+    along = [value / 10.0**power for value in values]
+    step = min((b - a for a, b in pairwise(sorted(along)) if b > a), default=1.0)
+    places = next(n for n in range(18) if all(abs(v - round(v, n)) < 1e-3 * step for v in along))
+    return [
+        fixed(value, places) + times_ten(power) if value or not power else "0" for value in along
+    ]
+
+
+def _alone(value: float) -> str:
+    """Return a round number with no more digits than it has."""
+    if not math.isfinite(value) or not value or _PLAIN_TICKS[0] <= abs(value) < _PLAIN_TICKS[1]:
+        return _written(f"{value:.6g}")
+    text = _written(re.sub(r"\.?0*e", "e", f"{value:.5e}"))
+    return re.sub(r"^(−?)1·", r"\1", text)
 
 
 def scaled(size: float, unit: str) -> tuple[float, str]:
@@ -90,13 +140,13 @@ def p_value(p: float, digits: int = 3) -> str:
     Examples
     --------
     >>> p_value(0.0004), p_value(1.234e-6), p_value(0.0496), p_value(0.0), p_value(0.0336, 2)
-    ('0.0004', '1.2e-06', '0.0496', '< 1e-300', '0.034')
+    ('0.0004', '1.2·10⁻⁶', '0.0496', '< 10⁻³⁰⁰', '0.034')
     """
     if math.isnan(p):
         return "–"
     if p < SMALLEST_P:
-        return f"< {SMALLEST_P:.0e}"
-    return f"{p:.{digits}g}" if p >= 1e-4 else f"{p:.1e}"
+        return f"< {_alone(SMALLEST_P)}"
+    return f"{p:.{digits}g}" if p >= 1e-4 else number(p, 2)
 
 
 def p_text(p: float, least: float = 1e-6) -> str:
@@ -105,9 +155,9 @@ def p_text(p: float, least: float = 1e-6) -> str:
     Examples
     --------
     >>> p_text(0.0213), p_text(1e-9), p_text(2e-5, 1e-4)
-    ('p = 0.021', 'p < 1e-06', 'p < 0.0001')
+    ('p = 0.021', 'p < 10⁻⁶', 'p < 0.0001')
     """
-    return f"p = {p:.2g}" if p >= least else f"p < {least:g}"
+    return f"p = {p_value(p, 2)}" if p >= least else f"p < {_alone(least)}"
 
 
 def p_and_r(p: float, r: float) -> str:
@@ -183,17 +233,17 @@ def with_error(value: float, standard_error: float) -> str:
     >>> with_error(0.136801, 8.7e-05), with_error(-1.7031, 0.0996), with_error(12345.6, 234.0)
     ('0.136801 ± 0.000087', '−1.70 ± 0.10', '12350 ± 230')
     >>> with_error(0.004588, 8.1e-06), with_error(1.7, math.nan), with_error(math.nan, math.nan)
-    ('4.5880e-3 ± 0.0081e-3', '1.7', '–')
+    ('(4.5880 ± 0.0081)·10⁻³', '1.7', '–')
     """
     value, standard_error = float(value), float(standard_error)
     if math.isnan(value):
         return "–"
     if not standard_error > 0:
         power = _power_of_ten(value)
-        return _minus(f"{value / 10.0**power:.4g}{f'e{power}' * bool(power)}")
+        return f"{_written(f'{value / 10.0**power:.4g}')}{times_ten(power)}"
     if not 1e-9 * abs(value) < standard_error < math.inf:
-        return _minus(f"{value:.4g} ± {standard_error:.2g}")
-    return " ± ".join(_to_the_error((value, standard_error), standard_error))
+        return f"{_written(f'{value:.4g}')} ± {_written(f'{standard_error:.2g}')}"
+    return _to_the_error((value, standard_error), standard_error, " ± ")
 
 
 def interval_text(low: float, high: float) -> str:
@@ -202,30 +252,26 @@ def interval_text(low: float, high: float) -> str:
     Examples
     --------
     >>> interval_text(1.6704, 1.7372), interval_text(-0.0005, 0.0041), interval_text(math.nan, 1.0)
-    ('1.670 to 1.737', '−0.5e-3 to 4.1e-3', '–')
+    ('1.670 to 1.737', '(−0.5 to 4.1)·10⁻³', '–')
     """
     if not -math.inf < low < high < math.inf:
         return "–"
-    return " to ".join(_to_the_error((low, high), (high - low) / 4))
+    return _to_the_error((low, high), (high - low) / 4, " to ")
 
 
-def _to_the_error(numbers: Sequence[float], error: float) -> Iterable[str]:
+def _to_the_error(numbers: Sequence[float], error: float, joint: str) -> str:
     """Return numbers with one power of ten, to the place of the second digit of an error."""
     power = _power_of_ten(max(map(abs, numbers)))
     place = int(f"{error / 10.0**power:.1e}".partition("e")[2]) - 1
-    times = f"e{power}" if power else ""
     rounded = (round(one / 10.0**power, -place) + 0.0 for one in numbers)
-    return (_minus(f"{one:.{max(-place, 0)}f}{times}") for one in rounded)
+    text = joint.join(_written(f"{one:.{max(-place, 0)}f}") for one in rounded)
+    return f"({text}){times_ten(power)}" if power else text
 
 
 def _power_of_ten(number: float) -> int:
     size = abs(number)
     plain = not size or math.isinf(size) or _PLAIN[0] <= size < _PLAIN[1]
     return 0 if plain else 3 * math.floor(math.log10(size) / 3)
-
-
-def _minus(text: str) -> str:
-    return text.replace("-", "−", 1) if text.startswith("-") else text
 
 
 def format_number(value: float, spec: str = ".2g", *, limit: float = math.nan) -> str:
@@ -236,7 +282,7 @@ def format_number(value: float, spec: str = ".2g", *, limit: float = math.nan) -
     Examples
     --------
     >>> [format_number(x, "+.2g") for x in (104.2, 7.36, -290.0, 2e-9)]
-    ['+104', '+7.4', '-290', '+2e-09']
+    ['+104', '+7.4', '−290', '+2·10⁻⁹']
     >>> format_number(15.2, limit=15.0), format_number(99.98, ".0f", limit=100.0)
     ('15.2', '99.98')
     """
@@ -246,7 +292,7 @@ def format_number(value: float, spec: str = ".2g", *, limit: float = math.nan) -
             break
         text = format(value, f".{digits}g")
     whole = "e+" in text and abs(value) < 1e6
-    return format(value, f"{'+' if '+' in spec else ''}.0f") if whole else text
+    return _written(format(value, f"{'+' if '+' in spec else ''}.0f") if whole else text)
 
 
 class Shown(float):
@@ -256,5 +302,4 @@ class Shown(float):
 
     def __format__(self, spec: str) -> str:
         """Return it rounded as `spec` says."""
-        text = format_number(float(self), spec or ".3g", limit=self.limit)
-        return text if "e" in text else text.replace("-", "−")
+        return format_number(float(self), spec or ".3g", limit=self.limit)

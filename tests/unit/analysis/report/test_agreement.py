@@ -35,7 +35,8 @@ from rigidimeter.cli.estimate_text import estimate_blocks
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
 from rigidimeter.core.files import read_json, write_json
 
-NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:e[+-]\d+)?")
+NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:·10[⁻⁰-⁹¹²³]+)?")
+LOWERED = str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789")
 PARAMETERS = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
 DRAWN = ("distributions", "days", "perturbation", "torque", "voluntary", "loops", "impedance")
 
@@ -43,7 +44,7 @@ Row = dict[str, str]
 
 
 def numbers(text: str) -> list[float]:
-    return [float(found.replace("−", "-")) for found in NUMBER.findall(text)]
+    return [float(found.replace("·10", "e").translate(LOWERED)) for found in NUMBER.findall(text)]
 
 
 def assert_shows(text: str, values: Sequence[float | None], digits: int) -> None:

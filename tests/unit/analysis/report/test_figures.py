@@ -1,12 +1,14 @@
 """Figures from arrays: complete, labelled, alike each time, and without trace."""
 
 import dataclasses
+import re
 from typing import Any
 from xml.etree import ElementTree as ET
 
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rigidimeter.analysis.estimation import epoch_signals, scoring_cycles
@@ -231,3 +233,28 @@ def test_a_channel_on_a_late_clock_is_drawn_from_its_origin() -> None:
     late = dataclasses.replace(PRBS, time_s=1.7e9 + STAMPS)
     above, _ = drawn(SIZE, draw_perturbation, late, 1.7e9, rows=2).axes
     assert above.get_xlim() == (0.0, 7.0)
+
+
+def tick_texts(*sizes: float, scale: str = "linear") -> list[str]:
+    def draw(panels: list[Axes]) -> None:
+        panels[0].plot(range(len(sizes)), sizes)
+        panels[0].set_yscale(scale)
+        panels[0].set_xticks([0], ["one"])
+
+    svg = svg_text(drawn((3.0, 3.0), draw))
+    return re.findall(r">([^<>]+)</text>", svg)
+
+
+def test_ticks_are_written_as_all_numbers_of_the_page_are() -> None:
+    assert tick_texts(-0.5, 0.5) == ["one", "−0.4", "−0.2", "0.0", "0.2", "0.4"]
+    # No factor or offset stands at the end of the axis.
+    assert tick_texts(4.49999, 4.50001)[1:4] == ["4.4999900", "4.4999925", "4.4999950"]
+    assert {"0", "0.5·10⁻⁶", "1.0·10⁻⁶"} <= set(tick_texts(0.0, 4e-6))
+    assert tick_texts(1e-8, 100.0, scale="log")[1:] == [
+        "10⁻⁸",
+        "10⁻⁶",
+        "0.0001",
+        "0.01",
+        "1",
+        "100",
+    ]

@@ -13,8 +13,8 @@ from rigidimeter.core.words import number, p_and_r, p_value, short_names
         (1234.5678, "1235"),
         (99999.7, "100000"),
         (-0.25, "−0.2500"),
-        (1e9, "1.000e+09"),
-        (3.2e-6, "3.200e-06"),
+        (1e9, "1.000·10⁹"),
+        (3.2e-6, "3.200·10⁻⁶"),
         (0.0, "0"),
         (-0.0, "0"),
         (math.nan, "–"),
@@ -33,9 +33,9 @@ def test_numbers_have_four_significant_digits(value: float, text: str) -> None:
         (0.04961, "0.0496"),
         (0.0004, "0.0004"),
         (1e-4, "0.0001"),
-        (1.23e-6, "1.2e-06"),
-        (5e-324, "< 1e-300"),
-        (0.0, "< 1e-300"),
+        (1.23e-6, "1.2·10⁻⁶"),
+        (5e-324, "< 10⁻³⁰⁰"),
+        (0.0, "< 10⁻³⁰⁰"),
         (math.nan, "–"),
     ],
 )
@@ -44,7 +44,7 @@ def test_p_is_never_printed_as_zero(p: float, text: str) -> None:
 
 
 def test_p_and_r_do_not_break_over_lines() -> None:
-    assert p_and_r(0.0, -0.5) == "p < 1e-300, r\xa0=\xa0−0.50"
+    assert p_and_r(0.0, -0.5) == "p < 10⁻³⁰⁰, r\xa0=\xa0−0.50"
 
 
 def test_short_names_tell_sources_apart() -> None:

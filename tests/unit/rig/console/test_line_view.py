@@ -85,7 +85,7 @@ def test_the_status_says_where_the_run_is_and_why_it_stands():
     assert "|  -1.50 N·m (drive +2.25)" in status_line(facts(PLAN, progress, loop, (), reports))
     assert "live" not in line(loop, [LiveEstimate()])
     known = [estimate(0.1 * k, epoch=1) for k in range(1, 100)]
-    assert "epoch 1, live: J 4.500e-3 ± 0.020e-3 kg·m², B" in line(loop, known)
+    assert "epoch 1, live: J (4.500 ± 0.020)·10⁻³ kg·m², B" in line(loop, known)
     wild = LiveEstimate(5, 0, 0, 1, 0.0, 0.2, 0.4701, 0.1, -341.779, 99.0, 75761.14, 9e3, 0.2)
     assert "live" not in line(loop, [wild])
     stopped = loop._replace(epoch=-1, missed_ticks=4, cause=int(Cause.STALLED))

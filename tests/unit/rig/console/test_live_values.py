@@ -50,7 +50,7 @@ def test_a_value_is_shown_with_its_interval_once_it_means_something():
     assert all(value.settled for value in (J, B, K))
     assert K.half_width == pytest.approx(1.96 * 0.02, rel=1e-4)
     assert K.text == "K 1.700 ± 0.039 N·m/rad"
-    assert J.text == "J 4.500e-3 ± 0.020e-3 kg·m²"
+    assert J.text == "J (4.500 ± 0.020)·10⁻³ kg·m²"
     assert B.text == "B 0.1370 ± 0.0020 N·m·s/rad"
 
 
