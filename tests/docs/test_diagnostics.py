@@ -22,7 +22,7 @@ def test_every_check_has_its_row_and_no_other_has() -> None:
     names = [name for name in names if KINDS[name] not in STUDY_KINDS]
     assert sorted(names) == sorted(DiagnosticLevels.model_fields)
     # Some are found where epochs are fitted; `between_samples` there and by a check.
-    of_fits = ["lack_of_fit", "band_sensitivity", "varying_between_epochs"]
+    of_fits = ["lack_of_fit", "band_sensitivity", "varying_between_epochs", "differs_from_estimate"]
     assert sorted(names) == sorted([*(check.name for check in CHECKS), *of_fits])
 
 

@@ -124,3 +124,30 @@ def test_the_checks_of_an_estimate_are_shown(rigidimeter, joint, tmp_path):
     assert "residual_whiteness" in [finding["name"] for finding in epoch["findings"]]
     headline = epoch["findings"][0]["headline"]
     assert f"{epoch['findings'][0]['name']} {headline}" in " ".join(ran.out.split())
+
+
+def test_j_b_and_k_that_differ_from_an_estimate_ask_for_caution(rigidimeter, simulate, tmp_path):
+    """Of a relaxed joint J is 0.8 % low: torque at a tick misses part of the acceleration."""
+    rig = {"tick_rate_hz": 1000.0, "torque": {"rate_hz": 1000.0}, "motion": {"rate_hz": 1000.0}}
+    session = simulate(rig=rig, prbs={"duration_s": 8.0})
+    ran = rigidimeter("model", session, "--json", tmp_path / "m.json")
+    assert ran.status == 0, ran.err
+    (epoch,) = json.loads((tmp_path / "m.json").read_text())["epochs"]
+    found = {one["name"]: one for one in epoch["findings"]}
+    J, B, K = found["differs_from_estimate"]["effect"]["percent"]
+    assert pytest.approx(-0.8, abs=0.2) == J
+    assert max(abs(B), abs(K)) < 0.2
+    assert "caution differs_from_estimate Least squares gives J −0.8" in " ".join(ran.out.split())
+
+
+def test_a_subject_who_pushes_is_refused_where_the_perturbation_is_recorded(
+    rigidimeter, simulate, tmp_path
+):
+    session = simulate(subject={"OFF": {"voluntary_sd_nm": 0.3}})
+    ran = rigidimeter("model", session)
+    assert ran.status == 1
+    assert "voluntary_torque: " in ran.err
+    assert "use `rigidimeter estimate`, which it does not bias" in ran.err
+    assert "inertia" not in ran.out
+    ran = rigidimeter("model", session, "--compare", "--terms", "inertia,damping,stiffness")
+    assert "caution voluntary_torque" in " ".join(ran.out.split())

@@ -1,4 +1,9 @@
-"""Torque models of one epoch, behind the checks that an estimate of it has to pass."""
+"""Torque models of one epoch, behind the checks that an estimate of it has to pass.
+
+Terms are fitted by least squares of the measured motion, which torque of the subject's own biases
+in a closed loop, and which do not know how the joint moved between the samples. `estimate` has
+neither fault where the perturbation was recorded, so what J, B and K alone come to is compared.
+"""
 
 from __future__ import annotations
 
@@ -6,25 +11,37 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from rigidimeter.analysis.estimation.bandlimited import band_hz
 from rigidimeter.analysis.estimation.diagnostics import checked
-from rigidimeter.analysis.estimation.methods import method_named
+from rigidimeter.analysis.estimation.found import found, half_widths
+from rigidimeter.analysis.estimation.methods import choose_method, method_named
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
-from rigidimeter.analysis.estimation.signals import usable_hz
+from rigidimeter.analysis.estimation.signals import Signals, usable_hz
 from rigidimeter.analysis.estimation.stretches import longest_part
 from rigidimeter.analysis.estimation.terms import (
     Comparison,
     compare_models,
     fit_model,
     fit_models,
+    fit_terms,
     wideband_signals,
 )
-from rigidimeter.core.findings import Finding
+from rigidimeter.core.findings import Effect, Finding
 from rigidimeter.core.records import Fit
 
 REFUSING = ("conditioning",)
 """Checks that forbid a choice of terms though an estimate only needs caution: where J, B
 and K cannot be told apart, further terms cannot either."""
+
+JOINT = ("inertia", "damping", "stiffness")
+
+OF_SUBJECT = ("voluntary_torque", "active_movement", "tremor")
+"""Checks that find torque of the subject's own."""
+
+APART_PERCENT = 100.0
+"""Of half the estimate's 95 % interval."""
 
 
 class EpochModels(NamedTuple):
@@ -61,7 +78,9 @@ def model_epoch(
     Raises
     ------
     ValueError
-        If the epoch cannot be used; the text says why.
+        If the epoch cannot be used; the text says why. So it is where the subject pushed and
+        `estimate` has the recorded perturbation, unless models are compared: that is by what no
+        linear loop explains.
     """
     band = _band_hz(prepared, high_hz)
     epoch, estimation = prepared.epoch, prepared.settings.estimation
@@ -69,15 +88,56 @@ def model_epoch(
     # models that are.
     (fit,), _ = method_named("bandlimited").fit([prepared], None, lambda _: None, False)
     fit = checked(prepared, fit, by_noise=False)
+    method, _ = choose_method([prepared])
+    pushed = [one for one in fit.findings if one.name in OF_SUBJECT and one.level != "note"]
+    if pushed and not compare and method_named(method).uses_perturbation:
+        raise ValueError(
+            f"{pushed[0].name}: {pushed[0].headline}. Least squares, which fits the terms, would "
+            "take that for the joint; use `rigidimeter estimate`, which it does not bias where the "
+            "perturbation was recorded, or epochs of a relaxed subject"
+        )
     motion = wideband_signals(longest_part(epoch), band[1])
+    findings = (*_against_estimate(prepared, motion, method), *fit.findings)
     if not compare:
         fitted = fit_models(motion, models, band, estimation.trim_s)
-        return EpochModels(band, fitted, fit.findings)
+        return EpochModels(band, fitted, findings)
     compared = compare_models(motion, models, band, estimation.trim_s, grow=grow)
     refused = _refused(fit)
     if refused and compared.recommended is not None:
         compared = replace(compared, recommended=None, reason=refused)
-    return EpochModels(band, compared, fit.findings)
+    return EpochModels(band, compared, findings)
+
+
+def _against_estimate(prepared: PreparedEpoch, motion: Signals, method: str) -> list[Finding]:
+    """Return by how much J, B and K alone differ from `estimate`, if by more than its interval.
+
+    Both in one band: what the joint has beside J, B and K, as a reflex, then moves both alike.
+    """
+    band, trim_s = _band_hz(prepared, None), prepared.settings.estimation.trim_s
+    highs = ("band_high_hz", "band_high_unknown_hz", "band_high_closed_loop_hz")
+    estimation = prepared.settings.estimation.model_copy(update=dict.fromkeys(highs, band[1]))
+    settings = prepared.settings.model_copy(update={"estimation": estimation})
+    in_band = replace(prepared, settings=settings)
+    (own,), _ = method_named(method).fit([in_band], None, lambda _: None, False)
+    try:
+        alone = fit_terms(motion, JOINT, band, trim_s)
+    except ValueError:
+        return []  # the checks of the fit say why
+    values, half = np.array([one.value for one in alone.parameters]), half_widths(own)
+    percent = 100.0 * float(np.max(np.abs(values - own.value) / half))
+    if not percent > APART_PERCENT:
+        return []
+    effect = Effect.of(values - own.value, values, half)
+    return [
+        found(
+            "differs_from_estimate",
+            settings.diagnostics,
+            percent,
+            APART_PERCENT,
+            effect=effect,
+            facts={"method": method},
+        )
+    ]
 
 
 def clock_of_models(

@@ -167,7 +167,7 @@ FIT_KINDS = (
         "gravity",
         "K without the slope m g l cos θ of the limb's weight, in N·m/rad, beside K itself; m g l "
         "is `gravity_nm`, and θ the angle from hanging straight down, `gravity_angle_deg` where "
-        "the recorded angle is 0. Not looked at while `gravity_nm` is 0",
+        "the recorded angle is 0. Not looked at while `gravity_nm` is 0, as for a vertical `axis`",
         headline="K without the limb's weight is {value:.4g} N·m/rad",
         measured="K of {stiffness:.4g} N·m/rad includes {slope:.4g} of the limb's weight (m g l "
         "cos θ).",

@@ -63,7 +63,8 @@ def test_a_motion_that_cannot_tell_j_from_k_gets_no_recommendation():
 def test_a_subject_who_pushes_asks_for_caution_with_models_though_iv_would_not_be_biased():
     """Least squares fits the models: what the subject's torque does to them is not harmless."""
     prepared = prepared_of(subject={"voluntary_nm": 0.2})
-    findings = {one.name: one for one in model_epoch(prepared, [JBK]).findings}
+    compared = model_epoch(prepared, [JBK], compare=True)
+    findings = {one.name: one for one in compared.findings}
     assert findings["voluntary_torque"].level == "caution"
     assert "loop_bias" in findings
     assert not any("not biased" in one.details for one in findings.values())
