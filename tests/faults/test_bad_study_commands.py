@@ -134,6 +134,43 @@ def test_one_offset_a_day_decides_nothing_and_that_is_said(compared, study) -> N
     ]
 
 
+def test_a_study_that_declared_nothing_keeps_the_family_of_an_earlier_comparison(
+    compared, study
+) -> None:
+    _, found = compared()
+    assert found["primary"]["source"] == "default"
+    assert found["primary"]["measures"] == ["stiffness_nm_rad", "damping_nm_s_rad"]
+    kept = study / "analysis/comparison.json"
+    assert compared()[1]["primary"] == found["primary"]
+    kept.write_text(json.dumps({name: x for name, x in found.items() if name != "primary"}))
+    for _ in range(2):  # also the next comparison
+        ran, again = compared()
+        assert "all measures stay one family by Holm's method, J among them" in ran.err
+        assert again["primary"]["source"] == "earlier comparison"
+        assert {row["role"] for row in again["conclusion"]} == {"primary"}
+        assert {row["adjusted_for"] for row in again["conclusion"]} == {len(again["conclusion"])}
+    with (study / "study.toml").open("a") as file:
+        file.write('\n[primary]\nmeasures = ["work_j", "impulse_nm_s"]\nrule = "sequence"\n')
+    ran, declared = compared()
+    assert "family" not in ran.err
+    assert declared["primary"]["source"] == "study.toml"
+    rows = {row["measure"]: row for row in declared["conclusion"]}
+    assert rows["work_j"]["p_holm"] == rows["work_j"]["p"]
+    assert rows["impulse_nm_s"]["p_holm"] == max(rows[n]["p"] for n in ("work_j", "impulse_nm_s"))
+    assert rows["rating"]["role"] == "secondary"
+
+
+@pytest.mark.parametrize(("day", "late"), [("2026-03-01", False), ("2026-03-02", True)])
+def test_a_declaration_after_the_first_recording_is_said(compared, study, edit, day, late) -> None:
+    edit(study / "sessions.csv", "M1,1,", "M1,2026-03-01,")
+    with (study / "study.toml").open("a") as file:
+        file.write(f"\n[primary]\ndeclared = {day}\n")
+    ran, found = compared()
+    assert ("declared on 2026-03-02, after the first recording, of 2026-03-01" in ran.err) is late
+    assert found["primary"]["declared"] == day
+    assert found["primary"]["declared_after_first_recording"] is late
+
+
 def test_the_comparison_as_json_is_the_kept_one(compared, study, tmp_path) -> None:
     _, found = compared("--json", tmp_path / "out.json")
     assert json.loads((tmp_path / "out.json").read_text()) == found

@@ -140,6 +140,7 @@ def _study_toml(design: StudyDesign, seed: int) -> str:
             for one in design.conditions
         },
         "rating": {"scale": design.rating_scale, "step": design.rating_step},
+        "primary": PrimaryTable().model_dump(),
     }
     return "\n".join([*comments, "", toml_text(described)])
 

@@ -79,10 +79,6 @@ class DayDifference:
     unit: str = "day"
     weights: DayWeights = field(default=({}, {}), repr=False)
 
-    def least_shown(self, level: float) -> float:
-        """Return how many standard errors a difference has whose p is this level."""
-        return float(scipy.stats.t.isf(level / 2, self.df))
-
 
 def day_difference(
     x: ArrayLike,

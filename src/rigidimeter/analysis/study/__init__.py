@@ -27,6 +27,7 @@ from rigidimeter.analysis.study.difference_rows import (
     difference_rows,
 )
 from rigidimeter.analysis.study.differences import Difference
+from rigidimeter.analysis.study.families import Primary
 from rigidimeter.analysis.study.measures import RATING, Measure, Observation, conditions
 from rigidimeter.analysis.study.provenance import provenance
 from rigidimeter.analysis.study.rating_relation import Relation, agreement, relations

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from rigidimeter.analysis.reading import estimates_document
+from rigidimeter.analysis.study.families import ANALYSIS, COMPARISON
 from rigidimeter.analysis.study.measures import RATING
 from rigidimeter.analysis.study.results import StudyResult
 from rigidimeter.analysis.study.study_analysis import StudyRead
@@ -30,9 +31,8 @@ from rigidimeter.core.settings import dump_settings, with_new_names
 from rigidimeter.core.version import __version__
 
 INPUTS_SCHEMA = "rigidimeter.study-inputs/1"
-ANALYSIS = "analysis"
 UNCHANGED = "nothing has changed since the last analysis"
-INPUTS, COMPARISON = "inputs.json", "comparison.json"
+INPUTS = "inputs.json"
 
 _SHOWN = 12
 _TABLES = ("conclusion", "precision", "comparisons", "days", "effect_differences", "ratings",

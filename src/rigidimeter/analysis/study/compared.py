@@ -57,7 +57,7 @@ class Comparison:
     days : DayDifference or None
         The test in which days count, not epochs; None where days are not known.
     days_p_holm : float
-        p of `days`, adjusted by Holm's method for all measures tested by days.
+        p of `days`, adjusted in its family (`families`).
     day_medians : tuple of DayMedian
     """
 

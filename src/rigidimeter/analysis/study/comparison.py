@@ -27,6 +27,7 @@ from rigidimeter.analysis.statistics import (
     two_groups,
 )
 from rigidimeter.analysis.study.compared import Comparison, DayMedian
+from rigidimeter.analysis.study.families import Primary, adjusted
 from rigidimeter.analysis.study.measures import MEASURES, Measure, Observation, conditions
 from rigidimeter.analysis.study.provenance import provenance
 from rigidimeter.analysis.study.results import EffectPair, SessionEntry, StudyResult
@@ -257,23 +258,26 @@ def rank_test(comparison: Comparison) -> Comparison:
 
 
 def day_tests(
-    comparisons: Sequence[Comparison], ready: Mapping[str, DayDifference] | None = None
+    comparisons: Sequence[Comparison],
+    ready: Mapping[str, DayDifference] | None = None,
+    primary: Primary = Primary(),  # noqa: B008
 ) -> tuple[Comparison, ...]:
-    """Return paired comparisons with their tests by days, adjusted for all of them, and medians.
+    """Return paired comparisons with their tests by days, adjusted in their families, and medians.
 
     `ready` holds tests that were made elsewhere, by measure: that of the ratings. A comparison that
     has its test keeps it.
     """
     ready = ready or {}
-    found = [
-        each.days or ready.get(each.measure.name) or day_test(each)
-        for each in comparisons
-        if each.paired
-    ]
-    adjusted = iter(zip(found, holm([each.p for each in found]), strict=True))
+    paired = [each for each in comparisons if each.paired]
+    found = [each.days or ready.get(each.measure.name) or day_test(each) for each in paired]
+    families = adjusted(
+        [(each.measure, each.other, days.p) for each, days in zip(paired, found, strict=True)],
+        primary,
+    )
+    tests = iter(zip(found, families, strict=True))
     done = []
     for each in comparisons:
-        days, p = next(adjusted) if each.paired else (None, math.nan)
+        days, (p, _) = next(tests) if each.paired else (None, (math.nan, None))
         medians = () if each.measure.name in ready else _day_medians(each)
         done.append(replace(each, days=days, days_p_holm=p, day_medians=medians))
     return tuple(done)

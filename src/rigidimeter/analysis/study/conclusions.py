@@ -1,7 +1,14 @@
 """What a comparison of two conditions shows of each measure, and what it does not.
 
-A difference is shown where p of the test (`tested`), adjusted by Holm's method for the measures, is
-below the level, and nothing that is known of the recordings can have made it (`objections`).
+A difference is shown where p of the test (`tested`), adjusted in its family (`families`), is below
+the level, and nothing that is known of the recordings can have made it (`objections`). That none of
+the size that is worth finding is shown is concluded where the test had a chance of one half to show
+it, and its interval excludes it:
+
+    half the interval at the level of the first test of the family ≤ size
+    the 95 % interval lies within ± size
+
+Otherwise it cannot be decided, and `deciding` finds what would decide it.
 """
 
 from __future__ import annotations
@@ -10,31 +17,25 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from rigidimeter.analysis.statistics import holm
 from rigidimeter.analysis.study.compared import Comparison, measure_names
+from rigidimeter.analysis.study.deciding import Needed, needed
 from rigidimeter.analysis.study.differences import Difference, simulated_difference
+from rigidimeter.analysis.study.families import CHECK, Family, Role, adjusted
 from rigidimeter.analysis.study.objections import (
     hidden,
     negligible,
     objections,
-    too_few,
+    wide,
     without_test,
 )
 from rigidimeter.analysis.study.results import StudyResult
 from rigidimeter.analysis.study.sensitivity import method_caveats
-from rigidimeter.analysis.study.tested import LEVEL, Basis, basis_of, tested
-from rigidimeter.core.findings import Finding
-from rigidimeter.core.records import PARAMETERS, FindingGroup
+from rigidimeter.analysis.study.tested import LEVEL, Basis, Test, basis_of, tested
+from rigidimeter.core.findings import Finding, found_between
+from rigidimeter.core.records import FindingGroup
 from rigidimeter.core.words import series, within
-from rigidimeter.planning import ASSUMED, day_difference_sd, pairs_needed
 
 Verdict = Literal["lower", "higher", "no difference shown", "not supported", "cannot be decided"]
-
-WANTED = 0.2
-"""The difference, as a share of the reference."""
-
-_MIN_EPOCHS = 3
-"""With fewer epochs of a condition their scatter is the assumed one."""
 
 
 @dataclass(frozen=True)
@@ -45,18 +46,27 @@ class Conclusion:
     ----------
     comparison : Comparison
     verdict : str
-        ``lower``, ``higher``, ``no difference shown``, ``not supported`` (one was found and
-        something else may have made it) or ``cannot be decided``.
-    p : float
-        Of the test, adjusted for the measures; NaN without one.
-    finding : Finding or None
-        The reason; None where the test is the whole reason.
+        ``lower``, ``higher``, ``no difference shown`` (of the size that is worth finding), ``not
+        supported`` (one was found and something else may have made it) or ``cannot be decided``.
     difference : Difference
         With both values, and the intervals of the measurement and of the test.
+    family : Family
+        The tests that p is adjusted for.
+    p : float
+        Of the test, adjusted in its family; NaN without one.
+    half_width : float
+        Half the interval at the level of the first test of the family, in the unit of the measure;
+        NaN without a test.
+    wanted_percent : float
+        The smallest difference worth finding, of the reference.
+    finding : Finding or None
+        The reason; None where the test is the whole reason.
+    caution : Finding or None
+        What stands beside the verdict: that the inertia differs.
     test : str
         The test in words, such as ``paired t-test of 5 days``; empty without one.
-    days_to_decide : int or None
-        Where there are too few days: how many would show a difference of 20 %.
+    needed : Needed or None
+        What would decide, where it cannot be decided.
     simulated : Difference or None
         What a virtual study simulated.
     """
@@ -64,25 +74,33 @@ class Conclusion:
     comparison: Comparison
     verdict: Verdict
     difference: Difference
+    family: Family
     p: float = math.nan
+    half_width: float = math.nan
+    wanted_percent: float = math.nan
     finding: Finding | None = None
-    simulated: Difference | None = None
+    caution: Finding | None = None
     test: str = ""
-    days_to_decide: int | None = None
+    needed: Needed | None = None
+    simulated: Difference | None = None
 
     @property
     def reason(self) -> str:
         """The headline of the finding as a clause; empty without one."""
         return "" if self.finding is None else within(self.finding.headline)
 
+    @property
+    def role(self) -> Role:
+        """Whether the measure is primary, secondary, or the check of the instrument."""
+        return self.family.role
+
 
 @dataclass(frozen=True)
 class Conclusions:
-    """The conclusions on all measures, what was tested, and how many tests p is adjusted for."""
+    """The conclusions on all measures, and what was tested."""
 
     basis: Basis
     each: tuple[Conclusion, ...]
-    adjusted_for: int = 0
 
     def of(self, *verdicts: Verdict) -> tuple[Conclusion, ...]:
         """Return those with one of these verdicts."""
@@ -100,6 +118,11 @@ class Conclusions:
         """The number of measures that were tested."""
         return sum(not math.isnan(one.p) for one in self.each)
 
+    @property
+    def adjusted(self) -> bool:
+        """Whether p of a measure is adjusted for other tests."""
+        return any(one.family.tests > 1 for one in self.each)
+
 
 def conclude(result: StudyResult) -> Conclusions | None:
     """Return what is concluded of each measure; None where no two conditions were compared."""
@@ -109,66 +132,79 @@ def conclude(result: StudyResult) -> Conclusions | None:
     basis = basis_of(compared)
     tests = [tested(c, basis) for c in compared]
     # Of each other condition with the reference: p is adjusted for these as well.
-    p_further = [tested(c, basis).p for c in result.further if c.paired]
-    adjusted = holm([*(test.p for test in tests), *p_further])[: len(tests)]
-    with_p = sum(not math.isnan(p) for p in (*(test.p for test in tests), *p_further))
+    every = [*tests, *(tested(c, basis) for c in result.further if c.paired)]
+    families = adjusted(
+        [(one.comparison.measure, one.comparison.other, one.p) for one in every], result.primary
+    )
+    own = list(zip(tests, families, strict=False))
     moved = next(
         (
             test.comparison
-            for test, p in zip(tests, adjusted, strict=True)
-            if test.comparison.measure.name == "inertia_kg_m2"
+            for test, (p, _) in own
+            if test.comparison.measure.name == CHECK
             and p < LEVEL
             and not negligible(test.comparison, result)
         ),
         None,
     )
-    found = []
-    for test, p in zip(tests, adjusted, strict=True):
-        c = test.comparison
-        verdict: Verdict
-        why: Finding | None
-        if math.isnan(p):
-            verdict, why = "cannot be decided", without_test(c, result, test.remark)
-        elif p < LEVEL and (why := negligible(c, result)):
-            verdict = "no difference shown"
-        elif p < LEVEL:
-            why = next(objections(test, basis, result, moved), None)
-            verdict = "not supported" if why else "lower" if test.sign < 0 else "higher"
-        elif basis == "values" and (why := too_few(c, with_p)):
-            verdict = "cannot be decided"
-        else:
-            verdict, why = "no difference shown", hidden(c, result, with_p)
-        simulated = simulated_difference(c, result.conditions)
-        wanted = days_to_decide(c) if math.isnan(p) else None
-        found.append(Conclusion(c, verdict, test.difference, p, why, simulated, test.words, wanted))
+    found = [_concluded(test, p, family, basis, result, moved) for test, (p, family) in own]
+    if moved is not None:
+        (why,) = (one.finding for one in found if one.comparison is moved)
+        found = [_beside(one, why) for one in found]
     ordered = tuple(sorted(found, key=lambda one: one.comparison.measure.place))
-    return Conclusions(basis, ordered, with_p)
+    return Conclusions(basis, ordered)
 
 
-def days_to_decide(c: Comparison) -> int | None:
-    """Return how many days with both conditions would show a difference of `WANTED`.
+def _concluded(
+    test: Test,
+    p: float,
+    family: Family,
+    basis: Basis,
+    result: StudyResult,
+    moved: Comparison | None,
+) -> Conclusion:
+    c, level = test.comparison, family.level(LEVEL)
+    percent = result.primary.table.difference_percent
+    wanted = percent / 100.0 * abs(test.difference.reference)
+    half = test.half_width(level)
+    verdict: Verdict = "cannot be decided"
+    why: Finding | None
+    if math.isnan(p):
+        why = without_test(c, result, test.remark)
+    elif p < LEVEL and (why := negligible(c, result)):
+        verdict = "no difference shown"
+    elif p < LEVEL:
+        why = next(objections(test, basis, result, moved), None)
+        verdict = "not supported" if why else "lower" if test.sign < 0 else "higher"
+    elif family.rule == "sequence" and test.p * family.first < LEVEL:
+        before = result.primary.before(c.measure)
+        why = found_between("earlier_in_sequence", {"before": before}, test.p)
+    elif half <= wanted and max(abs(test.difference.low), abs(test.difference.high)) < wanted:
+        verdict, why = "no difference shown", hidden(c, result)
+    else:
+        why = hidden(c, result) or wide(test, family, half, percent)
+    return Conclusion(
+        comparison=c,
+        verdict=verdict,
+        difference=test.difference,
+        family=family,
+        p=p,
+        half_width=half,
+        wanted_percent=percent,
+        finding=why,
+        test=test.words,
+        needed=needed(test, wanted, level) if verdict == "cannot be decided" else None,
+        simulated=simulated_difference(c, result.conditions),
+    )
 
-    The SD of the difference of one day is that of `rigidimeter.planning.days_needed`, with the
-    scatter between epochs of these recordings and the scatter of days that is assumed there, since
-    a single day does not show it. With as many epochs a day as there are, at a power of 0.8 and a
-    level of 0.05 for this measure alone. None for other measures than J, B and K, and where a
-    condition has no epoch.
-    """
-    title = {parameter.name: parameter.title for parameter in PARAMETERS}.get(c.measure.name)
-    each = [c.of(name) for name in c.pair]
-    if title is None or c.measure.origin != "fits" or not all(each):
-        return None
-    values = [math.fsum(o.value for o in own) / len(own) for own in each]
-    days = [len({(o.subject, o.day, o.source) for o in own}) for own in each]
-    epochs = [max(round(len(own) / n), 1) for own, n in zip(each, days, strict=True)]
-    scatter = ASSUMED[title]
-    if min(map(len, each)) >= _MIN_EPOCHS:
-        sd_percent = max(c.summaries[name].sd_percent for name in c.pair)
-        scatter = replace(scatter, between_epochs_percent=sd_percent)
-    if min(values) <= 0:
-        return None
-    sd = day_difference_sd(scatter, (values[0], values[1]), (0.0, 0.0), (epochs[0], epochs[1]))
-    return pairs_needed(WANTED * values[0], sd)
+
+def _beside(one: Conclusion, moved: Finding | None) -> Conclusion:
+    """Return a conclusion with the caution that the inertia differs, unless that is its reason."""
+    same = moved is None or (one.finding is not None and one.finding.name == moved.name)
+    fits = one.comparison.measure.origin == "fits" and one.comparison.measure.name != CHECK
+    if same or not fits or one.verdict == "not supported":
+        return one
+    return replace(one, caution=moved)
 
 
 def reasons(result: StudyResult) -> tuple[FindingGroup, ...]:
@@ -177,8 +213,9 @@ def reasons(result: StudyResult) -> tuple[FindingGroup, ...]:
     for pair in (result, *result.further_pairs):
         concluded = conclude(pair)
         for one in () if concluded is None else concluded.each:
-            if one.finding is not None:
-                found.setdefault(one.finding, []).append(one.comparison.measure.short)
+            for why in (one.finding, one.caution):
+                if why is not None:
+                    found.setdefault(why, []).append(one.comparison.measure.short)
     return tuple(
         FindingGroup(finding, (), series(list(dict.fromkeys(measures))))
         for finding, measures in found.items()
@@ -196,11 +233,17 @@ def conclusion_rows(result: StudyResult) -> list[dict[str, Any]]:
             "verdict": one.verdict,
             **one.difference.row(),
             "p_holm": one.p,
+            "role": one.role,
+            "adjusted_for": one.family.tests,
+            "level": one.family.level(LEVEL),
+            "half_width": one.half_width,
+            "wanted_percent": one.wanted_percent,
             "tested_by": concluded.basis,
             "test": one.test,
             "reason": one.reason,
             "finding": "" if one.finding is None else one.finding.name,
-            "days_to_decide": one.days_to_decide,
+            "caution": "" if one.caution is None else within(one.caution.headline),
+            **_needed(one.needed),
             "caveat": caveats.get(one.comparison.measure.name, ""),
             **(
                 {}
@@ -217,3 +260,12 @@ def conclusion_rows(result: StudyResult) -> list[dict[str, Any]]:
         if concluded is not None
         for one in concluded.each
     ]
+
+
+def _needed(found: Needed | None) -> dict[str, Any]:
+    of_days = found is not None and found.unit == "day"
+    return {
+        "days_to_decide": found.number if found is not None and of_days else None,
+        "units_to_decide": None if found is None else found.number,
+        "unit_to_decide": "" if found is None else found.unit,
+    }

@@ -41,7 +41,7 @@ def difference_cells(result: StudyResult) -> tuple[tuple[str, ...], list[tuple[s
     concluded = conclude(result)
     rows = [] if concluded is None else difference_rows(concluded)
     virtual = any(row.simulated for row in rows)
-    holm = "p, Holm" if concluded is not None and concluded.adjusted_for > 1 else "p"
+    holm = "p, Holm" if concluded is not None and concluded.adjusted else "p"
     reference, other = condition_name(result.reference), condition_name(result.other)
     headings = ("", reference, other, f"{other} − {reference}", "simulated" if virtual else "",
                 "95 % interval", "" if virtual else holm, "difference")  # fmt: skip
@@ -59,7 +59,8 @@ def difference_cells(result: StudyResult) -> tuple[tuple[str, ...], list[tuple[s
 def difference_rows(concluded: Conclusions) -> list[DifferenceRow]:
     """Return a row for each measure that was compared.
 
-    Differences are in % where that has a meaning. p is adjusted for all measures.
+    Differences are in % where that has a meaning. p is adjusted in its family, and not given of J
+    where it checks the instrument.
     """
     return [_row(one) for one in concluded.each]
 
@@ -77,7 +78,7 @@ def _row(one: Conclusion) -> DifferenceRow:
         difference,
         "" if one.simulated is None else _simulated(one.simulated, factor),
         ends,
-        "" if math.isnan(one.p) else p_value(one.p, 2),
+        "–" if one.role == "check" else "" if math.isnan(one.p) else p_value(one.p, 2),
         UNTESTED if math.isnan(one.p) else VERDICTS[one.verdict],
     )
 

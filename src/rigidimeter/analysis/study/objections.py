@@ -12,8 +12,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import date
 
 from rigidimeter.analysis.estimation import method_named
-from rigidimeter.analysis.statistics import ranksum
 from rigidimeter.analysis.study.compared import Comparison
+from rigidimeter.analysis.study.families import Family
 from rigidimeter.analysis.study.ratings_found import RatingsFound
 from rigidimeter.analysis.study.ratings_model import rated_one_condition, without_examiners
 from rigidimeter.analysis.study.results import StudyResult
@@ -53,9 +53,6 @@ DEGREES = 180.0 / math.pi
 UNIT_WITHIN = 1.5
 """Factor by which a ratio of inertias may miss that of the units."""
 
-FEW_DF = 3.0
-"""With fewer degrees of freedom the interval is wider than ± 3.2 standard errors."""
-
 Flagged = Mapping[tuple[str, str], Sequence[str]]
 
 
@@ -89,7 +86,7 @@ def objections(
         yield from _in_order(c)
 
 
-def hidden(c: Comparison, result: StudyResult, tests: int) -> Finding | None:
+def hidden(c: Comparison, result: StudyResult) -> Finding | None:
     """Return what can hide a difference that was not found, the most specific; None without any."""
     flagged = flagged_epochs(c, result.analysis)
     if flagged and (share := _largest_share(c, flagged)) >= SHARE_THAT_HIDES:
@@ -99,13 +96,6 @@ def hidden(c: Comparison, result: StudyResult, tests: int) -> Finding | None:
         examiners = rated_one_condition(result.ratings)
         if examiners:
             return _of_examiners(examiners, {"variant": "hides"})
-    if c.days is not None and c.days.df < FEW_DF:
-        units: dict[str, Fact] = {
-            "df": c.days.df,
-            "tests": plural(tests, "test"),
-            "units": f"{c.days.unit}s",
-        }
-        return found_between("few_units", units, c.days.least_shown(LEVEL / max(tests, 1)))
     return None
 
 
@@ -121,16 +111,20 @@ def without_test(c: Comparison, result: StudyResult, remark: str) -> Finding:
     return found_between("no_test", {"remark": remark})
 
 
-def too_few(c: Comparison, tests: int) -> Finding | None:
-    """Return that no values could be far enough apart for a rank-sum test; else None."""
-    n_x, n_y = (len(c.values[name]) for name in c.pair)
-    least = ranksum(range(n_x), range(n_x, n_x + n_y)).p * tests
-    if least < LEVEL:
-        return None
-    of = f" for {tests} measures" if tests > 1 else ""
-    facts: dict[str, Fact] = {"first": n_x, "second": n_y, "of": of}
-    facts["exact"] = 2.0 / math.comb(n_x + n_y, n_x)
-    return found_between("too_few_values", facts, least, LEVEL)
+def wide(test: Test, family: Family, half: float, wanted_percent: float) -> Finding:
+    """Return that a difference of the wanted size would be found in fewer than one study of two."""
+    c = test.comparison
+    size = 100.0 * half / abs(test.difference.reference or math.nan)
+    if test.by is None and math.isinf(half):
+        n_x, n_y = (len(c.values[name]) for name in c.pair)
+        of = f" for {family.tests} measures" if family.tests > 1 else ""
+        facts: dict[str, Fact] = {"variant": "values", "first": n_x, "second": n_y, "of": of}
+        facts |= {"alpha": LEVEL, "exact": 2.0 / math.comb(n_x + n_y, n_x)}
+        return found_between("wide_interval", facts, limit=wanted_percent)
+    facts = {"tests": plural(family.first, "test")}
+    if size <= wanted_percent:
+        facts["variant"] = "held"
+    return found_between("wide_interval", facts, size, wanted_percent)
 
 
 def negligible(c: Comparison, result: StudyResult) -> Finding | None:

@@ -13,6 +13,7 @@ from rigidimeter.analysis.statistics import (
     EffectDifference,
 )
 from rigidimeter.analysis.study.compared import Comparison, comparison_rows
+from rigidimeter.analysis.study.families import Primary
 from rigidimeter.analysis.study.measures import Measure
 from rigidimeter.analysis.study.ratings_found import RatingsFound
 from rigidimeter.core.records import Analysis, Epoch, FindingGroup, Fit, Notice, Score
@@ -169,6 +170,8 @@ class StudyResult:
     own_rig : bool
         Whether a session of this program was among what was analysed, so that the settings of the
         rig are those that it was recorded with.
+    primary : Primary
+        What the study concludes from, and which tests p is adjusted for together.
     """
 
     title: str
@@ -197,6 +200,7 @@ class StudyResult:
     changes: tuple[str, ...] = ()
     own_rig: bool = False
     further: tuple[Comparison, ...] = ()
+    primary: Primary = Primary()  # noqa: RUF009
 
     @property
     def further_pairs(self) -> tuple[StudyResult, ...]:

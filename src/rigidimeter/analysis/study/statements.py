@@ -10,8 +10,9 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 
-from rigidimeter.analysis.study.conclusions import WANTED, Conclusion, Conclusions, conclude
+from rigidimeter.analysis.study.conclusions import Conclusion, Conclusions, Verdict, conclude
 from rigidimeter.analysis.study.differences import Three
+from rigidimeter.analysis.study.families import Role
 from rigidimeter.analysis.study.reached_precision import precisions
 from rigidimeter.analysis.study.results import StudyResult
 from rigidimeter.core.words import (
@@ -25,6 +26,8 @@ from rigidimeter.core.words import (
     series,
     within,
 )
+
+_ALL_PERCENT = 100.0
 
 LEAST_P = 0.0001
 """Below this a sentence does not say how small p is; tables do."""
@@ -61,13 +64,13 @@ def lead(result: StudyResult) -> str:
     concluded = conclude(result)
     if concluded is None:
         return prefix + _only_condition(result)
-    shown = concluded.of("lower", "higher")
+    shown = [one for one in concluded.of("lower", "higher") if one.role == "primary"]
     said = f"{_measured(concluded)} {_concluded(concluded)[0]}"
     if shown:
         where, reach = _whom(concluded)
         quoted = _beginning(where, _quoted(shown))
         intervals = f" The intervals hold for {reach}." if reach else ""
-        said = f"{quoted}{_adjusted(concluded)}.{intervals}"
+        said = f"{quoted}{_adjusted(concluded, 'primary')}.{intervals}"
     paths = {out.path for out in result.left_out}
     if paths:
         total = len(paths | {session.source for session in result.sessions})
@@ -176,15 +179,24 @@ def _tested(concluded: Conclusions) -> str:
         return "Nothing could be tested."
     of = len(tests) > 1
     text = "; ".join(f"{test} ({', '.join(own)})" if of else test for test, own in tests.items())
-    return f"{text[:1].upper()}{text[1:]}{_adjusted(concluded)}."
+    return f"{text[:1].upper()}{text[1:]}{_adjusted(concluded, 'primary', 'secondary')}."
 
 
-def _adjusted(concluded: Conclusions) -> str:
-    """Return for how many tests p is adjusted, as the end of a sentence that gives p."""
-    count = concluded.adjusted_for
-    what = "measures" if count == concluded.tested else "tests"
-    of_each = f"p Holm-adjusted over {count} {what}; each interval is an unadjusted 95 % interval"
-    return f"; {of_each}" if count > 1 else ""
+def _adjusted(concluded: Conclusions, *roles: Role) -> str:
+    """Return for which tests p is adjusted, as the end of a sentence that gives p."""
+    parts: list[str] = []
+    for role in roles:
+        own = [one for one in concluded.each if one.role == role and not math.isnan(one.p)]
+        if not own or (tests := own[0].family.tests) < 2:
+            continue
+        names = series([one.comparison.measure.short for one in own])
+        further = f" ({tests} tests)" if tests != len(own) else ""
+        if own[0].family.rule == "sequence":
+            parts.append(f"adjusted in the declared sequence of {names}{further}")
+        else:
+            parts.append(f"Holm-adjusted over {names}{further}")
+    text = ", and apart ".join(parts).replace("apart Holm-adjusted", "apart")
+    return f"; p {text}; each interval is an unadjusted 95 % interval" if parts else ""
 
 
 def _concluded(concluded: Conclusions) -> list[str]:
@@ -193,50 +205,99 @@ def _concluded(concluded: Conclusions) -> list[str]:
     reference, other = condition_name(pair.reference), condition_name(pair.other)
     both = f"{reference} and {other}"
     where, reach = _whom(concluded)
+    wanted = f"{concluded.each[0].wanted_percent:g} %"
 
     def names(members: Iterable[Conclusion]) -> str:
         return series([one.comparison.measure.short for one in members])
 
-    found = []
-    sides: tuple[Literal["lower", "higher"], ...] = ("lower", "higher")
-    for side in sides:
-        if own := concluded.of(side):
-            are = "is" if len(own) == 1 else "are"
-            found.append(f"{names(own)} {are} {side} in {other} than in {reference}")
+    def claims(role: Role) -> list[str]:
+        found = []
+        sides: tuple[Literal["lower", "higher"], ...] = ("lower", "higher")
+        for side in sides:
+            if own := [one for one in concluded.of(side) if one.role == role]:
+                are = "is" if len(own) == 1 else "are"
+                found.append(f"{names(own)} {are} {side} in {other} than in {reference}")
+        return found
+
+    outcomes = [one for one in concluded.each if one.role != "check"] or concluded.each
+    found = claims("primary")
     if found and reach:
         found[-1] += f". This holds for {reach}"
     of_whom = max(len(found), 1)
-    for reason, withheld in _by_reason(concluded.of("not supported")):
+    for caution, beside in _by_caution(outcomes):
+        found.append(f"caution for {names(beside)}: {caution}")
+    for reason, withheld in _by_reason(outcomes, "not supported"):
         found.append(f"a difference in {names(withheld)} is not supported: {reason}")
-    for reason, withheld in _by_reason(concluded.of("no difference shown")):
+    for reason, withheld in _by_reason(outcomes, "no difference shown"):
         why = f": {reason}" if reason else ""
-        found.append(f"no difference between {both} is shown in {names(withheld)}{why}")
-    for reason, withheld in _by_reason(concluded.of("cannot be decided")):
+        found.append(
+            f"no difference of {wanted} between {both} is shown in {names(withheld)}{why}"
+            f"{_excluded(withheld)}"
+        )
+    for reason, withheld in _by_reason(outcomes, "cannot be decided"):
         found.append(
             f"whether {both} differ in {names(withheld)} cannot be decided: {reason}"
-            f"{_would_decide(withheld)}"
+            f"{_excluded(withheld)}{_would_decide(withheld)}"
         )
-    return [
-        f"{_beginning(where if k < of_whom else '', sentence)}." for k, sentence in enumerate(found)
-    ]
+    sentences = [_beginning(where if k < of_whom else "", one) for k, one in enumerate(found)]
+    in_whom = f"{where}, " if where and found else ""
+    sentences += [_beginning("", f"secondary: {in_whom}{one}") for one in claims("secondary")]
+    return [f"{sentence}." for sentence in sentences]
+
+
+def _excluded(members: Iterable[Conclusion]) -> str:
+    """Return ``; excluded (95 %): K more than 31 % lower or 4 % higher, B …``."""
+    parts: list[str] = []
+    for one in members:
+        known = not math.isnan(one.difference.percent[0])
+        estimate, low, high = one.difference.percent if known else one.difference.tested
+        if math.isnan(low):
+            continue
+        after = " %" if known else f" {one.comparison.measure.unit}".rstrip()
+        digits = decimals((high - low) / 2, estimate)
+        sides = [("lower", -low), ("higher", high)]
+        if known and -low >= _ALL_PERCENT:  # of what is above zero no more can be lost
+            sides = sides[1:]
+        words = [
+            f"{'more than ' * (not k)}{fixed(end, digits)}{after} {side}"
+            if end > 0
+            else f"{side} at all"
+            for k, (side, end) in enumerate(sides)
+        ]
+        parts.append(f"{one.comparison.measure.short} {' or '.join(words)}")
+    return f"; excluded (95 %): {', '.join(parts)}" if parts else ""
 
 
 def _would_decide(withheld: Iterable[Conclusion]) -> str:
-    """Return how many days would show a difference, for the first measure where that is known."""
+    """Return what would show a difference, for the first measure where that is known."""
     for one in withheld:
-        if one.days_to_decide is not None:
+        if one.needed is not None:
+            number, unit = one.needed
+            of = {"day": " in both conditions", "value": " in each"}.get(unit, "")
             return (
-                f"; {one.days_to_decide} days with both conditions would show a difference of "
-                f"{100 * WANTED:.0f} % in {one.comparison.measure.short}"
+                f"; with {plural(number, unit)}{of} a difference of {one.wanted_percent:g} % in "
+                f"{one.comparison.measure.short} would be shown with a chance of 80 %"
             )
     return ""
 
 
-def _by_reason(members: Iterable[Conclusion]) -> list[tuple[str, list[Conclusion]]]:
-    """Return the conclusions that share a reason, in the order of the first of each."""
+def _by_caution(members: Iterable[Conclusion]) -> list[tuple[str, list[Conclusion]]]:
+    """Return the conclusions that a caution stands beside, by the caution."""
     found: dict[str, list[Conclusion]] = {}
     for one in members:
-        found.setdefault(one.reason, []).append(one)
+        if one.caution is not None:
+            found.setdefault(within(one.caution.headline), []).append(one)
+    return list(found.items())
+
+
+def _by_reason(
+    members: Iterable[Conclusion], verdict: Verdict
+) -> list[tuple[str, list[Conclusion]]]:
+    """Return the conclusions of a verdict that share a reason, as the first of each come."""
+    found: dict[str, list[Conclusion]] = {}
+    for one in members:
+        if one.verdict == verdict:
+            found.setdefault(one.reason, []).append(one)
     return list(found.items())
 
 

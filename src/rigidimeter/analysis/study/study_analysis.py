@@ -30,6 +30,7 @@ from rigidimeter.analysis.study.comparison import (
     with_further,
 )
 from rigidimeter.analysis.study.exclusions import exclusions_of, operators_exclusions
+from rigidimeter.analysis.study.families import Primary, primary_of
 from rigidimeter.analysis.study.measures import MEASURES, RATING, chosen_pair
 from rigidimeter.analysis.study.ratings_model import rated, ratings_comparison, ratings_days
 from rigidimeter.analysis.study.results import SensitivityRow, SessionEntry, StudyResult
@@ -65,6 +66,8 @@ class StudyRead:
     notices : tuple of Notice
     further : tuple of str
         Conditions with epochs that are compared with the reference beside those of `names.pair`.
+    primary : Primary
+        What the study concludes from.
     """
 
     folder: StudyFolder
@@ -76,6 +79,7 @@ class StudyRead:
     method: str
     notices: tuple[Notice, ...]
     further: tuple[str, ...] = ()
+    primary: Primary = Primary()  # noqa: RUF009
 
 
 def read_study(
@@ -126,6 +130,8 @@ def read_study(
     if stated != "unknown":
         about = f"{folder / STUDY_FILE}: analysis.axis"
         settings = changed_settings(settings, {"diagnostics": {"axis": stated}}, about)
+    days = (entry.day for entry in gathered.entries.values())
+    primary = primary_of(read, days)
     return StudyRead(
         read,
         names,
@@ -134,8 +140,9 @@ def read_study(
         operator,
         settings,
         chosen,
-        (*read.notices, *said, *gathered.notices, *excluded),
+        (*read.notices, *said, *gathered.notices, *excluded, *primary.notices),
         tuple(name for name in names.known if name in there) if pair[1] is None else (),
+        primary,
     )
 
 
@@ -184,7 +191,7 @@ def analyse_study(
     comparisons, further = with_further(comparisons, _further(read, comparisons))
     notices += [*_lacking([c for c in comparisons if c.measure is not RATING], pair), *said]
     ready = {} if ratings is None else {RATING.name: ratings_days(ratings)}
-    every = day_tests((*comparisons, *further), ready)
+    every = day_tests((*comparisons, *further), ready, read.primary)
     comparisons, further = every[: len(comparisons)], every[len(comparisons) :]
     rows: list[SensitivityRow] = []
     if others:
@@ -222,6 +229,7 @@ def analyse_study(
         left_out=read.gathered.left_out,
         own_rig=read.gathered.settings is not None,
         further=further,
+        primary=read.primary,
     )
 
 

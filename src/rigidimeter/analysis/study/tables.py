@@ -58,6 +58,7 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
             for pair in (result, *result.further_pairs)
             if (said := statements(pair)) is not None
         ],
+        "primary": result.primary.row(c.measure for c in result.comparisons),
         "conclusion": result_table(result, "conclusion"),
         "reasons": [
             reason.row() | {"measures": measures} for reason, _, measures in reasons(result)

@@ -10,12 +10,15 @@ What is tested is, in this order,
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from rigidimeter.analysis.statistics import DayDifference, summarise
+import scipy
+
+from rigidimeter.analysis.statistics import DayDifference, ranksum, summarise
 from rigidimeter.analysis.study.compared import Comparison
 from rigidimeter.analysis.study.comparison import day_test, rank_test
 from rigidimeter.analysis.study.differences import Difference, by_units, by_values
@@ -40,6 +43,8 @@ class Test:
     remark : str
     words : str
         The test, such as ``paired t-test of 5 days``.
+    by : DayDifference or None
+        Of days, subjects, or recordings in their place.
     """
 
     comparison: Comparison
@@ -47,6 +52,7 @@ class Test:
     sign: float = 0.0
     remark: str = ""
     words: str = ""
+    by: DayDifference | None = None
 
     @property
     def p(self) -> float:
@@ -66,6 +72,18 @@ class Test:
         """Whether the interval would exclude zero if the difference were smaller by a bias."""
         d = self.difference
         return abs(d.estimate) - bias > (d.high - d.low) / 2.0
+
+    def half_width(self, level: float) -> float:
+        """Return half the interval whose ends a test at a level tells from the estimate.
+
+        A difference of this size is found in one study of two. NaN without a test, infinite where
+        so few values cannot reach the level.
+        """
+        if math.isnan(self.p):
+            return math.nan
+        if self.by is not None:
+            return float(scipy.stats.t.isf(level / 2, self.by.df)) * self.by.se
+        return _half_of_shift(*(self.comparison.values[n] for n in self.comparison.pair), level)
 
     @property
     def said(self) -> str:
@@ -95,7 +113,13 @@ def tested(c: Comparison, basis: Basis) -> Test:
 
 def by_days(c: Comparison, found: DayDifference) -> Test:
     """Return a test by days as the test of a comparison."""
-    return Test(c, by_units(c, found), -found.estimate, found.remark, found.test)
+    return Test(c, by_units(c, found), -found.estimate, found.remark, found.test, found)
+
+
+@functools.lru_cache(maxsize=64)
+def _half_of_shift(x: tuple[float, ...], y: tuple[float, ...], level: float) -> float:
+    test = ranksum(x, y, confidence=1 - level)
+    return (test.shift_high - test.shift_low) / 2 if test.shift_bounded else math.inf
 
 
 def tested_again(c: Comparison, observations: Sequence[Observation], basis: Basis) -> Test:

@@ -118,29 +118,48 @@ STUDY_KINDS = (
         example={"value": 0.5, "limit": 1.0},
     ),
     Kind(
-        "few_units",
-        "standard errors above which p adjusted by Holm's method is below 0.05 in any case, where "
-        "the test by days has fewer than 3 degrees of freedom",
-        headline="Differences below {value:.3g} standard errors may not show; more {units} show "
-        "smaller ones",
-        measured="The test has {df:.2g} degrees of freedom, and p is adjusted for {tests}: below "
-        "0.05 in any case it is above {value:.3g} standard errors.",
-        meaning="A smaller difference may be there.",
-        remedy="Record more {units}.",
+        "wide_interval",
+        "half the interval of a difference that was not found, at the level of the first test of "
+        "its family, in % of the reference: a difference of this size is found in one study of two",
+        headline="The chance to show a difference of {limit:g} % was below one half",
+        measured="Half the interval, at 0.05 over {tests}, is {value:.3g} % of the reference (at "
+        "most {limit:g} %).",
+        meaning="A difference as large may be there.",
+        remedy="Record more days, subjects or values, or declare fewer primary measures.",
         level="note",
-        unit="1",
-        example={"value": 63.7},
+        variants={
+            "held": {
+                "headline": "The 95 % interval holds a difference of {limit:g} %",
+                "measured": "Half the interval, at 0.05 over {tests}, is {value:.3g} % of the "
+                "reference, but the estimate is too far from zero to exclude {limit:g} %.",
+            },
+            "values": {
+                "headline": "{first} values against {second} cannot reach p < {alpha:g}{of}",
+                "measured": "Even where no value of one group is within the other, p is above that "
+                "({exact:.2g} by the exact test of one measure).",
+            },
+        },
+        example={
+            "value": 64.0,
+            "limit": 20.0,
+            "first": 3,
+            "second": 3,
+            "exact": 0.1,
+            "alpha": 0.05,
+            "tests": "2 tests",
+        },
     ),
     Kind(
-        "too_few_values",
-        "the least p that so many values can have, after Holm's method",
-        headline="{first} values against {second} cannot reach p < {limit:g}{of}",
-        measured="Even where no value of one group is within the other, p of {first} against "
-        "{second} is {value:.2g}{of}, and {exact:.2g} by the exact test of one.",
-        meaning="Whether the groups differ cannot be seen, whatever the values.",
-        remedy="Measure more, or compare fewer columns at once.",
+        "earlier_in_sequence",
+        "p of a measure after one that is not shown, in the declared sequence",
+        headline="In the declared sequence it comes after {before}, which is not shown",
+        measured="By itself p is {value:.2g}, but in the declared sequence it comes after "
+        "{before}, which is not shown.",
+        meaning="It is not tested then, as was declared.",
+        remedy="Declare another sequence for the next study.",
         unit="1",
-        example={"value": 0.16, "limit": 0.05, "first": 3, "second": 3, "exact": 0.1},
+        level="note",
+        example={"value": 0.01, "before": "K"},
     ),
     Kind(
         "unused_recordings",

@@ -177,7 +177,10 @@ def test_the_table_of_differences_is_one_on_page_and_terminal(study, json, page)
         factor = factor if part == "difference" else 1.0
         sizes = [factor * one[f"{part}{end}"] for end in ("", "_low", "_high")]
         assert_rounds(f"{row.difference} {row.interval}", sizes)
-        assert_shows(row.p, [one["p_holm"]], 2)
+        if one["role"] == "check":  # J is in no family
+            assert row.p == "–"
+        else:
+            assert_shows(row.p, [one["p_holm"]], 2)
         words = {"no difference shown": "none shown"}
         assert row.verdict == words.get(one["verdict"], one["verdict"])
 
@@ -219,7 +222,7 @@ def test_statements_are_the_same_on_page_terminal_and_in_python(study, page) -> 
     assert [*terminal.rows] == [
         ("measured", said.measured),
         ("tested", said.tested),
-        *zip(("concluded", ""), said.concluded, strict=True),
+        *zip(("concluded", *[""] * len(said.concluded)), said.concluded, strict=False),
     ]
     on_page = page.words()
     for sentence in (said.measured, said.tested, *said.concluded):

@@ -91,7 +91,7 @@ def test_table_and_document_are_one(
         stored = list(csv.DictReader(file))
     for one, row in zip(document["conclusion"], stored, strict=True):
         for name, value in one.items():
-            if isinstance(value, float):
+            if isinstance(value, int | float):
                 assert float(row[name]) == value
             else:
                 assert row[name] == ("" if value is None else value)

@@ -5,10 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+import scipy
 from tests.unit.analysis.report.cohorts import Design, made_study, ratings_found
 
+from rigidimeter.analysis.statistics import holm
 from rigidimeter.analysis.study import (
     Observation,
+    Primary,
     StudyResult,
     compare,
     compare_analysis,
@@ -20,6 +23,8 @@ from rigidimeter.analysis.study.conclusions import Conclusion
 from rigidimeter.analysis.study.ratings_model import ratings_comparison, ratings_days
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Fit
+from rigidimeter.core.study_files import PrimaryTable
+from rigidimeter.planning import pairs_needed
 
 SMALL = Design(days=(5, 4), epochs=(5, 5), scores=(4, 4))
 
@@ -249,6 +254,160 @@ def test_days_of_one_condition_after_all_of_the_other(study, label, verdict):
     assert found.verdict == verdict
     if verdict != "lower":
         assert found.reason.startswith("all days in DBS came after all days in OFF")
+
+
+def declared(study: StudyResult, *measures: str, **more) -> StudyResult:
+    """Return the study with these primary measures; B and K by default."""
+    given = {"measures": list(measures)} if measures else {}
+    return replace(study, primary=Primary(PrimaryTable(**given, **more), "study.toml"))
+
+
+class TestFamilies:
+    """K and B are claimed by Holm's method, scores and ratings apart, J is in no family."""
+
+    def test_primary_secondary_and_the_check_are_adjusted_apart(self, study):
+        found = {one.comparison.measure.name: one for one in conclude(study).each}
+        alone = {name: one.comparison.days.p for name, one in found.items()}
+        for names in (
+            ("stiffness_nm_rad", "damping_nm_s_rad"),
+            ("impulse_nm_s", "work_j", "rating"),
+        ):
+            assert [found[n].p for n in names] == list(holm([alone[n] for n in names]))
+            assert {found[n].family.tests for n in names} == {len(names)}
+        assert found["inertia_kg_m2"].p == alone["inertia_kg_m2"]
+        assert found["inertia_kg_m2"].role == "check"
+
+    def test_one_declared_measure_is_not_adjusted_and_the_other_is_secondary(self, study):
+        found = declared(study, "stiffness_nm_rad")
+        one = of(found, "stiffness_nm_rad")
+        assert (one.p, one.role) == (one.comparison.days.p, "primary")
+        assert (of(found, "damping_nm_s_rad").role, of(found, "rating").role) == ("secondary",) * 2
+        assert found.statements.concluded[0] == "K is lower in DBS than in OFF."
+        assert "B, impulse" in found.statements.concluded[-1]
+
+    @pytest.mark.parametrize(("first", "claimed"), [(0.01, True), (0.2, False)])
+    def test_in_a_sequence_the_second_is_claimed_only_if_the_first_is_shown(
+        self, study, first, claimed
+    ):
+        p = {"stiffness_nm_rad": 0.03, "damping_nm_s_rad": first}
+        given = tuple(
+            replace(c, days=replace(c.days, p=p.get(c.measure.name, c.days.p)))
+            for c in study.comparisons
+        )
+        order = ("damping_nm_s_rad", "stiffness_nm_rad")
+        found = declared(replace(study, comparisons=given), *order, rule="sequence")
+        second = of(found, "stiffness_nm_rad")
+        assert second.p == max(first, 0.03)
+        assert (second.verdict == "lower") is claimed
+        if not claimed:
+            assert second.verdict == "cannot be decided"
+            assert second.reason == "in the declared sequence it comes after B, which is not shown"
+        assert "p adjusted in the declared sequence of K and B" in found.statements.tested
+
+    def test_what_was_compared_before_keeps_all_measures_in_one_family(self, study):
+        found = conclude(replace(study, primary=Primary(source="earlier comparison")))
+        assert {one.family.tests for one in found.each} == {6}
+        assert [one.p for one in found.each] == list(
+            holm([one.comparison.days.p for one in found.each])
+        )
+
+
+class TestTheOneRule:
+    """No difference is shown where the test could have shown it, and it is excluded."""
+
+    def at(self, study: StudyResult, half_percent: float, estimate_percent: float) -> Conclusion:
+        """Return what is concluded of K with half its interval at p = 0.05/2, and an estimate."""
+
+        def changed(c):
+            t = scipy.stats.t.isf(0.0125, c.days.df)
+            estimate, se = (c.days.mean_x * x / 100 for x in (estimate_percent, half_percent / t))
+            half = scipy.stats.t.isf(0.025, c.days.df) * se
+            p = 2 * scipy.stats.t.sf(abs(estimate) / se, c.days.df)
+            return replace(
+                c,
+                days=replace(c.days, estimate=estimate, se=se, low=estimate - half,
+                             high=estimate + half, p=p),
+            )  # fmt: skip
+
+        given = tuple(
+            changed(c) if c.measure.name == "stiffness_nm_rad" else c for c in study.comparisons
+        )
+        return of(replace(study, comparisons=given), "stiffness_nm_rad")
+
+    @pytest.mark.parametrize(
+        ("half", "estimate", "verdict"),
+        [
+            (19.9, 1.0, "no difference shown"),
+            (20.1, 1.0, "cannot be decided"),
+            (19.9, 9.0, "cannot be decided"),  # 20 % is within its interval
+            (19.9, 25.0, "lower"),
+            (80.0, 45.0, "cannot be decided"),
+        ],
+    )
+    def test_it_is_by_half_the_interval_and_by_what_that_excludes(
+        self, study, half, estimate, verdict
+    ):
+        one = self.at(study, half, estimate)
+        assert one.verdict == verdict
+        assert one.half_width / one.difference.reference == pytest.approx(half / 100)
+
+    def test_the_size_is_what_the_study_declares(self, study):
+        one = of(declared(study, difference_percent=60.0), "inertia_kg_m2")
+        assert one.wanted_percent == 60.0
+
+    def test_days_that_would_decide_are_planned_for_the_first_test_of_the_family(self, study):
+        one = self.at(study, 30.0, 1.0)
+        days = one.comparison.days
+        sd = days.se * (2 / (1 / 5 + 1 / 4)) ** 0.5
+        assert one.needed == (pairs_needed(0.2 * days.mean_x, sd, alpha=0.025), "day")
+
+    def test_two_days_conclude_no_absence(self):
+        """Epochs that scatter by 2 %, and nothing between days: still one degree of freedom."""
+        rng = np.random.default_rng(3)
+        rows = [
+            {"subject": "S1", "day": day, "condition": name, "k": level * (1 + 0.02 * x)}
+            for day in (1, 2)
+            for name, level in (("OFF", 1.75), ("DBS", 1.435))
+            for x in rng.standard_normal(8)
+        ]
+        found = compare(pd.DataFrame(rows), value="k", resamples=0)
+        assert of(found, "k").verdict in ("lower", "cannot be decided")
+        flat = pd.DataFrame([{**row, "b": 1 + 0.1 * rng.standard_normal()} for row in rows])
+        one = of(compare(flat, value=["k", "b"], resamples=0), "b")
+        assert one.verdict == "cannot be decided"
+        assert one.reason == "the chance to show a difference of 20 % was below one half"
+        assert one.needed is not None
+
+    def test_many_values_that_do_not_differ_show_it(self):
+        rng = np.random.default_rng(1)
+        rows = [{"condition": c, "k": 5 + rng.standard_normal()} for c in "ab" for _ in range(80)]
+        found = compare(pd.DataFrame(rows), value="k", resamples=0)
+        assert of(found, "k").verdict == "no difference shown"
+        (sentence,) = found.statements.concluded
+        assert sentence.startswith("No difference of 20 % between a and b is shown in k; excluded")
+        few = compare(pd.DataFrame(rows[:6] + rows[-6:]), value="k", resamples=0)
+        assert of(few, "k").verdict == "cannot be decided"
+        assert of(few, "k").needed.unit == "value"
+
+
+def test_an_inertia_that_differs_by_less_is_a_caution_beside_the_verdicts_of_k_and_b(study):
+    """A cuff that sits otherwise may change all three; here J by 4 %, K and B by 20 %."""
+
+    def cuff(fit: Fit) -> np.ndarray:
+        spread = 1.0 + 0.01 * (int(fit.epoch[1:]) % 3)
+        by = np.array([1.04, 0.8, 0.8]) if in_dbs(fit) else np.ones(3)
+        return np.array([0.0045, 0.137, 1.75]) * by * spread
+
+    found = with_values(study, cuff)
+    for measure in ("stiffness_nm_rad", "damping_nm_s_rad"):
+        one = of(found, measure)
+        assert (one.verdict, one.finding) == ("lower", None)
+        assert one.caution == of(found, "inertia_kg_m2").finding
+    assert of(found, "rating" if found.ratings is None else "impulse_nm_s").caution is None
+    assert found.statements.concluded[1].startswith("Caution for K and B: inertia differs by ")
+    assert "caution" in conclusion_rows(found)[0]
+    (group,) = [g for g in found.findings if g.finding.name == "inertia_of_conditions"]
+    assert group.where == "K, B and J"
 
 
 class TestRecordings:

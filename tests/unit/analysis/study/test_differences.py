@@ -29,8 +29,9 @@ from rigidimeter.analysis.study import (
     traffic_light,
 )
 from rigidimeter.analysis.study.comparison import day_test, no_days
-from rigidimeter.analysis.study.conclusions import days_to_decide
+from rigidimeter.analysis.study.deciding import needed
 from rigidimeter.analysis.study.differences import by_units
+from rigidimeter.analysis.study.tested import tested as of_basis
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Epoch, Outcome
 from rigidimeter.planning import pairs_needed
@@ -380,12 +381,16 @@ def test_the_days_that_would_decide_are_those_of_the_paired_t_test():
     """
     c = observed_on_one_day([2.0, 2.0], [1.6, 1.6])
     v = (0.12**2 / 2 + 0.16**2 / 2) * (2.0**2 + 1.6**2)
-    assert days_to_decide(c) == pairs_needed(0.4, math.sqrt(v))
+    assert needed(of_basis(c, "days"), 0.4, 0.025) == (
+        pairs_needed(0.4, v**0.5, alpha=0.025),
+        "day",
+    )
     # Of three epochs the scatter is their own: none here, so that the days' alone counts.
     c = observed_on_one_day([2.0] * 3, [1.6] * 3)
-    assert days_to_decide(c) == pairs_needed(0.4, math.sqrt(0.12**2 / 2 * (2.0**2 + 1.6**2)))
+    sd = math.sqrt(0.12**2 / 2 * (2.0**2 + 1.6**2))
+    assert needed(of_basis(c, "days"), 0.4, 0.05) == (pairs_needed(0.4, sd), "day")
     scores = replace(c, measure=replace(c.measure, origin="scores"))
-    assert days_to_decide(scores) is None
+    assert needed(of_basis(scores, "days"), 0.4, 0.05) is None
 
 
 def observed_on_one_day(off: list[float], dbs: list[float]) -> Comparison:
