@@ -19,7 +19,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.executor import each
 from rigidimeter.core.files import csv_text, toml_text, write_text
 from rigidimeter.core.settings import SinusoidSettings
-from rigidimeter.core.study_files import STUDY_SCHEMA
+from rigidimeter.core.study_files import STUDY_SCHEMA, PrimaryTable
 from rigidimeter.core.units import rad_from_deg
 from rigidimeter.virtual.study_design import ConditionDesign, StudyDesign
 from rigidimeter.virtual.study_plan import DayPlan, day_joint, felt_rigidity, plan_study

@@ -9,9 +9,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any, Literal
 
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
-from rigidimeter.analysis.statistics import (
-    EffectDifference,
-)
+from rigidimeter.analysis.statistics import EffectDifference
 from rigidimeter.analysis.study.compared import Comparison, comparison_rows
 from rigidimeter.analysis.study.families import Primary
 from rigidimeter.analysis.study.measures import Measure
@@ -171,7 +169,6 @@ class StudyResult:
         Whether a session of this program was among what was analysed, so that the settings of the
         rig are those that it was recorded with.
     primary : Primary
-        What the study concludes from, and which tests p is adjusted for together.
     """
 
     title: str

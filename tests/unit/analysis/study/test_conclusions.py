@@ -282,7 +282,7 @@ class TestFamilies:
         one = of(found, "stiffness_nm_rad")
         assert (one.p, one.role) == (one.comparison.days.p, "primary")
         assert (of(found, "damping_nm_s_rad").role, of(found, "rating").role) == ("secondary",) * 2
-        assert found.statements.concluded[0] == "K is lower in DBS than in OFF."
+        assert "subject, K is lower in DBS than in OFF." in found.statements.concluded[0]
         assert "B, impulse" in found.statements.concluded[-1]
 
     @pytest.mark.parametrize(("first", "claimed"), [(0.01, True), (0.2, False)])
