@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import f as f_distribution
@@ -20,71 +22,107 @@ from scipy.stats import kstest, norm
 from rigidimeter.analysis.statistics import (
     TwoGroups,
     compare_effects,
-    difference,
     effect_sizes,
-    fit_mixed,
     rank_biserial_interval,
     two_groups,
 )
+from rigidimeter.analysis.study.ratings_model import model_ratings
+from rigidimeter.core.files import TextTable
 
-DAYS = {"OFF": 9, "DBS": 4}
 EXAMINERS = "ABC"
+COLUMNS = {name: name for name in ("condition", "score", "examiner", "subject", "day")}
+WIDE = (-100.0, 100.0)
+"""A scale that no score leaves."""
 
 
-def null_scores(
-    rng: np.random.Generator, examiner: float, day: float, rounded: bool
-) -> tuple[np.ndarray, list[str], list[str], list[str]]:
-    """Draw scores without any effect of the condition; return them with their labels."""
-    offsets = rng.normal(0, examiner, len(EXAMINERS))
-    scores, conditions, examiners, days = [], [], [], []
-    for condition, count in DAYS.items():
-        for number in range(count):
-            of_day = rng.normal(0, day)
-            for index, name in enumerate(EXAMINERS):
-                scores.append(1.8 + offsets[index] + of_day + rng.normal(0, 0.45))
-                conditions.append(condition)
-                examiners.append(name)
-                days.append(f"{condition}{number}")
-    values = np.array(scores)
-    if rounded:
-        values = np.clip(np.round(2 * values) / 2, 0, 3)
-    return values, conditions, examiners, days
+@dataclass(frozen=True)
+class Scores:
+    """How scores without an effect of the condition differ, and how they are modelled.
+
+    Attributes
+    ----------
+    name : str
+    examiner, day, own : float
+        SDs of the offsets of examiners, of days and of conditions within a day; the residual has
+        0.45.
+    off, dbs : range
+        Days of each condition; a number in both is one day.
+    rounded : bool
+        To half steps from 0 to 3.
+    random : tuple of str or None
+        As `model_ratings` takes it; None for its default, with days.
+    """
+
+    name: str
+    examiner: float = 0.4
+    day: float = 0.0
+    own: float = 0.0
+    off: range = range(9)
+    dbs: range = range(9, 13)
+    rounded: bool = False
+    random: tuple[str, ...] | None = ("examiner",)
+
+    def table(self, rng: np.random.Generator) -> TextTable:
+        """Draw a table of scores."""
+        offsets = rng.normal(0, self.examiner, len(EXAMINERS))
+        of_days: dict[int, float] = {}
+        rows = []
+        for condition, days in (("OFF", self.off), ("DBS", self.dbs)):
+            for day in days:
+                of_day = of_days.setdefault(day, rng.normal(0, self.day))
+                if self.own:
+                    of_day += rng.normal(0, self.own)
+                for index, name in enumerate(EXAMINERS):
+                    score = 1.8 + offsets[index] + of_day + rng.normal(0, 0.45)
+                    if self.rounded:
+                        score = float(np.clip(np.round(2 * score) / 2, 0, 3))
+                    rows.append((condition, repr(float(score)), name, "", f"{day}"))
+        columns = dict(zip(COLUMNS, zip(*rows, strict=True), strict=True))
+        return TextTable("scores", columns, tuple(range(2, len(rows) + 2)))
+
+
+def _scores() -> Iterator[Scores]:
+    yield Scores("examiners differ (SD 0.4)")
+    yield Scores("examiners hardly differ (SD 0.1)", examiner=0.1)
+    yield Scores("examiners do not differ", examiner=0.0)
+    yield Scores("SD 0.4, half steps from 0 to 3", rounded=True)
+    nine, four = range(9), range(4)
+    for name, changes in {
+        "days differ (SD 0.3)": {"day": 0.3},
+        "4 of 9 days with both, a day moves both alike": {"day": 0.3, "dbs": four},
+        "4 of 9 days with both, each by itself": {"own": 0.3, "dbs": four},
+        "5 days with both, each by itself": {"own": 0.3, "off": range(5), "dbs": range(5)},
+        "3 days each, none shared": {"day": 0.3, "off": range(3), "dbs": range(3, 6)},
+    }.items():
+        case = replace(Scores(name, off=nine), **changes)
+        yield replace(case, name=f"{name}, not modelled")
+        yield replace(case, name=f"{name}, modelled", random=None)
 
 
 def mixed(runs: int) -> None:
     """Print the share of p < .05 under the null, by the choice of degrees of freedom."""
-    cases = {
-        "examiners differ (SD 0.4)": (0.4, 0.0, False, ("examiner",)),
-        "examiners hardly differ (SD 0.1)": (0.1, 0.0, False, ("examiner",)),
-        "examiners do not differ": (0.0, 0.0, False, ("examiner",)),
-        "SD 0.4, half steps from 0 to 3": (0.4, 0.0, True, ("examiner",)),
-        "days differ (SD 0.3), not modelled": (0.4, 0.3, False, ("examiner",)),
-        "days differ (SD 0.3), modelled": (0.4, 0.3, False, ("examiner", "day")),
-    }
     names = ("p_residual", "p_satterthwaite", "p_kenward_roger")
     print("| scores without an effect | residual | Satterthwaite | Kenward-Roger | at zero |")
     print("| --- | ---: | ---: | ---: | ---: |")
-    for case, (examiner, day, rounded, random) in cases.items():
+    for case in _scores():
         rng = np.random.default_rng(11)
         p = np.empty((runs, 3))
         zero = 0
         for run in range(runs):
-            scores, conditions, examiners, days = null_scores(rng, examiner, day, rounded)
-            labels = {"examiner": examiners, "day": days}
-            fit = fit_mixed(scores, conditions, {name: labels[name] for name in random})
-            test = difference(fit, "OFF", "DBS")
-            p[run] = [getattr(test, name) for name in names]
-            zero += "examiner" in fit.at_zero
+            found = model_ratings(case.table(rng), COLUMNS, case.random, scale=WIDE, step=0)
+            p[run] = [getattr(found.contrast, name) for name in names]
+            zero += "examiner" in found.fit.at_zero
         cells = [
             f"{100 * np.mean(column < 0.05):.1f} % (KS p {kstest(column, 'uniform').pvalue:.2g})"
             for column in p.T
         ]
-        print(f"| {case} | {' | '.join(cells)} | {100 * zero / runs:.0f} % |", flush=True)
+        print(f"| {case.name} | {' | '.join(cells)} | {100 * zero / runs:.0f} % |", flush=True)
 
 
 def balanced(runs: int) -> None:
     """Print the same for complete tables, from the mean squares that REML then reduces to."""
-    n, m, k = len(EXAMINERS) * sum(DAYS.values()), sum(DAYS.values()), len(EXAMINERS)
+    m, k = 9 + 4, len(EXAMINERS)
+    n = m * k
     print("\n| complete table, without an effect | residual | Satterthwaite | at zero |")
     print("| --- | ---: | ---: | ---: |")
     rng = np.random.default_rng(10)

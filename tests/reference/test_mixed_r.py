@@ -28,6 +28,8 @@ RANDOM = {
     "nested": ("subject", "subject/day"),
     "no_days": ("subject", "subject/day"),
     "crossed": ("examiner", "subject"),
+    "days": ("examiner", "day"),
+    "days_of_both": ("examiner", "day", "day/condition"),
 }
 TESTS = (
     "estimate", "se", "p_residual", "df_satterthwaite", "p_satterthwaite", "f_kenward_roger",
@@ -129,6 +131,7 @@ def fit_of(dataset: str) -> Mixed:
     table = [row for row in rows(OURS / "scores.csv") if row["dataset"] == dataset]
     columns = {key: [row[key] for row in table] for key in table[0]}
     columns["subject/day"] = nested(columns["subject"], columns["day"])
+    columns["day/condition"] = nested(columns["day"], columns["condition"])
     scores = [float(score) for score in columns["score"]]
     groups = {name: columns[name] for name in RANDOM[dataset]}
     return fit_mixed(scores, columns["condition"], groups)

@@ -30,7 +30,8 @@ def ratings(
     day: str = OPTIONS.option("--day COLUMN", "Column of the day.", "day"),
     random: list[str] | None = OPTIONS.option(
         "--random NAME",
-        "Random offset of examiner, subject or subject/day. Default: examiner; repeat for several.",
+        "Random offset, as examiner; repeat for several. Also day, day/condition, subject and "
+        "subject/day. Default: examiner, and the days of one subject.",
     ),
     scale: tuple[float, float] = OPTIONS.option(
         "--scale LOW HIGH", "Lowest and highest rating.", (0.0, 3.0)
@@ -78,7 +79,7 @@ def ratings(
     found = model_ratings(
         read_text_table(table),
         columns,
-        random or ["examiner"],
+        random,
         scale=scale,
         step=step,
         pair=contrast,
@@ -119,9 +120,14 @@ def _blocks(found: RatingsFound, full: bool) -> Iterator[Block]:
         yield from ("", f"{len(found.pairs)} pairs (p unadjusted; Holm's are in the JSON file):")
         for pair in found.pairs if full else found.pairs[:MOST_PAIRS]:
             c = pair.contrast
+            other = (
+                f"{c.p_kenward_roger:.3g} (Kenward and Roger)"
+                if found.by_day
+                else f"{c.p_residual:.3g} (residual)"
+            )
             yield (
                 f"  {pair.first} minus {pair.second}: {c.estimate:.4g}, SE {c.se:.4g}, "
-                f"p {c.p_residual:.3g} (residual), {c.p_satterthwaite:.3g} (Satterthwaite)"
+                f"p {other}, {c.p_satterthwaite:.3g} (Satterthwaite)"
             )
         j = found.joint
         yield (
@@ -138,13 +144,15 @@ def _contrast(found: RatingsFound) -> Iterator[Block]:
     first, second = found.other, found.reference
     c, (low, high) = found.contrast, found.interval
     way = "higher" if c.estimate > 0 else "lower" if c.estimate < 0 else "neither higher nor lower"
-    yield (
-        f"{first} minus {second}: {c.estimate:.4g} [{low:.4g} to {high:.4g}, 95 %], SE {c.se:.4g}"
-    )
-    for f, df, p, name in (
+    se = c.se_kenward_roger if found.by_day else c.se
+    yield f"{first} minus {second}: {c.estimate:.4g} [{low:.4g} to {high:.4g}, 95 %], SE {se:.4g}"
+    choices = (
         (c.f, c.df_residual, c.p_residual, "residual degrees of freedom, n − p"),
         (c.f, c.df_satterthwaite, c.p_satterthwaite, "Satterthwaite"),
         (c.f_kenward_roger, c.df_kenward_roger, c.p_kenward_roger, "Kenward and Roger"),
-    ):
+    )
+    for f, df, p, name in choices[::-1] if found.by_day else choices:
         yield f"  F(1, {df:.4g}) = {f:.4g}, p = {p:.3g}   {name}"
+    if found.by_day:
+        yield "The interval is Kenward and Roger's: with few days n − p is too many."
     yield f"{first} was rated {way} than {second}; a positive difference means {first} is higher."

@@ -3,7 +3,8 @@
 suppressMessages({library(lme4); library(lmerTest); library(pbkrtest)})
 all <- read.csv("scores.csv")
 random <- list(unbalanced="(1|examiner)", three="(1|examiner)", nested="(1|subject)+(1|subject:day)",
-               no_days="(1|subject)+(1|subject:day)", crossed="(1|examiner)+(1|subject)")
+               no_days="(1|subject)+(1|subject:day)", crossed="(1|examiner)+(1|subject)",
+               days="(1|examiner)+(1|day)", days_of_both="(1|examiner)+(1|day)+(1|day:condition)")
 cat("dataset,quantity,value\n")
 tight <- lmerControl(optimizer="bobyqa", optCtrl=list(rhoend=1e-12, maxfun=1e6),
                      check.conv.singular=.makeCC(action="ignore", tol=1e-4))
@@ -15,10 +16,10 @@ for (ds in names(random)) {
   levels <- levels(d$condition); p <- length(levels); n <- nrow(d)
   for (c in levels) emit(paste0("mean_", c), fixef(m)[[paste0("condition", c)]])
   v <- as.data.frame(VarCorr(m))
-  for (k in seq_len(nrow(v))) emit(paste0("variance_", sub("subject:day", "subject/day", v$grp[k])), v$vcov[k])
+  for (k in seq_len(nrow(v))) emit(paste0("variance_", sub(":", "/", v$grp[k])), v$vcov[k])
   emit("deviance", REMLcrit(m))
   for (g in names(ranef(m))) { b <- ranef(m)[[g]]
-    for (e in rownames(b)) emit(paste0("offset_", sub("subject:day", "subject/day", g), "_", sub(":", "/", e)), b[e,1]) }
+    for (e in rownames(b)) emit(paste0("offset_", sub(":", "/", g), "_", sub(":", "/", e)), b[e,1]) }
   for (i in seq_len(p-1)) for (j in (i+1):p) {
     L <- rep(0,p); L[i] <- 1; L[j] <- -1; pair <- paste0(levels[i], "-", levels[j])
     s <- contest1D(m, L, ddf="Satterthwaite"); k <- KRmodcomp(m, matrix(L,1))$test

@@ -3,7 +3,9 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.special import stdtrit
 
 from rigidimeter.analysis.statistics import difference, fit_mixed
 
@@ -42,12 +44,12 @@ def model(rigidimeter, tmp_path):
 def test_the_document_holds_the_model_unrounded(model) -> None:
     ran, found = model()
     assert ran.status == 0, ran.err
-    fit = fit_mixed(SCORES, CONDITIONS, {"examiner": EXAMINERS})
+    fit = fit_mixed(SCORES, CONDITIONS, {"examiner": EXAMINERS, "day": DAYS})
     test = difference(fit, "DBS", "OFF")
     assert found["schema"] == "rigidimeter.ratings/1"
     assert found["means"] == {"OFF": fit.means[0], "DBS": fit.means[1]}
     for key in ("estimate", "se", "f", "df_residual", "p_residual", "df_satterthwaite",
-                "p_satterthwaite"):  # fmt: skip
+                "p_satterthwaite", "df_kenward_roger", "p_kenward_roger"):  # fmt: skip
         assert found["contrast"][key] == getattr(test, key)
     assert found["contrast"]["convention"] == "DBS minus OFF"
     assert found["offsets"] == dict(fit.offsets["examiner"])
@@ -59,6 +61,89 @@ def test_the_document_holds_the_model_unrounded(model) -> None:
     assert "DBS minus OFF" in ran.out
     assert "Satterthwaite" in ran.out
     assert "DBS was rated lower than OFF" in ran.out
+
+
+def test_days_of_one_subject_are_random(model) -> None:
+    ran, found = model()
+    assert list(found["variances"]) == ["examiner", "day"]
+    low, high = found["contrast"]["estimate"] + (
+        stdtrit(found["contrast"]["df_kenward_roger"], [0.025, 0.975])
+        * found["contrast"]["se_kenward_roger"]
+    )
+    assert f"[{low:.4g} to {high:.4g}, 95 %]" in ran.out
+    assert ran.out.index("Kenward and Roger") < ran.out.index("n − p")
+
+
+def test_a_day_with_both_conditions_has_an_offset_for_each_too(model) -> None:
+    """The same test as that of a study (`contrast_days`)."""
+    days = [str(k % 9 // 3 + 1) for k in range(15)]
+    _, found = model(list(zip(CONDITIONS, days, EXAMINERS, map(str, SCORES), strict=True)))
+    visits = [f"{day}/{c}" for day, c in zip(days, CONDITIONS, strict=True)]
+    groups = {"examiner": EXAMINERS, "day": days, "day/condition": visits}
+    test = difference(fit_mixed(SCORES, CONDITIONS, groups), "DBS", "OFF")
+    assert list(found["variances"]) == list(groups)
+    assert found["contrast"]["p_kenward_roger"] == test.p_kenward_roger
+
+
+def test_the_papers_model_without_days_is_an_option(model) -> None:
+    _, found = model(ROWS, "--random", "examiner")
+    test = difference(fit_mixed(SCORES, CONDITIONS, {"examiner": EXAMINERS}), "DBS", "OFF")
+    assert found["contrast"]["p_residual"] == test.p_residual
+    assert [n for n in found["notices"] if "there are 5 days" in n and "--random day" in n]
+
+
+WITHOUT_DAYS = {
+    "one day in each condition": (
+        [(c, c, f"{e}{k}", s) for k, (c, _, e, s) in enumerate(ROWS)],
+        "each condition was rated on one day, so how much days differ is unknown",
+    ),
+    "no residual beside days": (
+        [(c, d, e, str(1 + int(d) % 3 / 2)) for c, d, e, _ in ROWS],
+        "the model has no offset for days, so ratings of one day count as independent, for the "
+        "scores do not vary beyond the means and offsets",
+    ),
+    "no days": (
+        [(c, "", e, s) for c, _, e, s in ROWS],
+        "no days are given, so ratings of one day count as independent",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WITHOUT_DAYS)
+def test_where_days_cannot_be_modelled_a_sentence_says_so(model, case: str) -> None:
+    rows, sentence = WITHOUT_DAYS[case]
+    ran, found = model(rows)
+    assert ran.status == 0, ran.err
+    assert list(found["variances"]) == ["examiner"]
+    assert sentence in ran.err.replace("\n", " ")
+    assert sum(sentence in notice for notice in found["notices"]) == 1
+
+
+def test_one_rating_a_day_needs_no_offset_for_it(model) -> None:
+    """What differs between days is in the residual."""
+    rows = [(c, str(k), e, s) for k, (c, _, e, s) in enumerate(ROWS)]
+    ran, found = model(rows)
+    assert list(found["variances"]) == ["examiner"]
+    assert (ran.status, ran.err, found["notices"]) == (0, "", [])
+
+
+def test_days_that_differ_give_no_difference_of_conditions(model) -> None:
+    """Nine days and four, three examiners: the paper's, of 60 tables without a difference."""
+    rng = np.random.default_rng(11)
+    below = np.zeros(2)
+    for _ in range(60):
+        rows = [
+            (c, f"{c}{day}", e, f"{score:.6f}")
+            for c, days in (("OFF", 9), ("DBS", 4))
+            for day, of_day in enumerate(rng.normal(5, 0.6, days))
+            for e, score in zip("ABC", of_day + rng.normal(0, 0.45, 3), strict=True)
+        ]
+        for k, random in enumerate((("--random", "examiner"), ())):
+            _, found = model(rows, "--scale", "0", "10", "--step", "0", *random)
+            key = "p_residual" if random else "p_kenward_roger"
+            below[k] += found["contrast"][key] < 0.05
+    assert below[0] >= 12  # 20 % and more
+    assert below[1] <= 6
 
 
 def test_off_comes_first_whatever_the_file_s_order(model) -> None:
@@ -112,7 +197,11 @@ REFUSED = [
         "no column updrs; its columns are condition, day, examiner, score",
     ),
     (ROWS, ("--random", "subject"), "there is no column subject"),
-    (ROWS, ("--random", "day"), "--random day: must be one of examiner, subject, subject/day"),
+    (
+        ROWS,
+        ("--random", "days"),
+        "--random days: must be one of examiner, subject, subject/day, day",
+    ),
     (
         ROWS,
         ("--contrast", "OFF", "ON"),
@@ -212,6 +301,10 @@ def test_subjects_and_their_days(model) -> None:
     assert any("3 examiners, but the model has no offset for them" in n for n in found["notices"])
     ran, found = model(rows, "--random", "examiner", "--random", "subject", header=header)
     assert list(found["variances"]) == ["examiner", "subject"]
+    assert [n for n in found["notices"] if "add --random day" in n] == found["notices"]
+    three = ("--random", "examiner", "--random", "subject", "--random", "day")
+    _, found = model(rows, *three, header=header)
+    assert len(found["offsets_by"]["day"]) == 10  # a day belongs to its subject
     assert found["notices"] == []
 
 

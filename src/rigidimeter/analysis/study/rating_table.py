@@ -10,7 +10,7 @@ from rigidimeter.analysis.statistics import nested
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import MAX_NOTICES, TextTable, lines_text
 
-RANDOM = ("examiner", "subject", "subject/day")
+RANDOM = ("examiner", "subject", "subject/day", "day", "day/condition")
 FEWEST = 3
 _SHOWN = 4
 
@@ -123,14 +123,36 @@ def oddities(
 
 
 def groupings(rows: Sequence[Rating], random: Sequence[str]) -> dict[str, list[str]]:
-    """Return the labels of each grouping; ``subject/day`` stands for subject and day within."""
+    """Return the labels of each grouping; ``subject/day`` stands for subject and day within.
+
+    A day belongs to its subject.
+    """
+    columns = {
+        name: [getattr(row, name) for row in rows]
+        for name in ("examiner", "subject", "day", "condition")
+    }
+    if len(set(columns["subject"])) > 1:
+        columns["day"] = nested(columns["subject"], columns["day"])
     found: dict[str, list[str]] = {}
     for name in random:
-        outer = name.partition("/")[0]
-        found[outer] = [getattr(row, outer) for row in rows]
+        outer, _, inner = name.partition("/")
+        found[outer] = columns[outer]
         if name == "subject/day":
-            found[name] = nested(found["subject"], [row.day for row in rows])
+            found[name] = nested(columns["subject"], [row.day for row in rows])
+        elif inner:
+            found[name] = nested(columns[outer], columns[inner])
     return found
+
+
+def day_grouping(rows: Sequence[Rating]) -> str:
+    """Return ``day``, or ``day/condition`` where days have several conditions."""
+    days = {(row.subject, row.day) for row in rows}
+    return "day/condition" if visits(rows) > len(days) else "day"
+
+
+def visits(rows: Sequence[Rating]) -> int:
+    """Return how many days of a subject in a condition were rated."""
+    return len({(row.subject, row.day, row.condition) for row in rows})
 
 
 def _odd(source: str, rows: Sequence[Rating], low: float, step: float) -> list[str]:
@@ -178,7 +200,7 @@ def _single(rows: Sequence[Rating], random: Sequence[str]) -> list[str]:
     said = []
     for name, labels in groupings(rows, random).items():
         once = [label for label, count in Counter(labels).items() if count == 1]
-        if once and len(once) < len(set(labels)) and name != "subject/day":
+        if once and len(once) < len(set(labels)) and name in ("examiner", "subject"):
             said.append(
                 f"{name} {_some(once)} gave one rating; its offset is strongly shrunken"
                 if name == "examiner"
@@ -198,8 +220,21 @@ def _unmodelled(rows: Sequence[Rating], random: Sequence[str]) -> list[str]:
     for name in ("examiner", "subject"):
         count = len({getattr(row, name) for row in rows})
         if count > 1 and name not in modelled:
-            said.append(
-                f"there are {count} {name}s, but the model has no offset for them; add --random "
-                f"{name}, or ratings of one {name} count as independent"
-            )
+            said.append(_no_offset(count, name))
+    days = len({(row.subject, row.day) for row in rows})
+    if 1 < days < len(rows) and not any("day" in name for name in random):
+        said.append(_no_offset(days, "day"))
+    by_examiner = {(row.subject, row.condition, row.examiner) for row in rows}
+    if not any(row.day for row in rows) and len(rows) > len(by_examiner) > 2:
+        said.append(
+            "no days are given, so ratings of one day count as independent; name their column "
+            "with --day"
+        )
     return said
+
+
+def _no_offset(count: int, name: str) -> str:
+    return (
+        f"there are {count} {name}s, but the model has no offset for them; add --random {name}, or "
+        f"ratings of one {name} count as independent"
+    )

@@ -45,6 +45,7 @@ class RatingsPair:
     contrast: Contrast
     p_residual_holm: float
     p_satterthwaite_holm: float
+    p_kenward_roger_holm: float
 
 
 @dataclass(frozen=True)
@@ -87,9 +88,16 @@ class RatingsFound:
         return difference(self.fit, self.other, self.reference)
 
     @property
+    def by_day(self) -> bool:
+        """Whether the model has an offset for each day, so that n − p is too many."""
+        return any("day" in name for name in self.fit.variances)
+
+    @property
     def interval(self) -> tuple[float, float]:
-        """The 95 % interval of the contrast with residual degrees of freedom."""
+        """The 95 % interval of the contrast; with days after Kenward and Roger, else with n − p."""
         c = self.contrast
+        if self.by_day:
+            return interval_of(c.estimate, c.se_kenward_roger, c.df_kenward_roger)
         return interval_of(c.estimate, c.se, c.df_residual)
 
     @cached_property
@@ -107,11 +115,11 @@ class RatingsFound:
         """The contrasts of every two conditions: a later one less an earlier one, OFF first."""
         names = itertools.combinations(off_first(self.fit.conditions), 2)
         every = {(b, a): difference(self.fit, b, a) for a, b in names}
-        residual = holm([c.p_residual for c in every.values()])
-        satterthwaite = holm([c.p_satterthwaite for c in every.values()])
+        keys = ("p_residual", "p_satterthwaite", "p_kenward_roger")
+        adjusted = [holm([getattr(c, key) for c in every.values()]) for key in keys]
         return tuple(
             RatingsPair(*names, c, *p)
-            for (names, c), *p in zip(every.items(), residual, satterthwaite, strict=True)
+            for (names, c), *p in zip(every.items(), *adjusted, strict=True)
         )
 
     @cached_property
@@ -197,6 +205,7 @@ def ratings_document(found: RatingsFound) -> dict[str, Any]:
             | {
                 "p_residual_holm": pair.p_residual_holm,
                 "p_satterthwaite_holm": pair.p_satterthwaite_holm,
+                "p_kenward_roger_holm": pair.p_kenward_roger_holm,
             }
             for pair in found.pairs
         ],

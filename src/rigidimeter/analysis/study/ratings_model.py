@@ -18,15 +18,23 @@ from rigidimeter.analysis.study.rating_table import (
     FEWEST,
     RANDOM,
     Rating,
+    day_grouping,
     groupings,
     oddities,
     ratings_of,
+    visits,
 )
 from rigidimeter.analysis.study.ratings_found import RatingsFound, fit_ratings, with_days
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import TextTable
 from rigidimeter.core.records import Notice
 from rigidimeter.core.study_files import StudyFolder
+
+_ONE_DAY = (
+    "each condition was rated on one day, so how much days differ is unknown, and the contrast is "
+    "of these days alone; rate each condition on two days or more"
+)
+_WITHOUT_DAYS = "the model has no offset for days, so ratings of one day count as independent"
 
 
 def rated(read: StudyFolder, names: Naming) -> tuple[RatingsFound | None, list[Notice]]:
@@ -98,14 +106,9 @@ def _rows(read: StudyFolder, names: Naming) -> tuple[list[Rating], list[Notice]]
 
 def _fit_with_days(rows: list[Rating], random: tuple[str, ...]) -> Mixed | None:
     """Return the model with days, and with what a condition had to itself on a day."""
-    labels = groupings(rows, random)
-    days = [f"{row.subject}/{row.day}" for row in rows]
-    visits = [f"{day}/{row.condition}" for day, row in zip(days, rows, strict=True)]
-    labels["day"] = days
-    if len(set(visits)) > len(set(days)):
-        labels["condition in day"] = visits
-    if len(set(visits)) in (len(rows), len({row.condition for row in rows})):
+    if visits(rows) in (len(rows), len({row.condition for row in rows})):
         return None  # one rating a day says nothing of days; nor does one day a condition
+    labels = groupings(rows, (*random, day_grouping(rows)))
     try:
         return fit_mixed([r.score for r in rows], [r.condition for r in rows], labels)
     except (ValueError, ArithmeticError):
@@ -181,7 +184,7 @@ def without_examiners(found: RatingsFound, examiners: Sequence[str]) -> DayDiffe
 def model_ratings(
     table: TextTable,
     columns: Mapping[str, str],
-    random: Sequence[str] = ("examiner",),
+    random: Sequence[str] | None = None,
     *,
     scale: tuple[float, float] = (0.0, 3.0),
     step: float = 0.5,
@@ -194,8 +197,10 @@ def model_ratings(
     table : TextTable
     columns : mapping of str to str
         What the table calls condition, score, examiner, subject and day.
-    random : sequence of str
-        Names out of `RANDOM`.
+    random : sequence of str, optional
+        Names out of `RANDOM`. By default ``examiner``, and the day of one subject over several
+        days (with its conditions, where a day has several), for ratings of one day are no
+        independent values.
     scale : tuple of float
         Lowest and highest rating there is.
     step : float
@@ -209,7 +214,7 @@ def model_ratings(
     UserError
         If an option is wrong, or the table holds no ratings that can be modelled.
     """
-    chosen = tuple(dict.fromkeys(random))
+    chosen = tuple(dict.fromkeys(random or ("examiner",)))
     for name in chosen:
         if name not in RANDOM:
             raise UserError(f"--random {name}: must be one of {', '.join(RANDOM)}")
@@ -218,7 +223,8 @@ def model_ratings(
             f"--scale {scale[0]:g} {scale[1]:g} --step {step:g}: write the lowest and then the "
             "highest rating, and a step of 0 or more"
         )
-    found = ratings_of(table, columns, chosen, scale, step)
+    by_day = random is None and _over_days(table, columns)
+    found = ratings_of(table, columns, (*chosen, "day") if by_day else chosen, scale, step)
     conditions = [row.condition for row in found.rows]
     first, second = pair or off_first(conditions)[:2][::-1]
     for name in (first, second):
@@ -227,9 +233,27 @@ def model_ratings(
             raise UserError(f"--contrast {name}: there is no such condition; rated are: {known}")
     if first == second:
         raise UserError(f"--contrast {first} {second}: name two different conditions")
-    try:
+
+    def fitted(chosen: tuple[str, ...], *said: str) -> RatingsFound:
+        notices = (*found.notices, *said)
         return fit_ratings(
-            table.source, found.rows, chosen, (second, first), found.notices, found.left_out
+            table.source, found.rows, chosen, (second, first), notices, found.left_out
         )
+
+    try:
+        if not by_day or visits(found.rows) == len(found.rows) == len({r.day for r in found.rows}):
+            return fitted(chosen)  # with one rating a day the residual holds what days differ by
+        if visits(found.rows) == len(set(conditions)):
+            return fitted(chosen, f"{table.source}: {_ONE_DAY}")
+        try:
+            return fitted((*chosen, day_grouping(found.rows)))
+        except (ValueError, ArithmeticError) as error:
+            return fitted(chosen, f"{table.source}: {_WITHOUT_DAYS}, for {error}")
     except (ValueError, ArithmeticError) as error:
         raise UserError(f"{table.source}: {error}") from None
+
+
+def _over_days(table: TextTable, columns: Mapping[str, str]) -> bool:
+    """Return whether a table has the days of one subject."""
+    days, subjects = (set(table.columns.get(columns[name], ())) for name in ("day", "subject"))
+    return len(days - {""}) > 0 and len(subjects) < 2
