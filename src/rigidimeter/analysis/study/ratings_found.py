@@ -115,11 +115,15 @@ class RatingsFound:
         """The contrasts of every two conditions: a later one less an earlier one, OFF first."""
         names = itertools.combinations(off_first(self.fit.conditions), 2)
         every = {(b, a): difference(self.fit, b, a) for a, b in names}
-        keys = ("p_residual", "p_satterthwaite", "p_kenward_roger")
-        adjusted = [holm([getattr(c, key) for c in every.values()]) for key in keys]
+        residual, satterthwaite, kenward_roger = (
+            holm([getattr(c, key) for c in every.values()])
+            for key in ("p_residual", "p_satterthwaite", "p_kenward_roger")
+        )
         return tuple(
             RatingsPair(*names, c, *p)
-            for (names, c), *p in zip(every.items(), *adjusted, strict=True)
+            for (names, c), *p in zip(
+                every.items(), residual, satterthwaite, kenward_roger, strict=True
+            )
         )
 
     @cached_property
