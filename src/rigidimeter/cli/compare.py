@@ -26,7 +26,7 @@ def compare(
     reference: str | None = COMPARE.option(
         "--reference NAME",
         "Reference condition. Default: OFF if there is one, else the first. Differences are "
-        "other minus reference; the rank-sum shift in --full is reference minus other.",
+        "other minus reference; shift and estimate in the files are reference minus other.",
     ),
     other: str | None = COMPARE.option(
         "--other NAME",

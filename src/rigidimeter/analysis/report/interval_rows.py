@@ -48,14 +48,20 @@ def _rows(axes: Axes, labels: Sequence[str]) -> None:
 
 
 def effect_words(found: Effects) -> str:
-    """Return r with its interval."""
-    return f"{number(found.r, 2)} {interval(found.r_low, found.r_high, 2)}"
+    """Return r of other − reference with its interval."""
+    r, low, high = _turned(found)
+    return f"{number(r, 2)} {interval(low, high, 2)}"
+
+
+def _turned(found: Effects) -> tuple[float, float, float]:
+    """Return r and its interval of other − reference; those of a test are reference − other."""
+    return -found.r, -found.r_high, -found.r_low
 
 
 def effects_label(result: StudyResult) -> str:
     """Return what the horizontal axis of effect sizes shows."""
     reference, other = condition_name(result.reference), condition_name(result.other)
-    return f"Effect size r; above zero: {reference} larger than {other}"
+    return f"Effect size r; above zero: {other} larger than {reference}"
 
 
 def effects_size(rows: int) -> tuple[float, float]:
@@ -86,14 +92,14 @@ def draw_effects(
             axes.axvline(x, color=GREY, linewidth=0.6, dashes=(1, 3), zorder=0)
     most = [largest_r(test.n_x, test.n_y) for test in tests]
     for place, (_, effects) in enumerate(found):
-        ends = effects.r_low, effects.r_high
-        with_intervals(axes, place, (effects.r, *ends), INK, "s", across=True, width=1.6, ms=6)
+        r, *ends = _turned(effects)
+        with_intervals(axes, place, (r, *ends), INK, "s", across=True, width=1.6, ms=6)
         if np.all(np.isfinite(ends)):
             axes.plot(ends, [place] * 2, "|", color=INK, ms=7)
         bounds = (-most[place], most[place])
         axes.plot(bounds, [place] * 2, "|", color=GREY, ms=13, mew=0.7, alpha=0.7)
         write_at(axes, 1.02, place, effect_words(effects), share="x", va="center")
-    values = [(effects.r, effects.r_low, effects.r_high) for _, effects in found]
+    values = [_turned(effects) for _, effects in found]
     least, largest = np.nanmin(values), np.nanmax(values)
     reach = 1.05 * max(0.5, *most, abs(least), abs(largest))
     axes.set_xlim(
@@ -132,7 +138,7 @@ def draw_methods(panels: Sequence[Axes], found: Sequence[SensitivityRow], label:
     for axes in panels[len(by_measure(found)) :]:
         axes.set_visible(False)
     for axes, (measure, own) in zip(panels, by_measure(found).items(), strict=False):
-        shifts = np.array([(row.shift, row.shift_low, row.shift_high) for row in own])
+        shifts = -np.array([(row.shift, row.shift_high, row.shift_low) for row in own])
         factor, unit = axis_unit(shifts.ravel(), measure.unit)
         _rows(axes, [f"{drawable(method)}, J {inertia}" for method, inertia in methods])
         for row, shift in zip(own, factor * shifts, strict=True):

@@ -126,7 +126,7 @@ def draw_comparison(panels: Sequence[Axes], c: Comparison, colours: Mapping[str,
             for key in c.summaries
         },
         {condition_name(key): colours[key] for key in c.summaries},
-        "" if c.test is None else f"by epochs: {p_and_r(c.test.p, c.test.r)}",
+        "" if c.test is None else f"by epochs: {p_and_r(c.test.p, -c.test.r)}",
         {
             condition_name(key): factor * np.array([o.value, o.low, o.high])
             for key, o in c.pooled.items()

@@ -67,7 +67,8 @@ def compare(
         A study folder, which adds tests by days, ratings and other methods; estimates, or the JSON
         file of them; or a table, or the CSV file of one, with `value` and `by`.
     other, reference : str, optional
-        The two conditions; differences are reference − other. Where not given, those of the study,
+        The two conditions; differences are other − reference, but `shift`, `z`, `r` and the
+        `estimate` by days, as documented, are reference − other. Where not given, those of the study,
         or the first two, ``OFF`` first. Without `other` each further condition is compared with the
         reference, too.
     value : str or sequence of str, optional

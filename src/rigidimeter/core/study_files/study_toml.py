@@ -34,7 +34,10 @@ STUDY_SCHEMA = "rigidimeter.study/1"
 OFF, DBS = "OFF", "DBS"
 _TITLES = {OFF: "stimulation off", DBS: "stimulation on"}
 
-_REFERENCE = "# Differences are reference - other.\n"
+_REFERENCE = """\
+# Differences shown are other - reference; the columns shift and estimate of the tables are
+# reference - other.
+"""
 _TABLES = """\
 # The tables, below this folder. Only that of the sessions must exist.
 sessions = "sessions.csv"       # path,subject,day,condition,part,note

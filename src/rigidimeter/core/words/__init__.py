@@ -23,6 +23,7 @@ from rigidimeter.core.words.numbers import (
 from rigidimeter.core.words.tables import (
     INTERVAL,
     SESSION,
+    TURNED,
     WORDS,
     Column,
     Kind,

@@ -30,6 +30,9 @@ Kind = Literal[
 WORDS = ("text", "label", "check", "reason", "source", "condition", "outcome")
 """Kinds of columns that hold words; the others hold numbers, which are set to the right."""
 
+TURNED = -1.0
+"""`Column.page_factor` of what is stored as reference − other: people see other − reference."""
+
 INTERVAL = "[95\N{NO-BREAK SPACE}%\N{NO-BREAK SPACE}interval]"
 """What the heading of a column with `ends` says after the quantity."""
 
@@ -150,4 +153,5 @@ def shown_below(row: Mapping[str, Any], column: Column, names: Mapping[str, str]
     low, high = (row.get(name) for name in column.ends)
     if not isinstance(low, float) or not isinstance(high, float) or not low < high:
         return ""
-    return interval(low * column.page_factor, high * column.page_factor, column.digits)
+    ends = sorted((low * column.page_factor, high * column.page_factor))
+    return interval(*ends, column.digits)

@@ -232,7 +232,7 @@ def test_statements_are_the_same_on_page_terminal_and_in_python(study, page) -> 
 
 
 def test_comparisons_over_epochs(json, folder: Path, page: ParsedPage) -> None:
-    shown = page.table("OFF against DBS: each epoch counted")[2:]
+    shown = page.table("DBS − OFF: each epoch counted")[2:]
     for c, row, cells in zip(
         json["comparison"]["comparisons"], rows_of(folder, "comparisons"), shown, strict=True
     ):
@@ -244,9 +244,10 @@ def test_comparisons_over_epochs(json, folder: Path, page: ParsedPage) -> None:
             group = c["groups"][name]
             summary = ("median", "q1", "q3", "sd_percent")
             assert_same(row, {f"{key}_{side}": group[key] for key in summary})
-        assert_shows(cells[7], [c["shift"], c["shift_low"], c["shift_high"]], 3)
-        assert_shows(cells[8], [c["z"]], 3)
-        assert_shows(cells[9], [c["r"]], 2)
+        # The keys of a rank-sum test are reference − other; people see other − reference.
+        assert_shows(cells[7], [-c["shift"], -c["shift_high"], -c["shift_low"]], 3)
+        assert_shows(cells[8], [-c["z"]], 3)
+        assert_shows(cells[9], [-c["r"]], 2)
         assert_shows(cells[10], [c["p"], c["p_holm"]], 2)
         for (cell, sd), name in ((cells[2:4], "OFF"), (cells[5:7], "DBS")):
             assert_shows(cell, [c["groups"][name][key] for key in ("median", "q1", "q3")], 3)
@@ -254,14 +255,14 @@ def test_comparisons_over_epochs(json, folder: Path, page: ParsedPage) -> None:
 
 
 def test_comparisons_by_days(json, folder: Path, page: ParsedPage) -> None:
-    shown = page.table("OFF against DBS: days counted")[1:]
+    shown = page.table("DBS − OFF: days counted")[1:]
     for c, row, cells in zip(
         json["comparison"]["comparisons"], rows_of(folder, "comparisons"), shown, strict=True
     ):
         days = c["days"]
         names = ("estimate", "low", "high", "p", "p_holm", "df", "p_days", "day_share")
         assert_same(row, {name: days[name] for name in names}, "days_")
-        assert_shows(cells[1], [days["estimate"], days["low"], days["high"]], 4)
+        assert_shows(cells[1], [-days["estimate"], -days["high"], -days["low"]], 4)
         assert_shows(cells[4], [days["df"]], 4)
         assert_shows(cells[5], [days["p"], days["p_holm"]], 2)
         assert_shows(cells[6], [days["p_days"]], 2)
@@ -322,7 +323,7 @@ def test_sensitivity(json, folder: Path, page: ParsedPage) -> None:
             s["inertia"],
         )
         assert_same(row, s)
-        assert_shows(cells[5], [s["shift"], s["shift_low"], s["shift_high"]], 4)
+        assert_shows(cells[5], [-s["shift"], -s["shift_high"], -s["shift_low"]], 4)
         assert_shows(cells[7], [s["p"]], 2)
         assert_shows(cells[8], [s["p_day"]], 2)
 

@@ -31,7 +31,7 @@ def test_estimates_give_a_page_without_figures_of_signals(
     page = report(study.analysis, tmp_path, "Estimates alone")
     text = page.read_text(encoding="utf-8")
     assert "<h1>Estimates alone</h1>" in text
-    assert "OFF against DBS: each epoch counted" in text
+    assert "DBS − OFF: each epoch counted" in text
     assert (tmp_path / "figures" / "distribution_stiffness_nm_rad.svg").exists()
     assert not list((tmp_path / "figures").glob("torque_*"))
 

@@ -126,7 +126,7 @@ def test_subjects_stand_apart_and_many_days_go_on_in_another_row() -> None:
 
 def test_a_forest_has_a_row_for_each_effect_in_their_order(study: StudyResult) -> None:
     found = [(c, c.effects) for c in study.comparisons[:2] if c.effects is not None]
-    turned = dataclasses.replace(found[1][1], r=-0.9, r_low=-0.95, r_high=float("nan"))
+    turned = dataclasses.replace(found[1][1], r=0.9, r_low=float("nan"), r_high=0.95)
     shown = [found[0], (found[1][0], turned)]
     (axes,) = drawn((7.4, 2.0), draw_effects, shown, "r").axes
     assert points(axes, "s") == [0, 1]
@@ -180,8 +180,8 @@ def test_sensitivity_keeps_methods_together_and_marks_the_chosen_one() -> None:
     assert points(axes, "s") == [2, 0]
     assert points(axes, "o") == [1]
     low, high = axes.get_xlim()
-    assert low < -0.1
-    assert high > 0.4
+    assert low < -0.4  # other − reference: the shifts are turned
+    assert high > 0.1
 
 
 def test_figures_of_a_study(study: StudyResult) -> None:

@@ -38,8 +38,8 @@ def test_ratings_are_compared_by_their_own_model(study: StudyResult, page: Parse
     found = study.ratings
     assert found is not None
     assert found.contrast_days is not None
-    (row,) = (r for r in page.table("OFF against DBS: days") if r[0].startswith("Examiners"))
-    assert row[1].startswith(number(-found.contrast_days.estimate))  # OFF − DBS
+    (row,) = (r for r in page.table("DBS − OFF: days") if r[0].startswith("Examiners"))
+    assert row[1].startswith(number(found.contrast_days.estimate))  # DBS − OFF
     assert row[5].startswith(p_value(found.contrast_days.p_kenward_roger))
     contrast = page.table("Contrast of the ratings, DBS − OFF")
     assert [row[-1] for row in contrast[1:]] == [
@@ -116,7 +116,7 @@ def test_a_study_without_ratings_sensitivity_or_exclusions() -> None:
 
 def test_a_measure_that_days_cannot_test_says_why(study: StudyResult) -> None:
     page = shown(untested(study, "work_j", "there is one day in each condition"))
-    (row,) = (r for r in page.table("OFF against DBS: days") if r[0].startswith("Work"))
+    (row,) = (r for r in page.table("DBS − OFF: days") if r[0].startswith("Work"))
     assert row[-1] == "there is one day in each condition"
     assert (
         "Whether OFF and DBS differ in work cannot be decided: there is one day in each condition."
@@ -128,7 +128,7 @@ def test_a_blinded_study_keeps_its_codes_and_shows_no_stimulation() -> None:
     page = shown(blind)
     text = page.words()
     assert text.count("are codes") >= 3
-    assert "a7 against k2" in " ".join(page.rows)
+    assert "k2 against a7" in " ".join(page.rows)
     assert not re.search(r"130 Hz|stimulation|0\.32 mA|\bOFF\b|\bDBS\b", text)
 
 

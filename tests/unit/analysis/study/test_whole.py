@@ -280,7 +280,7 @@ def test_a_third_condition_is_compared_with_the_first_and_p_is_adjusted_for_all(
     assert text.count("p Holm-adjusted over impulse and work (4 tests); each interval") == 2
     assert "DBS − OFF 95 % interval p, Holm" in text
     assert "LOW − OFF 95 % interval p, Holm" in text
-    assert "OFF against LOW: days counted" in text
+    assert "LOW − OFF: days counted" in text
     document = json.loads(out.read_text())
     concluded = {(c["measure"], c["other"]): c for c in document["conclusion"]}
     assert {other for _, other in concluded} == {"DBS", "LOW"}

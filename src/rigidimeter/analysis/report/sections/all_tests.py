@@ -31,21 +31,30 @@ from rigidimeter.analysis.report.sections.every_epoch import pooled_table
 from rigidimeter.analysis.report.sections.examiners import RATINGS, RELATION
 from rigidimeter.analysis.report.style import condition_colours, drawn
 from rigidimeter.analysis.study import Comparison, StudyResult, comparison_rows
-from rigidimeter.core.words import INTERVAL, Column, Table, condition_name, interval, number, series
+from rigidimeter.core.words import (
+    INTERVAL,
+    TURNED,
+    Column,
+    Table,
+    condition_name,
+    interval,
+    number,
+    series,
+)
 
 _EPOCHS_NOTE = Markup(
-    "All differences are {pair}. Two-sided Wilcoxon rank-sum test, asymptotic (normal "
-    "approximation), with tie and continuity correction; <i>r</i> = <i>z</i>/√N, where 0.1 is "
-    "called small, 0.3 medium and 0.5 large. Shift: the Hodges–Lehmann estimate, the median of "
-    "all differences, with the interval of the same test. SD: between all epochs of the condition, "
-    "in % of their mean. In brackets: <i>p</i> "
-    "adjusted for all measures by Holm’s method."
+    "All differences are {pair}; the file has shift, z and r as {turned}. Two-sided Wilcoxon "
+    "rank-sum test, asymptotic (normal approximation), with tie and continuity correction; "
+    "<i>r</i> = <i>z</i>/√N, where 0.1 is called small, 0.3 medium and 0.5 large. Shift: the "
+    "Hodges–Lehmann estimate, the median of all differences, with the interval of the same test. "
+    "SD: between all epochs of the condition, in % of their mean. In brackets: <i>p</i> adjusted "
+    "for all measures by Holm’s method."
 )
 _DAYS_NOTE = Markup(
-    "{tests}. In brackets: <i>p</i> adjusted in its family. <i>p</i> of day "
-    "medians: "
-    "exact rank-sum test of the medians of the days. Between days: the share of the variance "
-    "between epochs of one condition that is between days.{ratings}"
+    "{tests}. In brackets: <i>p</i> adjusted in its family. <i>p</i> of day medians: exact rank-sum "
+    "test of the medians of the days. Between days: the share of the variance between epochs of "
+    "one condition that is between days.{ratings} Differences are {pair}; the file has them as "
+    "{turned}."
 )
 
 
@@ -76,11 +85,14 @@ def _by_days(result: StudyResult, name: str) -> Iterator[Block]:
     percent = _percent(c.days.confidence for c in result.comparisons if c.days)
     yield Table(
         name,
-        f"{_pair(result)}: days counted",
+        f"{_signs(result)['pair']}: days counted",
         (
             Column("title", "Measure", "text", below="unit"),
             Column(
-                "days_estimate", f"Difference [{percent} interval]", ends=("days_low", "days_high")
+                "days_estimate",
+                f"Difference [{percent} interval]",
+                ends=("days_low", "days_high"),
+                page_factor=TURNED,
             ),
             Column("days_reference", f"Days {condition_name(result.reference)}", "count"),
             Column("days_other", f"Days {condition_name(result.other)}", "count"),
@@ -92,7 +104,9 @@ def _by_days(result: StudyResult, name: str) -> Iterator[Block]:
         ),
         comparison_rows(result.comparisons),
         note=_DAYS_NOTE.format(
-            tests="; ".join(text[:1].upper() + text[1:] for text in used), ratings=ratings
+            tests="; ".join(text[:1].upper() + text[1:] for text in used),
+            ratings=ratings,
+            **_signs(result),
         ),
     )
 
@@ -115,18 +129,24 @@ def _epochs(result: StudyResult, table: str) -> Iterator[Block]:
             Column(f"sd_percent_{side}", "SD (%)", digits=2, group=name),
         ]
     columns += [
-        Column("shift", f"Shift [{percent} interval]", ends=("shift_low", "shift_high"), digits=3),
-        Column("z", "z", digits=3),
-        Column("r", "r", digits=2),
+        Column(
+            "shift",
+            f"Shift [{percent} interval]",
+            ends=("shift_low", "shift_high"),
+            page_factor=TURNED,
+            digits=3,
+        ),
+        Column("z", "z", page_factor=TURNED, digits=3),
+        Column("r", "r", page_factor=TURNED, digits=2),
         Column("p", "p (Holm)", "p", below="p_holm"),
         Column("remark", "Remark", "reason"),
     ]
     yield Table(
         table,
-        f"{_pair(result)}: each epoch counted",
+        f"{_signs(result)['pair']}: each epoch counted",
         tuple(columns),
         comparison_rows(result.comparisons),
-        note=_EPOCHS_NOTE.format(pair=f"{sides['reference']} − {sides['other']}"),
+        note=_EPOCHS_NOTE.format(**_signs(result)),
     )
     yield paragraph(
         "This test treats every epoch as an independent observation. Epochs of one day are not, so "
@@ -142,8 +162,10 @@ def _epochs(result: StudyResult, table: str) -> Iterator[Block]:
         )
 
 
-def _pair(result: StudyResult) -> str:
-    return f"{condition_name(result.reference)} against {condition_name(result.other)}"
+def _signs(result: StudyResult) -> dict[str, str]:
+    """Return what differences are on the page, and in the file."""
+    reference, other = condition_name(result.reference), condition_name(result.other)
+    return {"pair": f"{other} − {reference}", "turned": f"{reference} − {other}"}
 
 
 def _percent(confidences: Iterable[float]) -> str:

@@ -29,7 +29,7 @@ from rigidimeter.analysis.report.interval_rows import (
 from rigidimeter.analysis.report.style import drawn
 from rigidimeter.analysis.study import StudyResult, method_caveats, split_pooled
 from rigidimeter.core.records import PARAMETERS
-from rigidimeter.core.words import INTERVAL, Column, Table, condition_name, interval, number
+from rigidimeter.core.words import INTERVAL, TURNED, Column, Table, condition_name, interval, number
 
 MOST_BESIDE = 3
 
@@ -40,14 +40,14 @@ def _methods(result: StudyResult) -> Iterator[Block]:
         return
     reference, other = condition_name(result.reference), condition_name(result.other)
     words = "; ".join(
-        f"{row.measure.title}, {row.method}, J {row.inertia}: {number(row.shift, 3)} "
-        f"{interval(row.shift_low, row.shift_high, 3)} {row.measure.unit}"
+        f"{row.measure.title}, {row.method}, J {row.inertia}: {number(-row.shift, 3)} "
+        f"{interval(-row.shift_high, -row.shift_low, 3)} {row.measure.unit}"
         for row in found
     )
     columns = min(len(by_measure(found)), MOST_BESIDE)
     rows = math.ceil(len(by_measure(found)) / columns)
     size = 7.4, 0.5 + (1.0 + 0.26 * len(methods_in(found))) * rows
-    shown = found, f"Shift, {reference} − {other}"
+    shown = found, f"Shift, {other} − {reference}"
     yield Figure(
         "sensitivity",
         "The Hodges–Lehmann shift with its interval by each method, in the unit above the "
@@ -69,14 +69,14 @@ def _methods(result: StudyResult) -> Iterator[Block]:
     yield from_result(
         result,
         "sensitivity",
-        "The shift by each method",
+        f"The shift by each method, {other} − {reference}",
         Column("title", "Measure", "text", below="unit"),
         Column("method", "Method", "check"),
         Column("inertia", "J", "label"),
         Column("n_reference", f"n {reference}", "count"),
         Column("n_other", f"n {other}", "count"),
-        Column("shift", f"Shift {INTERVAL}", ends=("shift_low", "shift_high")),
-        Column("r", "r"),
+        Column("shift", f"Shift {INTERVAL}", ends=("shift_low", "shift_high"), page_factor=TURNED),
+        Column("r", "r", page_factor=TURNED),
         Column("p", "p, epochs", "p"),
         Column("p_day", "p, days", "p"),
         Column("chosen", "Used here", "label"),
