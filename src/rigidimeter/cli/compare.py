@@ -44,6 +44,10 @@ def compare(
         "With --value: the bootstrap resamples the labels of this column. Default: rows, or days "
         "where several rows are of one.",
     ),
+    group: str | None = COMPARE.option(
+        "--group NAME",
+        "Compare the subjects of this group alone: column `group` of the table or of sessions.csv.",
+    ),
     seed: int = ESTIMATE.further("--seed N", "Seed of the bootstrap.", 1, min=0),
     resamples: int = ESTIMATE.further(
         "--resamples N", "Resamples of the bootstrap.", 9999, min=100
@@ -90,7 +94,13 @@ def compare(
     if not value and (folder := study_of(recordings, key)) is not None:
         keep_inputs(outputs, study_files(folder, key))
         study = analyse_study_folder(
-            folder, recordings, key, pair=(reference, other), seed=seed, resamples=resamples
+            folder,
+            recordings,
+            key,
+            pair=(reference, other),
+            group=group,
+            seed=seed,
+            resamples=resamples,
         )
         try:
             _write(study.result, *outputs, str(folder))
@@ -113,6 +123,7 @@ def compare(
                 value=value,
                 by=by,
                 session=session,
+                group=group,
                 seed=seed,
                 resamples=resamples,
                 progress=meter.advance,

@@ -139,6 +139,7 @@ def read_study_inputs(
     recordings: Recordings,
     key: Path | None = None,
     pair: tuple[str | None, str | None] = (None, None),
+    group: str | None = None,
 ) -> StudyRead:
     """Read a study folder with progress, as the options say."""
     chosen = load_settings(recordings.settings) if recordings.settings is not None else None
@@ -149,6 +150,7 @@ def read_study_inputs(
             settings=chosen,
             method=recordings.method,
             pair=pair,
+            group=group,
             progress=meter.advance,
         )
     return replace(read, settings=recordings.adjust(read.settings))
@@ -167,6 +169,7 @@ def analyse_study_folder(
     key: Path | None = None,
     *,
     pair: tuple[str | None, str | None] = (None, None),
+    group: str | None = None,
     seed: int = 1,
     resamples: int = 9999,
 ) -> Analysed:
@@ -177,7 +180,7 @@ def analyse_study_folder(
     UserError
         If there is nothing to analyse.
     """
-    read = read_study_inputs(folder, recordings, key, pair)
+    read = read_study_inputs(folder, recordings, key, pair, group)
     with Meter("study", 1.0) as meter:
         result = analyse_study(read, seed=seed, resamples=resamples, progress=meter.advance)
     changes, not_kept = [], ""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,12 +29,18 @@ from rigidimeter.analysis.study.measures import (
     off_first,
 )
 from rigidimeter.analysis.study.results import StudyResult
-from rigidimeter.analysis.study.study_analysis import analyse_study, read_study
+from rigidimeter.analysis.study.study_analysis import (
+    GROUP,
+    analyse_study,
+    no_such_group,
+    read_study,
+)
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import TextTable, lines_text, read_text_table
 from rigidimeter.core.records import Analysis, Notice
 from rigidimeter.core.settings import Settings, settings_from
 from rigidimeter.core.study_files import is_study
+from rigidimeter.core.words import series
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,6 +48,8 @@ if TYPE_CHECKING:
 _FEW_SESSIONS = 10
 _LARGEST = 1e100
 """Squares of larger values overflow in the tests."""
+_OCCASIONS = ("visit", "session", "block", "run")
+"""Columns that split the rows also where their labels are numbers."""
 _OF_DAY = ("subject", "day")
 """Columns of a table that say which values belong together."""
 
@@ -52,6 +62,7 @@ def compare(
     value: str | Sequence[str] | None = None,
     by: str = "condition",
     session: str | None = None,
+    group: str | None = None,
     key: str | PathLike[str] | None = None,
     settings: Settings | str | Path | Mapping[str, Any] | None = None,
     method: str = "auto",
@@ -68,9 +79,9 @@ def compare(
         file of them; or a table, or the CSV file of one, with `value` and `by`.
     other, reference : str, optional
         The two conditions; differences are other − reference, but `shift`, `z`, `r` and the
-        `estimate` by days, as documented, are reference − other. Where not given, those of the study,
-        or the first two, ``OFF`` first. Without `other` each further condition is compared with the
-        reference, too.
+        `estimate` by days, as documented, are reference − other. Where not given, those of the
+        study, or the first two, ``OFF`` first. Without `other` each further condition is compared
+        with the reference, too.
     value : str or sequence of str, optional
         Columns of the table to compare.
     by : str
@@ -78,6 +89,10 @@ def compare(
     session : str, optional
         The table's column whose labels the bootstrap resamples; by default each row, or each
         subject and day where the table's columns `subject` and `day` have several rows of one.
+    group : str, optional
+        Compare the subjects of this group alone, of the column `group` of the table, or of the
+        study's table of sessions. Without it a difference is claimed only where each group shows
+        it by itself.
     key : path, optional
         The blinding key of a study folder that is stored elsewhere.
     settings : Settings, path or mapping, optional
@@ -110,6 +125,7 @@ def compare(
             by,
             wanted,
             session=session,
+            group=group,
             seed=seed,
             resamples=resamples,
             progress=progress,
@@ -117,7 +133,9 @@ def compare(
     if path is not None and is_study(path):
         secret = None if key is None else Path(key)
         chosen = None if settings is None else settings_from(settings)
-        read = read_study(path, key=secret, settings=chosen, method=method, pair=wanted)
+        read = read_study(
+            path, key=secret, settings=chosen, method=method, pair=wanted, group=group
+        )
         return analyse_study(read, seed=seed, resamples=resamples, progress=progress)
     if path is not None and (
         path.is_dir() or any(path.suffix.lower() in reader.suffixes for reader in READERS)
@@ -126,6 +144,8 @@ def compare(
             f"{path} is neither a study folder nor a JSON file of estimates; for a recording give "
             "what estimate returns, for a table also value=, the columns to compare"
         )
+    if group is not None:
+        raise UserError(f"group {group}: estimates name no group; give a study folder or a table")
     analysis = x if isinstance(x, Analysis) else read_estimates(Path(x))
     known = conditions(analysis)
     pair = chosen_pair(known, wanted)
@@ -166,6 +186,7 @@ def _compare_columns(
     pair: tuple[str | None, str | None] = (None, None),
     *,
     session: str | None = None,
+    group: str | None = None,
     seed: int = 1,
     resamples: int = 9999,
     progress: Progress = lambda _: None,
@@ -187,6 +208,8 @@ def _compare_columns(
         without the other each further group with the reference.
     session : str, optional
         A column whose labels are resampled as units; else each row is one.
+    group : str, optional
+        Take the rows of this group of subjects alone.
     seed, resamples : int
         Of the bootstrap.
     progress : callable
@@ -196,6 +219,8 @@ def _compare_columns(
     UserError
         If a column or a group is not there, or a cell is no number.
     """
+    if group is not None:
+        table = _of_group(table, group)
     labels = table.column(by, "--by")
     for name in values:
         table.column(name, "--value")
@@ -215,6 +240,11 @@ def _compare_columns(
         rows = [k for k in rows if "" not in days[k]]
         if dayless:
             notices.append(f"{table.source}: no subject or day in {lines_text(dayless)}; left out")
+    if splits := _splitting(table, rows, {*values, by, session or by}):
+        which = f"column {splits[0]} splits the rows and is"
+        if len(splits) > 1:
+            which = f"columns {series(splits)} split the rows and are"
+        notices.append(f"{table.source}: {which} not used; compare each part by itself")
     comparisons = []
     for name in dict.fromkeys(values):
         one, said = _column(table, name, labels, units, days, names, rows)
@@ -246,6 +276,33 @@ def _compare_columns(
         by=by,
         further=more,
     )
+
+
+def _of_group(table: TextTable, group: str) -> TextTable:
+    """Return the rows of one group of subjects."""
+    labels = table.column(GROUP, "group=")
+    rows = [k for k, label in enumerate(labels) if label == group]
+    if not rows:
+        raise UserError(no_such_group(table.source, group, labels))
+    columns = {name: tuple(cells[k] for k in rows) for name, cells in table.columns.items()}
+    return replace(table, columns=columns, lines=tuple(table.lines[k] for k in rows))
+
+
+def _splitting(table: TextTable, rows: Sequence[int], used: Collection[str]) -> list[str]:
+    """Return columns that put the rows into a few parts, and that nothing uses.
+
+    Tables that this program wrote have such columns too; what they mean is known.
+    """
+    if "outcome" in table.columns:
+        return []
+    found = []
+    for name, cells in table.columns.items():
+        labels = Counter(cells[k] for k in rows if cells[k])
+        words = not all(label.replace(".", "", 1).lstrip("+-").isdigit() for label in labels)
+        few = len(labels) > 1 and min(labels.values()) > 1
+        if few and (words or name in _OCCASIONS) and name not in {*used, *_OF_DAY, GROUP}:
+            found.append(name)
+    return found
 
 
 def _kept(
@@ -293,6 +350,8 @@ def _column(
     rows: Sequence[int],
 ) -> tuple[Comparison, list[str]]:
     observations, missing = [], []
+    nowhere = ("",) * len(labels)
+    subjects, groups = (table.columns.get(of, nowhere) for of in (_OF_DAY[0], GROUP))
     for row in rows:
         line = table.lines[row]
         value = table.number(name, row)
@@ -306,9 +365,16 @@ def _column(
         if value is None or not unit:
             missing.append(line)
         else:
-            subject, day = days[row] if days else ("", "")
             observations.append(
-                Observation(value, labels[row], subject, day, epoch=f"line {line}", unit=unit)
+                Observation(
+                    value,
+                    labels[row],
+                    subjects[row],
+                    days[row][1] if days else "",
+                    epoch=f"line {line}",
+                    unit=unit,
+                    group=groups[row],
+                )
             )
     found = measured(Measure(name, name, "", "column"), observations, names)
     for group in names:

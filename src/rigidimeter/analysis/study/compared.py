@@ -91,6 +91,15 @@ class Comparison:
         """The included values by condition, in the order of recording."""
         return {name: tuple(o.value for o in self.of(name)) for name in self.summaries}
 
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """The groups of subjects of the compared values; none where they are the conditions."""
+        own = [o for o in self.observations if o.condition in self.pair and o.group]
+        if all(o.group == o.condition for o in own):
+            return ()
+        found = tuple(dict.fromkeys(o.group for o in own))
+        return found if len(found) > 1 else ()
+
     def of(self, condition: str) -> tuple[Observation, ...]:
         """Return the observations of one condition."""
         return tuple(each for each in self.observations if each.condition == condition)

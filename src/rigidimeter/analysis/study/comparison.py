@@ -145,12 +145,13 @@ def _observation(
     value, low, high = (
         float(getattr(result, measure.name + end, math.nan)) for end in ("", "_low", "_high")
     )
-    subject, day, unit = "", "", f"{result.source}/{result.epoch}"
+    subject, day, group, unit = "", "", "", f"{result.source}/{result.epoch}"
     if sessions is not None:
-        subject, day = sessions[result.source].subject, sessions[result.source].day
+        session = sessions[result.source]
+        subject, day, group = session.subject, session.day, session.group
         unit = f"{subject}/{day}"
     return Observation(
-        value, result.condition, subject, day, result.source, result.epoch, unit, low, high
+        value, result.condition, subject, day, result.source, result.epoch, unit, low, high, group
     )
 
 

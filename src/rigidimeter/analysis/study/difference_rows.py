@@ -6,9 +6,9 @@ import math
 from typing import NamedTuple
 
 from rigidimeter.analysis.study.conclusions import Conclusion, Conclusions, conclude
-from rigidimeter.analysis.study.differences import Difference, Three
+from rigidimeter.analysis.study.differences import Difference, Signed, signed
 from rigidimeter.analysis.study.results import StudyResult
-from rigidimeter.core.words import condition_name, decimals, fixed, number, p_value, scaled
+from rigidimeter.core.words import condition_name, number, p_value, scaled
 
 VERDICTS = {
     "lower": "lower",
@@ -68,7 +68,7 @@ def difference_rows(concluded: Conclusions) -> list[DifferenceRow]:
 def _row(one: Conclusion) -> DifferenceRow:
     d, measure = one.difference, one.comparison.measure
     factor, unit = scaled(max(abs(d.reference), abs(d.other)), measure.unit)
-    difference, ends = _cells(d.percent, d.tested, factor)
+    difference, ends = _cells(d, factor)
     return DifferenceRow(
         one,
         measure.short,
@@ -83,18 +83,10 @@ def _row(one: Conclusion) -> DifferenceRow:
     )
 
 
-def _cells(percent: Three, own: Three, factor: float) -> tuple[str, str]:
-    in_percent = not math.isnan(percent[0])
-    estimate, low, high = percent if in_percent else (factor * size for size in own)
-    if math.isnan(estimate):
-        return "–", ""
-    after = " %" * in_percent
-    places = decimals((high - low) / 2, estimate)
-    ends = ""
-    if not math.isnan(low):
-        ends = f"{fixed(low, places, sign=True)} to {fixed(high, places, sign=True)}{after}"
-    return f"{fixed(estimate, places, sign=True)}{after}", ends
+def _cells(d: Difference, factor: float) -> Signed:
+    estimate, low, high = d.tested
+    return signed(d.percent, (factor * estimate, factor * low, factor * high))
 
 
 def _simulated(d: Difference, factor: float) -> str:
-    return _cells(d.percent, d.tested, factor)[0] if d.estimate else "0"
+    return _cells(d, factor).value if d.estimate else "0"

@@ -18,17 +18,25 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from rigidimeter.analysis.statistics import DayDifference
 from rigidimeter.analysis.study.compared import Comparison
 from rigidimeter.analysis.study.measures import Observation
 from rigidimeter.analysis.study.results import Condition
+from rigidimeter.core.words import decimals, fixed
 
 ACCURACY = 0.001
 """As a share: the mean error of J, B and K of relaxed epochs is below it (accuracy.md)."""
 
 Three = tuple[float, float, float]
+
+
+class Signed(NamedTuple):
+    """A difference in words with its sign, and the ends of its interval; `ends` may be empty."""
+
+    value: str
+    ends: str
 
 
 @dataclass(frozen=True)
@@ -105,6 +113,24 @@ class Difference:
             ),
             "p": self.p,
         }
+
+
+def signed(percent: Three, own: Three, unit: str = "", two_below: float = 5.0) -> Signed:
+    """Return a difference and its interval in words: in per cent where that has a meaning.
+
+    Examples
+    --------
+    >>> signed((-18.2, -29.0, -7.4), (-0.3, -0.5, -0.1), "N·m/rad")
+    Signed(value='−18 %', ends='−29 to −7 %')
+    """
+    known = not math.isnan(percent[0])
+    estimate, low, high = percent if known else own
+    if math.isnan(estimate):
+        return Signed("–", "")
+    after = " %" if known else f" {unit}".rstrip()
+    digits = decimals((high - low) / 2, estimate, two_below)
+    value, *ends = (fixed(size, digits, sign=True) for size in (estimate, low, high))
+    return Signed(f"{value}{after}", "" if math.isnan(low) else f"{' to '.join(ends)}{after}")
 
 
 def by_units(c: Comparison, found: DayDifference | None) -> Difference:

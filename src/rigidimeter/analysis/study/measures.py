@@ -88,6 +88,8 @@ class Observation:
         Empty where unknown.
     unit : str
         What the bootstrap resamples: a day of a subject, a session, or the value itself.
+    group : str
+        Of subjects, such as patients.
     """
 
     value: float
@@ -99,6 +101,7 @@ class Observation:
     unit: str = ""
     low: float = math.nan
     high: float = math.nan
+    group: str = ""
 
 
 def conditions(analysis: Analysis) -> tuple[str, ...]:

@@ -13,11 +13,20 @@ from datetime import date
 
 from rigidimeter.analysis.estimation import method_named
 from rigidimeter.analysis.study.compared import Comparison
+from rigidimeter.analysis.study.differences import signed
 from rigidimeter.analysis.study.families import Family
 from rigidimeter.analysis.study.ratings_found import RatingsFound
 from rigidimeter.analysis.study.ratings_model import rated_one_condition, without_examiners
 from rigidimeter.analysis.study.results import StudyResult
-from rigidimeter.analysis.study.tested import LEVEL, Basis, Test, by_days, tested_again
+from rigidimeter.analysis.study.tested import (
+    LEVEL,
+    Basis,
+    Test,
+    basis_of,
+    by_days,
+    by_groups,
+    tested_again,
+)
 from rigidimeter.core.findings import Fact, Finding, found_between
 from rigidimeter.core.records import Analysis, Fit
 from rigidimeter.core.words import condition_name, plural, series
@@ -70,6 +79,9 @@ def objections(
         Of the inertia, where that is found to differ.
     """
     c = test.comparison
+    groups = by_groups(c, basis)
+    if not all(again.agrees(test) for again in groups.values()):
+        yield _of_groups(groups)
     if result.ratings is not None and c.measure.origin == "ratings":
         yield from _one_sided(test, result.ratings)
     if c.measure.origin in ("fits", "scores"):
@@ -88,6 +100,9 @@ def objections(
 
 def hidden(c: Comparison, result: StudyResult) -> Finding | None:
     """Return what can hide a difference that was not found, the most specific; None without any."""
+    groups = by_groups(c, basis_of([c]))
+    if any(again.found for again in groups.values()):
+        return _of_groups(groups)
     flagged = flagged_epochs(c, result.analysis)
     if flagged and (share := _largest_share(c, flagged)) >= SHARE_THAT_HIDES:
         facts = _carried(c, flagged) | {"variant": "hides"}
@@ -277,6 +292,15 @@ def _cleared(test: Test, result: StudyResult) -> bool:
         and row.shift * test.sign < 0  # the shift is reference − other
         for row in result.sensitivity
     )
+
+
+def _of_groups(groups: Mapping[str, Test]) -> Finding:
+    """Return that groups of subjects differ in what the condition does, and how."""
+    each = [
+        f"{name} {signed(again.difference.percent, again.difference.tested).value} ({again.said})"
+        for name, again in groups.items()
+    ]
+    return found_between("groups_differ", {"groups": ", ".join(each)}, len(groups))
 
 
 def _one_sided(test: Test, ratings: RatingsFound) -> Iterator[Finding]:

@@ -68,6 +68,7 @@ class Condition:
 class SessionEntry:
     """One recording of a study: whose, when, in what condition, and where it lies.
 
+    `group` is that of the subject, such as patients; empty where the table has none.
     `source` is the name by which its epochs go in an analysis; `code` is the blinded name of its
     condition as the table has it, `condition` what the key says, or the code without a key.
     """
@@ -78,6 +79,7 @@ class SessionEntry:
     code: str
     path: str
     source: str
+    group: str = ""
 
 
 @dataclass(frozen=True)

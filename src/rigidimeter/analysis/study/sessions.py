@@ -203,7 +203,7 @@ def _read(
     said = [*said, *differing]
     tasks = [task_of(epoch, settings or Settings()) for epoch in epochs]
     entry = SessionEntry(
-        row["subject"], row["day"], condition, row["condition"], row["path"], source
+        row["subject"], row["day"], condition, row["condition"], row["path"], source, row["group"]
     )
     kept = tuple(
         replace(epoch, source=source, condition=condition, task=task)

@@ -10,8 +10,9 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 
+from rigidimeter.analysis.study.compared import Comparison
 from rigidimeter.analysis.study.conclusions import Conclusion, Conclusions, Verdict, conclude
-from rigidimeter.analysis.study.differences import Three
+from rigidimeter.analysis.study.differences import signed
 from rigidimeter.analysis.study.families import Role
 from rigidimeter.analysis.study.reached_precision import precisions
 from rigidimeter.analysis.study.results import StudyResult
@@ -85,13 +86,13 @@ def _quoted(shown: Sequence[Conclusion]) -> str:
     before: Conclusion | None = None
     for one in shown:
         c, d = one.comparison, one.difference
-        size = _size(d.percent, d.tested, c.measure.unit)
+        size = signed(d.percent, d.tested, c.measure.unit)
         inside = [f"95 % interval {size.ends}"] if size.ends else []
         inside += [one.test] if one.test and (before is None or one.test != before.test) else []
         inside.append(p_text(one.p, LEAST_P))
         went = ""
         if before is None:
-            went = f" was {one.verdict} in {c.other} than in {c.reference}:"
+            went = f" was {one.verdict} {_than(c)}:"
         elif one.verdict != before.verdict:
             went = f" was {one.verdict}:"
         parts.append(f"{within(c.measure.title)}{went} {size.value} ({', '.join(inside)})")
@@ -130,25 +131,16 @@ def _whom(concluded: Conclusions) -> tuple[str, str]:
     return f"in {these}", f"other days of {these}, not for other subjects"
 
 
+def _than(c: Comparison) -> str:
+    """Return ``in DBS than in OFF``; a difference is claimed of all groups or of none."""
+    each = f" in each of the groups {series(c.groups)}" if c.groups else ""
+    return f"in {condition_name(c.other)} than in {condition_name(c.reference)}{each}"
+
+
 def _beginning(where: str, clause: str) -> str:
     """Return a clause as the beginning of a sentence, after whom it speaks of."""
     text = f"{where}, {clause}" if where else clause
     return text[:1].upper() + text[1:]
-
-
-class _Size(NamedTuple):
-    value: str
-    ends: str
-
-
-def _size(percent: Three, own: Three, unit: str, two_below: float = 5.0) -> _Size:
-    """Return a difference and its interval with their signs: other − reference."""
-    known = not math.isnan(percent[0])
-    estimate, low, high = percent if known else own
-    after = " %" if known else f" {unit}".rstrip()
-    digits = decimals((high - low) / 2, estimate, two_below)
-    value, *ends = (fixed(size, digits, sign=True) for size in (estimate, low, high))
-    return _Size(f"{value}{after}", "" if math.isnan(low) else f"{' to '.join(ends)}{after}")
 
 
 def _measured(concluded: Conclusions) -> str:
@@ -158,7 +150,7 @@ def _measured(concluded: Conclusions) -> str:
         c, d = one.comparison, one.difference
         if math.isnan(d.estimate):
             continue
-        size = _size(d.measured_percent, d.measured, c.measure.unit, 1.0)
+        size = signed(d.measured_percent, d.measured, c.measure.unit, 1.0)
         ends = f" ({size.ends.removesuffix(' %')})" if size.ends else ""
         parts.append(f"{c.measure.short} {size.value}{ends}")
     if not parts:
@@ -166,7 +158,9 @@ def _measured(concluded: Conclusions) -> str:
     pair = concluded.each[0].comparison
     difference = f"{condition_name(pair.other)} − {condition_name(pair.reference)}"
     alone = f" {MEASUREMENT_ALONE}" if "(" in "".join(parts) else ""
-    return f"Between these recordings, {difference}: {series(parts)}.{alone}"
+    of = f" of {series(pair.groups)} together" if pair.groups else ""
+    what = "values" if concluded.basis == "values" else "recordings"
+    return f"Between these {what}{of}, {difference}: {series(parts)}.{alone}"
 
 
 def _tested(concluded: Conclusions) -> str:
@@ -202,8 +196,7 @@ def _adjusted(concluded: Conclusions, *roles: Role) -> str:
 def _concluded(concluded: Conclusions) -> list[str]:
     """Return a sentence for each verdict and reason, the most important first."""
     pair = concluded.each[0].comparison
-    reference, other = condition_name(pair.reference), condition_name(pair.other)
-    both = f"{reference} and {other}"
+    both = f"{condition_name(pair.reference)} and {condition_name(pair.other)}"
     where, reach = _whom(concluded)
     wanted = f"{concluded.each[0].wanted_percent:g} %"
 
@@ -216,7 +209,7 @@ def _concluded(concluded: Conclusions) -> list[str]:
         for side in sides:
             if own := [one for one in concluded.of(side) if one.role == role]:
                 are = "is" if len(own) == 1 else "are"
-                found.append(f"{names(own)} {are} {side} in {other} than in {reference}")
+                found.append(f"{names(own)} {are} {side} {_than(pair)}")
         return found
 
     outcomes = [one for one in concluded.each if one.role != "check"] or concluded.each

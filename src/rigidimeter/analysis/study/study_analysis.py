@@ -6,7 +6,7 @@ the analysis of all. Methods of the sensitivity analysis run once each.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -41,6 +41,9 @@ from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Analysis, Epoch, Notice
 from rigidimeter.core.settings import Settings, changed_settings
 from rigidimeter.core.study_files import STUDY_FILE, StudyFolder, TableRow, read_study_folder
+
+GROUP = "group"
+"""The column that says of which group, such as patients, a subject is."""
 
 MEASURE_MS, RESAMPLE_MS = 50.0, 0.01
 """What the tests of a measure cost, beside the steps of `analysis.step_costs`."""
@@ -89,6 +92,7 @@ def read_study(
     settings: Settings | None = None,
     method: str = "auto",
     pair: tuple[str | None, str | None] = (None, None),
+    group: str | None = None,
     progress: Progress = lambda _: None,
 ) -> StudyRead:
     """Read a study folder and every recording in it.
@@ -104,6 +108,8 @@ def read_study(
         Instead of that of `study.toml`; ``auto`` leaves it.
     pair : (str or None, str or None)
         Other conditions than `study.toml` compares.
+    group : str, optional
+        Take the subjects of this group alone, of the column `group` of the sessions.
     progress : callable
         Called with the share of the recordings that was read since, 1 in all.
 
@@ -113,6 +119,8 @@ def read_study(
         If there is nothing to analyse, or an option names what does not exist.
     """
     read = read_study_folder(folder, key)
+    if group is not None:
+        read = _of_group(read, group)
     chosen = method if method != "auto" else read.about.analysis.method
     if chosen not in method_names():
         where = "--method" if method != "auto" else f"{folder / 'study.toml'}: analysis.method ="
@@ -143,6 +151,27 @@ def read_study(
         (*read.notices, *said, *gathered.notices, *excluded, *primary.notices),
         tuple(name for name in names.known if name in there) if pair[1] is None else (),
         primary,
+    )
+
+
+def no_such_group(source: str, group: str, labels: Iterable[str]) -> str:
+    """Return that a table has no such group of subjects, and which it has."""
+    known = ", ".join(filter(None, dict.fromkeys(labels)))
+    return f"{source}: there is no group {group}; there are: {known or 'none'}"
+
+
+def _of_group(read: StudyFolder, group: str) -> StudyFolder:
+    """Return a study of one group of subjects: their sessions, ratings and exclusions."""
+    sessions = tuple(row for row in read.sessions if row[GROUP] == group)
+    if not sessions:
+        source = str(read.folder / read.about.sessions)
+        raise UserError(no_such_group(source, group, (row[GROUP] for row in read.sessions)))
+    paths, subjects = ({row[name] for row in sessions} for name in ("path", "subject"))
+    return replace(
+        read,
+        sessions=sessions,
+        ratings=tuple(row for row in read.ratings if row["subject"] in subjects),
+        exclusions=tuple(row for row in read.exclusions if row["path"] in paths),
     )
 
 
@@ -181,7 +210,7 @@ def analyse_study(
     comparisons = gathered(main, pair, sessions)
     ratings, said = rated(read.folder, read.names)
     if ratings is not None:
-        comparisons = (*comparisons, ratings_comparison(ratings))
+        comparisons = (*comparisons, _grouped(ratings_comparison(ratings), sessions.values()))
     comparisons, differences = compare_measures(
         comparisons,
         seed=seed,
@@ -231,6 +260,13 @@ def analyse_study(
         further=further,
         primary=read.primary,
     )
+
+
+def _grouped(c: Comparison, sessions: Iterable[SessionEntry]) -> Comparison:
+    """Return the comparison of the ratings, which name a subject, with their groups."""
+    groups = {session.subject: session.group for session in sessions}
+    own = tuple(replace(o, group=groups.get(o.subject, "")) for o in c.observations)
+    return replace(c, observations=own)
 
 
 def _lacking(comparisons: Sequence[Comparison], pair: tuple[str, str]) -> list[Notice]:

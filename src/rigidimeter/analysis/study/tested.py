@@ -122,6 +122,14 @@ def _half_of_shift(x: tuple[float, ...], y: tuple[float, ...], level: float) -> 
     return (test.shift_high - test.shift_low) / 2 if test.shift_bounded else math.inf
 
 
+def by_groups(c: Comparison, basis: Basis) -> dict[str, Test]:
+    """Return the test within each group of subjects; nothing where there are not two."""
+    return {
+        group: tested_again(c, [o for o in c.observations if o.group == group], basis)
+        for group in c.groups
+    }
+
+
 def tested_again(c: Comparison, observations: Sequence[Observation], basis: Basis) -> Test:
     """Return the test of a comparison with other observations."""
     values = {name: [o.value for o in observations if o.condition == name] for name in c.summaries}

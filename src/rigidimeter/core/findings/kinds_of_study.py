@@ -69,6 +69,19 @@ STUDY_KINDS = (
         example={"value": 83.0, "limit": 10.0, "others": " (or 1 other finding)"},
     ),
     Kind(
+        "groups_differ",
+        "number of groups of subjects, where not each of them shows the difference by itself",
+        headline="groups differ: {groups}",
+        measured="Within each group by itself: {groups}.",
+        meaning="A mean over groups that respond differently speaks of none of them.",
+        remedy="Compare each group by itself: --group NAME, or group= in Python.",
+        unit="1",
+        example={
+            "value": 2.0,
+            "groups": "patients −18 % (p = 0.001), controls 0 % (p = 0.9)",
+        },
+    ),
+    Kind(
         "examiners_of_one_condition",
         "number of examiners who rated one of the conditions alone, where the difference is not "
         "found without them",

@@ -31,7 +31,7 @@ from rigidimeter.core.study_files.study_toml import STUDY_FILE, StudyToml, read_
 TABLE_COLUMNS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "sessions": (
         ("path", "subject", "day", "condition"),
-        ("part", "mapping", "join", "clock_offset", "note"),
+        ("group", "part", "mapping", "join", "clock_offset", "note"),
     ),
     "ratings": (("subject", "day", "condition", "examiner", "score"), ("note",)),
     "exclusions": (("path", "epoch", "reason"), ("by", "note")),

@@ -153,5 +153,5 @@ def shown_below(row: Mapping[str, Any], column: Column, names: Mapping[str, str]
     low, high = (row.get(name) for name in column.ends)
     if not isinstance(low, float) or not isinstance(high, float) or not low < high:
         return ""
-    ends = sorted((low * column.page_factor, high * column.page_factor))
-    return interval(*ends, column.digits)
+    low, high = sorted((low * column.page_factor, high * column.page_factor))
+    return interval(low, high, column.digits)

@@ -236,6 +236,15 @@ def test_three_subjects_are_compared_and_words_say_so(study: Path, rigidimeter) 
         means = [[np.mean([o.value for o in c.of(name) if o.subject == f"S{k}"]) for k in (1, 2, 3)]
                  for name in c.pair]  # fmt: skip
         assert (c.days.mean_x, c.days.mean_y) == pytest.approx(np.mean(means, axis=1))
+    head, *lines = (study / "sessions.csv").read_text().splitlines()
+    groups = ["patients"] * 2 + ["controls"] * 4
+    lines = [f"{line},{group}" for line, group in zip(lines, groups, strict=True)]
+    (study / "sessions.csv").write_text("\n".join([f"{head},group", *lines]))
+    assert compare(study, resamples=0).comparison("work_j").groups == ("patients", "controls")
+    controls = read_study(study, group="controls").gathered.sessions
+    assert {session.entry.subject for session in controls} == {"S2", "S3"}
+    with pytest.raises(UserError, match=r"sessions.csv: there is no group old; there are: pat"):
+        read_study(study, group="old")
 
 
 def test_a_session_of_two_conditions_has_one_vote_on_the_protocol(study: Path, rigidimeter) -> None:

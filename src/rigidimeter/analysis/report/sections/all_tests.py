@@ -51,10 +51,10 @@ _EPOCHS_NOTE = Markup(
     "for all measures by Holm’s method."
 )
 _DAYS_NOTE = Markup(
-    "{tests}. In brackets: <i>p</i> adjusted in its family. <i>p</i> of day medians: exact rank-sum "
-    "test of the medians of the days. Between days: the share of the variance between epochs of "
-    "one condition that is between days.{ratings} Differences are {pair}; the file has them as "
-    "{turned}."
+    "{tests}. In brackets: <i>p</i> adjusted in its family. <i>p</i> of day medians: exact "
+    "rank-sum test of the medians of the days. Between days: the share of the variance between "
+    "epochs of one condition that is between days.{ratings} Differences are {pair}; the file has "
+    "them as {turned}."
 )
 
 
