@@ -216,9 +216,7 @@ def shown_table(table: Description, names: Mapping[str, str]) -> Table:
     columns = table.shown_columns(several_sources=len(names) > 1)
     rows = [
         tuple(
-            " ".join(
-                filter(None, (shown_value(row.get(c.name), c, names), shown_below(row, c, names)))
-            )
+            " ".join(filter(None, (shown_value(row, c, names), shown_below(row, c, names))))
             for c in columns
         )
         for row in table.rows

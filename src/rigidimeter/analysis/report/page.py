@@ -26,6 +26,9 @@ from rigidimeter.core.files import csv_text, visible
 from rigidimeter.core.version import __version__
 from rigidimeter.core.words import Column, Table, epoch_name, short_names, shown_below, shown_value
 
+MOST_PRINTED = 30
+"""A longer table that is folded on the page is not printed unless everything is."""
+
 Contents = Sequence[tuple[Section, Sequence[Block]]]
 """The sections of a result, each with its text, tables and figures."""
 
@@ -163,14 +166,19 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
     light = traffic_light(result)
     traces = page_traces(result)
     script = _script() if traces else ""
+    shown = parts(made)
     return _template().render(
         result=result,
-        show=lambda value, column: shown_value(value, column, names),
+        show=lambda row, column: shown_value(row, column, names),
         below=lambda row, column: shown_below(row, column, names),
         shown_columns=lambda table: table.shown_columns(several_sources=len(names) > 1),
         # The style is this package's own file and needs no escaping.
         css=Markup("\n".join([_text("page.css"), *([_plot(".min.css")] if traces else [])])),
-        parts=parts(made),
+        parts=shown,
+        most_printed=MOST_PRINTED,
+        not_printed=[
+            section.title for part in shown for section, _ in part.sections if not section.printed
+        ],
         images=_images(made, svg, {key: place for place, key in enumerate(traces)}, names),
         traces=Markup(traces_json(traces.values())) if traces else "",
         script=Markup(script),

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from rigidimeter.core.words.numbers import interval, number, p_value
+from rigidimeter.core.words.numbers import interval, number, p_value, with_error
 
 Kind = Literal[
     "text",
@@ -53,7 +53,9 @@ class Column:
     page_factor : float
         The page shows the number times this, in the unit that the heading states.
     digits : int
-        Significant digits that the page shows of a number.
+        Significant digits that the page shows of a number without `error`.
+    error : str
+        The key of the number's standard error, which is shown behind it.
     group : str
         Neighbouring columns of one group share a heading above their own.
     below : str
@@ -68,6 +70,7 @@ class Column:
     digits: int = 4
     group: str = ""
     below: str = ""
+    error: str = ""
 
 
 SESSION = (
@@ -121,8 +124,16 @@ class Table:
         ]
 
 
-def shown_value(value: Any, column: Column, names: Mapping[str, str]) -> str:
-    """Return a value as the page prints it."""
+def shown_value(row: Mapping[str, Any], column: Column, names: Mapping[str, str]) -> str:
+    """Return the value of a row in a column as the page prints it."""
+    value = row.get(column.name)
+    if column.error and isinstance(value, float):
+        error = row.get(column.error, math.nan)
+        return with_error(value * column.page_factor, error * column.page_factor)
+    return _shown(value, column, names)
+
+
+def _shown(value: Any, column: Column, names: Mapping[str, str]) -> str:
     if value is None or value == "":
         return "(no condition)" if column.kind == "condition" else "–"
     if isinstance(value, bool):
@@ -147,7 +158,7 @@ def shown_below(row: Mapping[str, Any], column: Column, names: Mapping[str, str]
     """
     if column.below:
         second = row.get(column.below)
-        return "" if second in (None, "") else f"({shown_value(second, column, names)})"
+        return "" if second in (None, "") else f"({_shown(second, column, names)})"
     if column.ends is None:
         return ""
     low, high = (row.get(name) for name in column.ends)

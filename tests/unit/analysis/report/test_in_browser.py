@@ -115,13 +115,43 @@ def test_the_print_is_the_first_parts_with_page_numbers(
         return len(re.findall(rb"/Type\s*/Page\b", page.pdf(prefer_css_page_size=True)))
 
     first = pages()
-    assert 2 <= first <= 8
+    assert 2 <= first <= 11
     page.locator("#everything").check()
     page.locator("details.long").evaluate_all("all => all.forEach(one => one.open = true)")
     assert pages() > first
     assert "counter(page)" in reports["study"].read_text(encoding="utf-8")
     page.locator("#everything").uncheck()
     page.reload()
+
+
+def test_the_print_has_rig_settings_and_provenance_and_names_what_is_not_in_it(
+    on_a_desk: Page,
+) -> None:
+    page = on_a_desk
+    page.emulate_media(media="print")
+    chapters = [one for one in page.locator("h2").all_inner_texts() if one]
+    assert {"What was done", "Was the rig right", "Were the epochs good", "Provenance"} <= set(
+        one.strip("?") for one in chapters
+    )
+    for shown in ("#design table:has-text('Estimation')", "#provenance table"):
+        assert page.locator(shown).is_visible(), shown
+    # What is folded on a screen cannot be unfolded on paper.
+    excluded = page.locator("#exclusions details", has_text="by whom and why")
+    assert excluded.locator("td").first.is_visible()
+    left_out = page.locator("footer .left-out").inner_text()
+    hidden = page.locator("section.on-screen").all()
+    assert len(hidden) >= 3
+    for section in hidden:
+        assert not section.is_visible()
+        title = section.locator("h3").first.text_content() or ""
+        assert title in left_out
+    assert "tables/" in str(page.locator("details.many + .left-out").first.text_content())
+    page.locator("#everything").evaluate("one => one.checked = true")
+    assert page.locator("#tables details td").first.is_visible()
+    assert not page.locator("footer .left-out").is_visible()
+    page.locator("#everything").evaluate("one => one.checked = false")
+    page.emulate_media(media="screen")
+    assert not page.locator("footer .left-out").is_visible()
 
 
 def test_the_dark_scheme_is_dark_and_its_text_light(

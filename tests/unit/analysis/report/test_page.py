@@ -16,7 +16,7 @@ from rigidimeter.analysis.report.page import contents, render_page, tables, writ
 from rigidimeter.analysis.study import StudyResult, estimate
 from rigidimeter.core.findings import Finding, Level
 from rigidimeter.core.records import Epoch, Notice, Outcome
-from rigidimeter.core.words import interval, number
+from rigidimeter.core.words import interval, with_error
 
 NASTY = "<script>alert('x')</script>&amp;\"$_$"
 VOID = {"meta", "img", "br", "link", "input", "hr"}
@@ -209,7 +209,7 @@ def test_page_tells_what_the_estimates_know(page: Page, study: StudyResult) -> N
     assert "Method: iv (instrumental variables" in text
     assert f"Chosen automatically: {analysis.method_reason}." in text
     for delay in analysis.delays:
-        assert f"{number(1e3 * delay.delay_s)}" in text
+        assert with_error(1e3 * delay.delay_s, 1e3 * delay.delay_s_se) in text
     for fit in (*analysis.fits, *analysis.fixed_inertia, *analysis.pooled):
         assert interval(fit.stiffness_nm_rad_low, fit.stiffness_nm_rad_high) in text
     assert "(all)" in text

@@ -64,8 +64,7 @@ def _estimation(result: StudyResult) -> Iterator[Block]:
         "Delay of the torque relative to the motion",
         (
             WHO[0],
-            Column("delay_s", "Torque late by (ms)", page_factor=1e3),
-            Column("delay_s_se", "SE (ms)", page_factor=1e3),
+            Column("delay_s", "Torque delay ± SE (ms)", page_factor=1e3, error="delay_s_se"),
             Column("corrected", "Corrected", "label"),
             Column("done", "What was done", "reason"),
         ),
@@ -77,6 +76,7 @@ def _estimation(result: StudyResult) -> Iterator[Block]:
         note="A delay is positive where the time stamps of the torque are later than the motion "
         "that they belong to. SE is its standard error.",
         empty="The delay between torque and motion was not estimated.",
+        folding=len(analysis.delays) > 1,
     )
 
 
@@ -216,7 +216,7 @@ RIG = part(
     "Was the rig right",
     Section("notices", "Notices", _notices),
     Section("estimation", "Estimation", _estimation),
-    printed=1,
+    printed=2,
 )
 EPOCHS = part(
     "Were the epochs good",
@@ -225,4 +225,4 @@ EPOCHS = part(
     Section("recorded", "As recorded", _recorded),
     printed=1,
 )
-PROVENANCE = part("Provenance", Section("provenance", "Provenance", _provenance))
+PROVENANCE = part("Provenance", Section("provenance", "Provenance", _provenance), printed=1)

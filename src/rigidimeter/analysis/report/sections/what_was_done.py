@@ -281,5 +281,5 @@ SECTIONS = part(
     Section("about", "What this is", _about),
     Section("design", "Study design", _design),
     Section("perturbation", "Perturbation", _perturbation),
-    printed=1,
+    printed=4,
 )
