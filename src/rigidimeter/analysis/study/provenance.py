@@ -42,8 +42,9 @@ def provenance(
         if is_session(path):
             manifest = read_manifest(path)
             checked = "session_id" in manifest
+            seeds = ", ".join(f"{name} {seed}" for name, seed in manifest["seeds"].items())
             facts[f"{path}"] = (
-                f"session of {manifest['created_utc']}, seeds {manifest['seeds']}, samples SHA-256 "
+                f"session of {manifest['created_utc']}, seeds {seeds}, samples SHA-256 "
                 f"{digests.get(path / SAMPLES, 'not known')}, "
                 + ("with checksums" if checked else "without checksums: cannot be verified")
             )

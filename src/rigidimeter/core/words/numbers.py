@@ -67,7 +67,7 @@ def tick_labels(values: Sequence[float], *, logarithmic: bool = False) -> list[s
     """
     largest = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
     if logarithmic or not largest:
-        return [_alone(value) for value in values]
+        return [_alone(value, least=1e-3) for value in values]
     power = 0 if _PLAIN_TICKS[0] <= largest < _PLAIN_TICKS[1] else math.floor(math.log10(largest))
     along = [value / 10.0**power for value in values]
     step = min((b - a for a, b in pairwise(sorted(along)) if b > a), default=1.0)
@@ -77,9 +77,9 @@ def tick_labels(values: Sequence[float], *, logarithmic: bool = False) -> list[s
     ]
 
 
-def _alone(value: float) -> str:
+def _alone(value: float, least: float = _PLAIN_TICKS[0]) -> str:
     """Return a round number with no more digits than it has."""
-    if not math.isfinite(value) or not value or _PLAIN_TICKS[0] <= abs(value) < _PLAIN_TICKS[1]:
+    if not math.isfinite(value) or not value or least <= abs(value) < _PLAIN_TICKS[1]:
         return _written(f"{value:.6g}")
     text = _written(re.sub(r"\.?0*e", "e", f"{value:.5e}"))
     return re.sub(r"^(−?)1·", r"\1", text)

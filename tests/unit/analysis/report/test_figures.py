@@ -253,7 +253,7 @@ def test_ticks_are_written_as_all_numbers_of_the_page_are() -> None:
     assert tick_texts(1e-8, 100.0, scale="log")[1:] == [
         "10⁻⁸",
         "10⁻⁶",
-        "0.0001",
+        "10⁻⁴",
         "0.01",
         "1",
         "100",

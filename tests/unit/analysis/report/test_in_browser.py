@@ -70,7 +70,7 @@ def test_the_first_screen_holds_stiffness_and_the_traffic_light(
         assert box["y"] >= 0
         assert box["y"] + box["height"] <= size[1]
         assert box["x"] + box["width"] <= size[0]
-    ends = r"−\d+ to −\d+ %" if name == "study" else r"\[[\d.]+ to [\d.]+"
+    ends = r"−\d+ to −\d+ %" if name == "study" else r"[\d.]+ to [\d.]+"
     assert re.search(ends, row.inner_text())
     assert row.locator("svg.interval").is_visible()
     assert "Data quality: good" in page.locator(".light").inner_text()

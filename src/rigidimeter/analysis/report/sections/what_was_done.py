@@ -83,10 +83,10 @@ def _about(result: StudyResult) -> Iterator[Block]:
             "A robot moved a joint while torque and motion were recorded. Each epoch with a torque "
             "perturbation gives the joint’s inertia J, viscous damping B and stiffness K: the "
             'values with which <span class="formula">J θ″ + B θ′ + K θ = M</span> comes closest to '
-            "the measured torque M. These are compared. B and K with J held at {} over all "
-            "included epochs, as in the paper, are among the other methods. Each epoch with an "
-            "imposed sinusoid gives two scores per cycle: the angular impulse ∑|M|Δt and the work, "
-            "which is the area of the torque–angle loop."
+            "the measured torque M. These are what this page shows and compares. B and K with J "
+            "held at {} over all included epochs, as in the paper, are in a table of their own. "
+            "Each epoch with an imposed sinusoid gives two scores per cycle: the angular impulse "
+            "∑|M|Δt and the work, which is the area of the torque–angle loop."
         ).format(median)
     )
     yield paragraph(
@@ -116,7 +116,7 @@ def _design(result: StudyResult) -> Iterator[Block]:
             )
             for source, count in Counter(epoch.source for epoch in result.epochs).items()
         )
-        yield Markup('<h3>Sources</h3>\n<ol class="sources">\n{}\n</ol>').format(items)
+        yield Markup('<p>Sources:</p>\n<ol class="sources">\n{}\n</ol>').format(items)
     yield Table(
         "counts",
         "Epochs by task and condition",
