@@ -39,7 +39,8 @@ from rigidimeter.cli.report import report
 from rigidimeter.cli.reproduce import reproduce
 from rigidimeter.cli.run import recover, run
 from rigidimeter.cli.simulate import simulate
-from rigidimeter.cli.study import demo, study
+from rigidimeter.cli.study import demo
+from rigidimeter.cli.study_plan import study
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.extensions import load_file
 from rigidimeter.core.version import __version__

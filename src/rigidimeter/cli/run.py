@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from rigidimeter.cli.console import HOST, NO_TOKEN, PORT, TOKEN_FILE, require_page
-from rigidimeter.cli.help_pages import OPTIONS, RUN, argument
-from rigidimeter.cli.options import CPU, NEW_SESSION, PRIORITY, RIG, SEED
+from rigidimeter.cli.help_pages import OPTIONS, RUN, WRITE, argument
+from rigidimeter.cli.options import CPU, PRIORITY, RIG, SEED
 from rigidimeter.cli.output import echo
 from rigidimeter.core.errors import UserError
 
@@ -22,11 +23,38 @@ _ON_THE_PAGE = {
 
 
 def run(
-    out: Path = NEW_SESSION,
+    out: Path | None = WRITE.option(
+        "--out DIR", "New folder for the session. With --next it is in the study."
+    ),
     protocol: Path | None = argument("[PROTOCOL.toml]", "Settings with the protocol.", None),
     rig: Path | None = RIG,
     resume: Path | None = RUN.option(
         "--resume DIR", "Continue this session: run the epochs that are left."
+    ),
+    study: Path | None = RUN.option(
+        "--next STUDY", "Run the session of this study's plan that is due, after its wait."
+    ),
+    block: str = RUN.further(
+        "--block DAY/ORDER", "With --next: another session of the plan, or one once more.", ""
+    ),
+    subject: str = RUN.option("--subject CODE", "Code of the subject.", ""),
+    operator: str = RUN.further("--operator NAME", "Who leads the session.", ""),
+    day: str = RUN.further("--day LABEL", "Day of the study. Default: the date.", ""),
+    note: str = RUN.further("--note TEXT", "Note on the session.", ""),
+    stimulation: str = RUN.option(
+        "--stimulation TEXT",
+        "With --next: on, off, or since when on the clock, as `off since 10:42`.",
+        "",
+    ),
+    begin_anyway: str = RUN.further(
+        "--begin-anyway REASON", "With --next: begin before the wait is over. Recorded.", ""
+    ),
+    clock_speed: float = RUN.further(
+        "--clock-speed X",
+        "With --next on the virtual rig: waits pass so many times faster. Recorded.",
+        1.0,
+        min=1.0,
+        max=100000.0,
     ),
     seed: int | None = SEED,
     unattended: bool = RUN.flag(
@@ -75,8 +103,16 @@ def run(
       rigidimeter run --out session
       rigidimeter run protocol.toml --rig rig.toml --lead-range --out session
       rigidimeter run --resume session --rig rig.toml --out session-2
+      rigidimeter run --next study --stimulation "on since 10:42"
     """
     from rigidimeter.cli.attendance import attendance
+    from rigidimeter.cli.next_session import (
+        SaidOfSession,
+        added,
+        next_session,
+        refuse_with_next,
+        refuse_without_next,
+    )
     from rigidimeter.cli.planned_session import (
         checked_rig,
         conclude,
@@ -91,7 +127,20 @@ def run(
 
     for line in complete_left():
         echo(line, err=True)
-    planned = planned_session(protocol, resume, seed, virtual=rig is None)
+    said = SaidOfSession(
+        subject, operator, note, stimulation, block, begin_anyway, clock_speed, day
+    )
+    due = None
+    if study is not None:
+        refuse_with_next(out, protocol, resume, seed, day, page=page, blinded=blinded)
+        due = next_session(study, said, virtual=rig is None)
+        planned, out = due.planned(), due.folder
+    else:
+        refuse_without_next(said)
+        planned = planned_session(protocol, resume, seed, virtual=rig is None)
+        planned = replace(planned, about={**planned.about, **said.facts()})
+    if out is None:
+        raise UserError("--out is needed: name a new folder for the session")
     require_packages(planned.settings)
     offer_to_continue(out)
     if page:
@@ -125,6 +174,9 @@ def run(
     planned = planned.blinded() if blinded else planned
     planned = planned.within(entered_range(range_deg, rig, planned.settings, lead=lead_range))
     planned = checked_rig(planned, rig)
+    if due is not None:
+        due.wait()
+        planned = replace(planned, about=due.planned().about)
     attended, confirmed = attendance(rig, unattended=unattended, confirm=confirm)
     shown = planned.shown(virtual=rig is None)
     realtime = Realtime(priority=priority, cpu=cpu, attended=attended, confirmed=confirmed)
@@ -132,6 +184,8 @@ def run(
         ended = run_planned(planned, out, rig, realtime, console)
     for remark in ended.remarks:
         echo(remark, err=True)
+    if due is not None:
+        added(due)
     try:
         conclude(ended, out, rig, nwb=planned.settings.sharing.nwb_at_close)
     finally:

@@ -89,3 +89,4 @@ from rigidimeter.planning.search import (
     prbs_toml,
     strongest_amplitude_nm,
 )
+from rigidimeter.planning.study_days import StudyDays, draw_days

@@ -1,5 +1,15 @@
 """The files of a study: `study.toml`, and its tables of sessions, ratings and exclusions."""
 
+from rigidimeter.core.study_files.day_plan import (
+    PLAN_FILE,
+    PLAN_SCHEMA,
+    PLAN_TABLE,
+    PlannedBlock,
+    PlanToml,
+    StudyPlan,
+    read_plan,
+    write_plan,
+)
 from rigidimeter.core.study_files.exclusions import (
     exclude_epoch,
     excluded_epochs,
@@ -8,7 +18,23 @@ from rigidimeter.core.study_files.exclusions import (
 )
 from rigidimeter.core.study_files.extended_folder import extend_study, write_new_study
 from rigidimeter.core.study_files.folder import StudyFolder, TableRow, is_study, read_study_folder
+from rigidimeter.core.study_files.plan_progress import (
+    DueBlock,
+    RecordedBlock,
+    due_block,
+    named_block,
+    plan_facts,
+    recorded_blocks,
+)
 from rigidimeter.core.study_files.recorded_sessions import recorded_session, session_rows
+from rigidimeter.core.study_files.stimulation_log import (
+    STIMULATION_TABLE,
+    StimulationChange,
+    add_change,
+    last_change,
+    parse_change,
+    read_changes,
+)
 from rigidimeter.core.study_files.study_toml import (
     STUDY_FILE,
     STUDY_SCHEMA,

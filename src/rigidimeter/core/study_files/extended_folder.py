@@ -7,7 +7,7 @@ edited stays as it is.
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
@@ -47,8 +47,18 @@ from rigidimeter.core.study_files.tables import (
 _TABLES = ("sessions", "ratings", "exclusions")
 
 
-def write_new_study(folder: Path, title: str = "") -> None:
+def write_new_study(
+    folder: Path, title: str = "", planned: Mapping[str, ConditionTable] | None = None
+) -> None:
     """Make a study folder; without a title it has the folder's name.
+
+    Parameters
+    ----------
+    folder : Path
+    title : str
+    planned : mapping of str to ConditionTable, optional
+        The conditions of a plan, the reference first; then `study.toml` is marked as the program's
+        own, and grows with the sessions.
 
     Raises
     ------
@@ -67,9 +77,10 @@ def write_new_study(folder: Path, title: str = "") -> None:
     for name in _TABLES:
         write_text(folder / f"{name}.csv", empty_table(name))
     shown = title.strip() or folder.resolve().name
-    conditions = {OFF: ConditionTable(), DBS: ConditionTable()}
+    conditions = dict(planned or {OFF: ConditionTable(), DBS: ConditionTable()})
     primary = PrimaryTable(declared=date.today())
-    write_text(folder / STUDY_FILE, study_text(shown, OFF, DBS, conditions, primary))
+    text = study_text(shown, *tuple(conditions)[:2], conditions, primary)
+    write_text(folder / STUDY_FILE, text if planned is None else own_text(text))
 
 
 def extend_study(

@@ -33,7 +33,7 @@ class RecordedSession:
     subject : str
         Empty where it was not said.
     day : str
-        The date on which it began, where it was recorded.
+        Its label, or else the date on which it began, where it was recorded.
     virtual : bool
         Whether it was recorded on the virtual rig.
     conditions : tuple of str
@@ -72,6 +72,7 @@ def recorded_session(
         Of the laboratory, for the date; None for that of this computer.
     """
     about = manifest.get("about", {})
+    created = datetime.fromisoformat(manifest["created_utc"])
     begun = {event["epoch"]: event for event in events if event["event"] == "epoch_started"}
     ratings: dict[tuple[int, str], RecordedRating] = {}
     for event in events:
@@ -84,7 +85,7 @@ def recorded_session(
     return RecordedSession(
         path,
         str(about.get("subject", "")),
-        datetime.fromisoformat(manifest["created_utc"]).astimezone(zone).date().isoformat(),
+        str(about.get("day") or created.astimezone(zone).date().isoformat()),
         bool(manifest["virtual"]),
         tuple(dict.fromkeys(str(event["condition"]) for event in begun.values())),
         tuple(ratings.values()),

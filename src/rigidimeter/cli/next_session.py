@@ -1,0 +1,253 @@
+"""The session of a plan that is due: what to run, after which wait, and what it leaves."""
+
+from __future__ import annotations
+
+import re
+import time
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from rigidimeter.cli.output import echo
+from rigidimeter.cli.planned_session import PlannedSession, new_session
+from rigidimeter.cli.progress import Meter
+from rigidimeter.cli.study_plan import due_of, due_words, plan_of, subject_of, wait_words
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.settings import changed_settings, load_settings
+from rigidimeter.core.study_files import (
+    DueBlock,
+    StudyPlan,
+    add_change,
+    extend_study,
+    named_block,
+    parse_change,
+    plan_facts,
+    recorded_blocks,
+)
+
+_TICK_S = 0.5
+_SESSIONS = 1
+"""The stream of the plan's seed from which sessions draw theirs."""
+
+
+@dataclass(frozen=True)
+class SaidOfSession:
+    """What the operator said of a session, on the command line or in a form.
+
+    Attributes
+    ----------
+    subject, operator, note : str
+    stimulation : str
+        ``on``, ``off since 10:42``; empty if nothing was said.
+    block : str
+        ``DAY/ORDER``, to run another session than the one that is due; empty for that one.
+    begin_anyway : str
+        Why not to wait.
+    speed : float
+        Of the clock of the waits; above 1 on the virtual rig alone.
+    day : str
+        A label, where the session is of no plan.
+    """
+
+    subject: str = ""
+    operator: str = ""
+    note: str = ""
+    stimulation: str = ""
+    block: str = ""
+    begin_anyway: str = ""
+    speed: float = 1.0
+    day: str = ""
+
+    def facts(self) -> dict[str, str]:
+        """Return what a manifest says of a session of no plan."""
+        said = {
+            "subject": self.subject,
+            "operator": self.operator,
+            "note": self.note,
+            "day": self.day,
+        }
+        return {key: text for key, text in said.items() if text}
+
+
+@dataclass(frozen=True)
+class NextSession:
+    """A session of a plan, before its wait is over."""
+
+    plan: StudyPlan
+    due: DueBlock
+    said: SaidOfSession
+
+    @property
+    def folder(self) -> Path:
+        """The new folder of the session; its name does not give the condition away."""
+        block = self.due.block
+        part = f"-{self.due.part}" if self.due.part > 1 else ""
+        name = re.sub(r"[^\w.-]+", "-", f"{block.subject}-day-{block.day}-{block.order}{part}")
+        return self.plan.folder / "sessions" / name
+
+    def planned(self) -> PlannedSession:
+        """Return the session as it is to be run now, with its place in the plan."""
+        block, said = self.due.block, self.said
+        source = self.plan.folder / block.protocol
+        about = {
+            "subject": block.subject,
+            "operator": said.operator,
+            "note": said.note,
+            "day": block.day,
+            "conditions": [block.condition],
+            "plan": plan_facts(
+                self.plan,
+                self.due,
+                datetime.now(UTC),
+                speed=said.speed,
+                reason=said.begin_anyway,
+            ),
+        }
+        if self.plan.blinded:
+            about |= {"blinded": True, "codes": self.plan.about.codes}
+        settings = changed_settings(load_settings(source), {"seed": self._seed}, str(source))
+        told = {epoch.condition for epoch in settings.protocol.blocks}
+        if told != {block.condition}:
+            raise UserError(
+                f"{source}: has epochs of {', '.join(sorted(told))}, and the plan has "
+                f"{block.condition} in this session; correct one of them"
+            )
+        return new_session(settings, about, source)
+
+    @property
+    def _seed(self) -> int:
+        """Of the rests and of the virtual subject: another one in every session of the plan."""
+        place = self.plan.blocks.index(self.due.block)
+        key = (_SESSIONS, place, self.due.part)
+        state = np.random.SeedSequence(self.plan.about.seed, spawn_key=key).generate_state(1)
+        return int(state[0])
+
+    def wait(self) -> None:
+        """Count down to the end of the wait.
+
+        Raises
+        ------
+        UserError
+            If the wait has not begun.
+        """
+        said, speed = self.said, self.said.speed
+        left = self.due.left_min(datetime.now(UTC), speed)
+        if said.begin_anyway:
+            echo(f"Begun without waiting: {said.begin_anyway}")
+            return
+        if left is None:
+            raise UserError(
+                f"{wait_words(self.due, datetime.now(UTC))}; enter it with --stimulation "
+                '"on since 10:42", or begin with --begin-anyway REASON'
+            )
+        if left <= 0.0:
+            return
+        echo(wait_words(self.due, datetime.now(UTC), speed))
+        total_s = 60.0 * left / speed
+        start_s = time.monotonic()
+        with Meter("wait", total_s) as meter:
+            while (gone_s := time.monotonic() - start_s) < total_s:
+                meter.reach(gone_s)
+                time.sleep(min(_TICK_S, total_s - gone_s))
+
+
+def next_session(study: Path, said: SaidOfSession, *, virtual: bool) -> NextSession:
+    """Return the session of a study that is due, or the one that was named.
+
+    Raises
+    ------
+    UserError
+        If the study has no plan or nothing is left of it, the subject or session is not in it, or
+        the clock is speeded up where a person is waiting.
+    """
+    if said.speed != 1.0 and not virtual:
+        raise UserError("--clock-speed: is for the virtual rig; a person has to wait the full time")
+    plan = plan_of(study)
+    subject = subject_of(plan, said.subject)
+    if said.stimulation:
+        add_change(study, parse_change(said.stimulation, subject, datetime.now(UTC), said.operator))
+    if said.block:
+        found = _named(plan, subject, said.block)
+    else:
+        due = due_of(plan, subject)
+        if due is None:
+            raise UserError(
+                f"{study}: all sessions of {subject} are recorded; name one with --block DAY/ORDER "
+                "to run it again"
+            )
+        found = due
+    echo(due_words(plan, found))
+    return NextSession(plan, found, said)
+
+
+def added(session: NextSession) -> None:
+    """Add the recorded session to the study, and say what is left of the plan."""
+    for line in extend_study(session.plan.folder, [session.folder]):
+        echo(line)
+    due = due_of(session.plan, session.due.block.subject)
+    echo(due_words(session.plan, due) if due else "All sessions of the plan are recorded.")
+
+
+def refuse_with_next(
+    out: Path | None,
+    protocol: Path | None,
+    resume: Path | None,
+    seed: int | None,
+    day: str,
+    *,
+    page: bool,
+    blinded: bool,
+) -> None:
+    """Refuse what the plan of a study says.
+
+    Raises
+    ------
+    UserError
+        Naming the option.
+    """
+    given = {
+        "--out": out is not None,
+        "PROTOCOL.toml": protocol is not None,
+        "--resume": resume is not None,
+        "--seed": seed is not None,
+        "--day": bool(day),
+        "--blinded": blinded,
+        "--console": page,
+    }
+    for option, there in given.items():
+        if there:
+            raise UserError(f"{option} does not go with --next: the plan of the study says it")
+
+
+def refuse_without_next(said: SaidOfSession) -> None:
+    """Refuse what has a meaning with a plan alone.
+
+    Raises
+    ------
+    UserError
+        Naming the option.
+    """
+    given = {
+        "--stimulation": said.stimulation,
+        "--block": said.block,
+        "--begin-anyway": said.begin_anyway,
+        "--clock-speed": said.speed != 1.0,
+    }
+    for option, there in given.items():
+        if there:
+            raise UserError(f"{option} goes with --next STUDY alone")
+
+
+def _named(plan: StudyPlan, subject: str, text: str) -> DueBlock:
+    day, _, order = text.rpartition("/")
+    found = None
+    if order.isdigit():
+        found = named_block(plan, recorded_blocks(plan.folder), (subject, day, int(order)))
+    if found is None:
+        raise UserError(
+            f"--block {text}: the plan of {subject} has no such session; write its day and its "
+            "number on that day, such as 3/2"
+        )
+    return found

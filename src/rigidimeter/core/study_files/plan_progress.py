@@ -1,0 +1,193 @@
+"""What was recorded of a plan, and which session is due, after which wait.
+
+A session that was run from a plan has its place in its manifest, under `about.plan`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from rigidimeter.core.session import EVENTS, is_session, read_events, read_manifest
+from rigidimeter.core.study_files.day_plan import PlannedBlock, StudyPlan
+from rigidimeter.core.study_files.stimulation_log import (
+    StimulationChange,
+    last_change,
+    read_changes,
+)
+
+
+@dataclass(frozen=True)
+class RecordedBlock:
+    """A session folder, and the place in the plan that its manifest gives.
+
+    Attributes
+    ----------
+    path : str
+        Below the study folder.
+    created_utc : str
+    facts : mapping
+        `about.plan` of the manifest; empty where the session was not run from a plan.
+    good, planned : int
+        Epochs that ended with success, and those that were planned.
+    closed : bool
+    """
+
+    path: str
+    created_utc: str
+    facts: Mapping[str, Any]
+    good: int
+    planned: int
+    closed: bool
+
+    @property
+    def key(self) -> tuple[str, str, int] | None:
+        """Subject, day and place in the day; None where it was not run from a plan."""
+        if not self.facts:
+            return None
+        return str(self.facts["subject"]), str(self.facts["day"]), int(self.facts["order"])
+
+
+@dataclass(frozen=True)
+class DueBlock:
+    """The session that is due.
+
+    Attributes
+    ----------
+    block : PlannedBlock
+    place : (int, int)
+        Which one it is of how many, of this subject.
+    stimulation : str
+        What it must be: ``on`` or ``off``.
+    change : StimulationChange or None
+        The last change of the subject's stimulation that was written down.
+    wait_from : StimulationChange or None
+        From when the wait runs: from the change; where examiners are blinded from the last report,
+        which is made before every session, also where nothing is changed, since a wait that is
+        over at once would give the condition away. None where the state is another or unknown.
+    part : int
+        From 1; more where it was begun before.
+    """
+
+    block: PlannedBlock
+    place: tuple[int, int]
+    stimulation: str
+    change: StimulationChange | None
+    wait_from: StimulationChange | None
+    part: int = 1
+
+    def since_min(self, now: datetime, speed: float = 1.0) -> float | None:
+        """Return the minutes since the change, on a clock that is `speed` times as fast."""
+        known = self.change is not None and self.change.stimulation == self.stimulation
+        return speed * self.change.minutes_until(now) if known and self.change else None
+
+    def left_min(self, now: datetime, speed: float = 1.0) -> float | None:
+        """Return the minutes of the wait that are left; None where it has not begun."""
+        if self.block.wait_min == 0.0 and self.change is None:
+            return 0.0
+        if self.wait_from is None:
+            return None
+        return max(self.block.wait_min - speed * self.wait_from.minutes_until(now), 0.0)
+
+
+def recorded_blocks(study: Path) -> tuple[RecordedBlock, ...]:
+    """Return the sessions in a study folder and in its folder `sessions`, the oldest first."""
+    places = [place for place in (study, study / "sessions") if place.is_dir()]
+    folders = [path for place in places for path in place.iterdir() if is_session(path)]
+    found = []
+    for folder in folders:
+        manifest = read_manifest(folder)
+        events, _ = read_events(folder / EVENTS) if (folder / EVENTS).is_file() else ([], False)
+        ended = [event for event in events if event["event"] == "epoch_ended"]
+        found.append(
+            RecordedBlock(
+                os.path.relpath(folder, study).replace(os.sep, "/"),
+                str(manifest["created_utc"]),
+                manifest.get("about", {}).get("plan", {}),
+                sum(event["outcome"] == "success" for event in ended),
+                len(manifest["protocol"]),
+                any(event["event"] == "session_ended" for event in events),
+            )
+        )
+    return tuple(sorted(found, key=lambda one: one.created_utc))
+
+
+def due_block(plan: StudyPlan, recorded: Sequence[RecordedBlock], subject: str) -> DueBlock | None:
+    """Return the next session of a subject in the order of the plan; None if all are recorded.
+
+    A session that ended before all its epochs were run counts as recorded: it is continued, or run
+    again, by its name.
+    """
+    own = [block for block in plan.blocks if block.subject == subject]
+    times = {key: sum(one.key == key for one in recorded) for key in {b.key for b in own}}
+    for number, block in enumerate(own, start=1):
+        if not times[block.key]:
+            return _due(plan, recorded, block, (number, len(own)))
+    return None
+
+
+def named_block(
+    plan: StudyPlan, recorded: Sequence[RecordedBlock], key: tuple[str, str, int]
+) -> DueBlock | None:
+    """Return a session of the plan by its name, to be run out of order or once more."""
+    own = [block for block in plan.blocks if block.subject == key[0]]
+    for number, block in enumerate(own, start=1):
+        if block.key == key:
+            part = 1 + sum(one.key == key for one in recorded)
+            return _due(plan, recorded, block, (number, len(own)), part)
+    return None
+
+
+def _due(
+    plan: StudyPlan,
+    recorded: Sequence[RecordedBlock],
+    block: PlannedBlock,
+    place: tuple[int, int],
+    part: int = 1,
+) -> DueBlock:
+    changes = read_changes(plan.folder)
+    wanted, change = plan.about.stimulation_of(block.condition), last_change(changes, block.subject)
+    wait_from = change
+    if plan.blinded:
+        before = [one.created_utc for one in recorded if one.facts.get("subject") == block.subject]
+        since = datetime.fromisoformat(max(before)) if before else None
+        reports = [one for one in changes if one.subject == block.subject]
+        new = [one for one in reports if since is None or one.changed_utc > since]
+        wait_from = new[-1] if new else None
+    if wait_from is not None and wait_from.stimulation != wanted:
+        wait_from = None
+    return DueBlock(block, place, wanted, change, wait_from, part)
+
+
+def plan_facts(
+    plan: StudyPlan, due: DueBlock, now: datetime, *, speed: float = 1.0, reason: str = ""
+) -> dict[str, Any]:
+    """Return what the manifest of a session says of its place in the plan.
+
+    Parameters
+    ----------
+    plan : StudyPlan
+    due : DueBlock
+    now : datetime
+        When its first epoch may begin.
+    speed : float
+        Of the clock of the waits; above 1 in rehearsals alone.
+    reason : str
+        Why the wait was cut short, where it was.
+    """
+    since = due.since_min(now, speed)
+    change = due.change if since is not None else None
+    facts: dict[str, Any] = {
+        **plan.facts(due.block),
+        "stimulation": due.stimulation,
+        "stimulation_changed_utc": change.changed_utc.isoformat() if change else None,
+        "since_change_min": None if since is None else round(since, 2),
+        "clock_speed": speed,
+        "wait_cut_short": reason,
+        "begun_utc": now.astimezone(UTC).isoformat(timespec="seconds"),
+    }
+    return facts

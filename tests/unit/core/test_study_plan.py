@@ -1,0 +1,129 @@
+"""The files of a plan: written, edited, damaged; and the wait before the session that is due."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.study_files import (
+    PLAN_TABLE,
+    PlanToml,
+    StudyPlan,
+    add_change,
+    due_block,
+    parse_change,
+    read_changes,
+    read_plan,
+    write_plan,
+)
+from rigidimeter.planning import StudyDays, draw_days
+
+NOW = datetime(2026, 1, 5, 11, 0, tzinfo=UTC)
+SPEC = StudyDays(("S01",), ("OFF", "DBS"), 2, ("DBS",), order=("OFF", "DBS"))
+ABOUT = PlanToml(subjects=["S01"], days=2, conditions=["OFF", "DBS"], stimulated=["DBS"])
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> StudyPlan:
+    protocols = {f"protocols/{name}.toml": "" for name in SPEC.conditions}
+    return write_plan(tmp_path / "study", ABOUT, draw_days(SPEC, 1), protocols)
+
+
+def test_plan_is_read_as_it_was_drawn_and_known_to_be_edited(plan: StudyPlan) -> None:
+    again = read_plan(plan.folder)
+    assert again == plan
+    assert again is not None
+    assert [block.key[1:] for block in again.blocks] == [("1", 1), ("1", 2), ("2", 1), ("2", 2)]
+    assert not again.edited
+    table = plan.folder / PLAN_TABLE
+    table.write_text(table.read_text().replace("60.0", "30.0"))
+    edited = read_plan(plan.folder)
+    assert edited is not None
+    assert edited.edited
+    assert edited.blocks[0].wait_min == 30.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("60.0", "-1", "line 2: wait_min -1 must be from 0 to 1440 min"),
+        ("60.0", "soon", "line 2: "),
+        ("S01,1,1,OFF", "S02,1,1,OFF", "subject S02 is not one of those in plan.toml: S01"),
+        ("S01,1,1,OFF", "S01,1,1,ON", "condition ON is not one of those in plan.toml: OFF, DBS"),
+        ("S01,1,2", "S01,1,1", "day 1, order 1 is planned twice"),
+        ("S01,1,1,", "S01,1,0,", "order 0 must be a whole number from 1"),
+        ("prbs sinusoid", "prbs sine", "task 'prbs sine' must be prbs, sinusoid or both"),
+        ("protocols/OFF.toml", "../OFF.toml", "is outside the study folder"),
+        ("protocols/OFF.toml", "protocols/ON.toml", "there is no such file"),
+        ("wait_min", "wait", "there is no column wait_min"),
+        ("S01,1,1,", "S01,,1,", "line 2: day is empty"),
+    ],
+)
+def test_an_edited_plan_is_checked(plan: StudyPlan, old: str, new: str, sentence: str) -> None:
+    table = plan.folder / PLAN_TABLE
+    table.write_text(table.read_text().replace(old, new, 1))
+    with pytest.raises(UserError) as refused:
+        read_plan(plan.folder)
+    assert sentence in str(refused.value)
+    assert str(table) in str(refused.value)
+
+
+def test_a_plan_is_never_written_over(plan: StudyPlan) -> None:
+    with pytest.raises(UserError, match="is there already"):
+        write_plan(plan.folder, ABOUT, plan.blocks, {})
+
+
+def test_the_wait_runs_from_the_change(plan: StudyPlan) -> None:
+    due = due_block(plan, (), "S01")
+    assert due is not None
+    assert due.left_min(NOW) is None  # nobody said when it was switched off
+    add_change(plan.folder, parse_change("off since 10:42", "S01", NOW, zone=UTC))
+    due = due_block(plan, (), "S01")
+    assert due is not None
+    assert due.since_min(NOW) == 18.0
+    assert due.left_min(NOW) == 42.0
+    assert due.left_min(NOW, speed=2.0) == 24.0
+    assert due.left_min(NOW + timedelta(hours=1)) == 0.0
+    # The same state once more is no change.
+    add_change(plan.folder, parse_change("off", "S01", NOW))
+    due = due_block(plan, (), "S01")
+    assert due is not None
+    assert due.since_min(NOW) == 18.0
+    # Another state is not the one that the session needs.
+    add_change(plan.folder, parse_change("on", "S01", NOW))
+    due = due_block(plan, (), "S01")
+    assert due is not None
+    assert due.left_min(NOW) is None
+
+
+def test_a_blinded_wait_runs_from_the_last_report(plan: StudyPlan) -> None:
+    codes = {"OFF": "code-A", "DBS": "code-B"}
+    blinded = replace(plan, about=plan.about.model_copy(update={"codes": codes}))
+    add_change(plan.folder, parse_change("off since 10:42", "S01", NOW, zone=UTC))
+    add_change(plan.folder, parse_change("off", "S01", NOW))
+    due = due_block(blinded, (), "S01")
+    assert due is not None
+    assert due.left_min(NOW) == 60.0
+    assert due.since_min(NOW) == 18.0
+
+
+@pytest.mark.parametrize("text", ["", "maybe", "on since", "on since 25:00", "off since 10:75"])
+def test_a_change_that_cannot_be_read_is_refused(text: str) -> None:
+    with pytest.raises(UserError, match="write on or off, or since when on the clock"):
+        parse_change(text, "S01", NOW, zone=UTC)
+
+
+def test_changes_are_in_order(plan: StudyPlan) -> None:
+    add_change(plan.folder, parse_change("on", "S01", NOW))
+    with pytest.raises(UserError, match="is before its last change"):
+        add_change(plan.folder, parse_change("off since 10:00", "S01", NOW, zone=UTC))
+    late = parse_change("off since 23:50", "S02", NOW, zone=UTC)
+    assert late.changed_utc == datetime(2026, 1, 4, 23, 50, tzinfo=UTC)
+    table = plan.folder / "stimulation.csv"
+    table.write_text(table.read_text().replace(",on,", ",half,"))
+    with pytest.raises(UserError, match="line 2"):
+        read_changes(plan.folder)
