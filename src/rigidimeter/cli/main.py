@@ -39,8 +39,8 @@ from rigidimeter.cli.report import report
 from rigidimeter.cli.reproduce import reproduce
 from rigidimeter.cli.run import recover, run
 from rigidimeter.cli.simulate import simulate
-from rigidimeter.cli.study import demo
-from rigidimeter.cli.study_plan import study
+from rigidimeter.cli.study import demo, study
+from rigidimeter.cli.study_plan import add_plan_commands
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.extensions import load_file
 from rigidimeter.core.version import __version__
@@ -105,6 +105,7 @@ for panel, commands in {
 }.items():
     for command in commands:
         app.command(cls=HelpCommand, rich_help_panel=panel)(command)
+add_plan_commands(study)
 app.add_typer(study, rich_help_panel="Start")
 with_numbers(app)
 

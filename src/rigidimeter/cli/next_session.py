@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import re
 import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-import numpy as np
-
 from rigidimeter.cli.output import echo
+from rigidimeter.cli.plan_text import due_of, due_words, plan_of, subject_of, wait_words
 from rigidimeter.cli.planned_session import PlannedSession, new_session
 from rigidimeter.cli.progress import Meter
-from rigidimeter.cli.study_plan import due_of, due_words, plan_of, subject_of, wait_words
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.settings import changed_settings, load_settings
 from rigidimeter.core.study_files import (
     DueBlock,
     StudyPlan,
@@ -23,13 +19,12 @@ from rigidimeter.core.study_files import (
     extend_study,
     named_block,
     parse_change,
-    plan_facts,
     recorded_blocks,
+    session_facts,
+    session_settings_of,
 )
 
 _TICK_S = 0.5
-_SESSIONS = 1
-"""The stream of the plan's seed from which sessions draw theirs."""
 
 
 @dataclass(frozen=True)
@@ -82,47 +77,22 @@ class NextSession:
     @property
     def folder(self) -> Path:
         """The new folder of the session; its name does not give the condition away."""
-        block = self.due.block
-        part = f"-{self.due.part}" if self.due.part > 1 else ""
-        name = re.sub(r"[^\w.-]+", "-", f"{block.subject}-day-{block.day}-{block.order}{part}")
-        return self.plan.folder / "sessions" / name
+        return self.plan.folder / self.due.folder
 
     def planned(self) -> PlannedSession:
         """Return the session as it is to be run now, with its place in the plan."""
-        block, said = self.due.block, self.said
-        source = self.plan.folder / block.protocol
-        about = {
-            "subject": block.subject,
-            "operator": said.operator,
-            "note": said.note,
-            "day": block.day,
-            "conditions": [block.condition],
-            "plan": plan_facts(
-                self.plan,
-                self.due,
-                datetime.now(UTC),
-                speed=said.speed,
-                reason=said.begin_anyway,
-            ),
-        }
-        if self.plan.blinded:
-            about |= {"blinded": True, "codes": self.plan.about.codes}
-        settings = changed_settings(load_settings(source), {"seed": self._seed}, str(source))
-        told = {epoch.condition for epoch in settings.protocol.blocks}
-        if told != {block.condition}:
-            raise UserError(
-                f"{source}: has epochs of {', '.join(sorted(told))}, and the plan has "
-                f"{block.condition} in this session; correct one of them"
-            )
-        return new_session(settings, about, source)
-
-    @property
-    def _seed(self) -> int:
-        """Of the rests and of the virtual subject: another one in every session of the plan."""
-        place = self.plan.blocks.index(self.due.block)
-        key = (_SESSIONS, place, self.due.part)
-        state = np.random.SeedSequence(self.plan.about.seed, spawn_key=key).generate_state(1)
-        return int(state[0])
+        said = self.said
+        settings = session_settings_of(self.plan, self.due)
+        about = session_facts(
+            self.plan,
+            self.due,
+            datetime.now(UTC),
+            operator=said.operator,
+            note=said.note,
+            speed=said.speed,
+            reason=said.begin_anyway,
+        )
+        return new_session(settings, about, self.plan.folder / self.due.block.protocol)
 
     def wait(self) -> None:
         """Count down to the end of the wait.

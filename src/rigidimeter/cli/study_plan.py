@@ -4,40 +4,45 @@ from __future__ import annotations
 
 import random
 from collections.abc import Sequence
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import typer
 
 from rigidimeter.cli.help_pages import OPTIONS, READ, HelpCommand, argument
 from rigidimeter.cli.options import STUDY_SEED
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.study import study
-from rigidimeter.cli.terminal_tables import Table, show
+from rigidimeter.cli.plan_text import (
+    due_of,
+    plan_of,
+    show_plan,
+    show_switches,
+    subject_of,
+    wait_words,
+)
+from rigidimeter.cli.progress import Meter
 from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
     from rigidimeter.core.settings import Settings
-    from rigidimeter.core.study_files import DueBlock, StudyPlan
     from rigidimeter.planning import StudyDays
 
-_SHOWN = 12
 
-
-@study.command("plan", cls=HelpCommand)
 def plan_days(
     folder: Path = argument("STUDY", "Study folder; made if it is none."),
     subjects: str = OPTIONS.option("--subjects A,B", "Codes of the subjects.", ""),
     days: int = OPTIONS.option("--days N", "Days of each subject.", 8, min=1, max=1000),
-    conditions: str = OPTIONS.option(
+    conditions: str = OPTIONS.further(
         "--conditions A,B", "Conditions, the reference first.", "OFF,DBS"
     ),
-    stimulated: str = OPTIONS.option(
+    stimulated: str = OPTIONS.further(
         "--stimulated B,C", "Conditions with stimulation on. Default: all but the first.", "*"
     ),
-    days_of: list[str] | None = OPTIONS.option(
+    days_of: list[str] | None = OPTIONS.further(
         "--days-of NAME=N", "On how many of the days a condition is recorded. Default: on all."
     ),
-    sessions: int = OPTIONS.option(
+    sessions: int = OPTIONS.further(
         "--sessions N",
         "Sessions a day of each condition. Above 1 conditions alternate, at most two alike in a "
         "row.",
@@ -45,13 +50,13 @@ def plan_days(
         min=1,
         max=6,
     ),
-    order: str = OPTIONS.option(
+    order: str = OPTIONS.further(
         "--order balanced|drawn|A,B",
         "Order in a day. Balanced: the second of two days reverses the first; drawn: each day by "
         "itself; or one order for all days.",
         "balanced",
     ),
-    wait_on_min: float = OPTIONS.option(
+    wait_on_min: float = OPTIONS.further(
         "--wait-after-on MIN", "Wait after switching on.", 15.0, min=0.0, max=1440.0
     ),
     wait_off_min: float = OPTIONS.option(
@@ -64,17 +69,17 @@ def plan_days(
     prbs_epochs: int = OPTIONS.option(
         "--prbs-epochs N", "PRBS epochs of a session.", 5, min=0, max=500
     ),
-    sinusoid_epochs: int = OPTIONS.option(
+    sinusoid_epochs: int = OPTIONS.further(
         "--sinusoid-epochs N", "Sinusoidal epochs of a session.", 3, min=0, max=500
     ),
-    raters: str = OPTIONS.option("--raters A,B", "Examiners who rate in each session.", ""),
+    raters: str = OPTIONS.further("--raters A,B", "Examiners who rate in each session.", ""),
     blinded: bool = OPTIONS.flag(
         "--blinded", "Show codes in place of conditions wherever an examiner may look."
     ),
     settings: Path | None = READ.option(
         "--settings FILE", "Settings that all sessions share. Default: those of the program."
     ),
-    design: Path | None = READ.option(
+    design: Path | None = READ.further(
         "--from-design FILE", "Take days and PRBS epochs from the JSON of design --detect."
     ),
     seed: int = STUDY_SEED,
@@ -87,7 +92,7 @@ def plan_days(
 
     \b
     For example:
-      rigidimeter study plan study --subjects S01 --days 9 --days-of DBS=4 --raters A,B,C
+      rigidimeter study plan study --subjects S01 --days 9 --days-of DBS=4
       rigidimeter study plan study
       rigidimeter run --next study
     """
@@ -99,7 +104,7 @@ def plan_days(
     if not subjects:
         if there is None:
             raise UserError(f"{folder}: has no plan yet; draw one with --subjects S01,S02")
-        _show(there)
+        show_plan(there)
         return
     names = _names(conditions, "--conditions")
     base = load_settings(settings)
@@ -143,10 +148,9 @@ def plan_days(
     if not is_study(folder):
         _describe(folder, spec)
     written = write_plan(folder, about, blocks, protocols)
-    _show(written)
+    show_plan(written)
 
 
-@study.command("stimulation", cls=HelpCommand)
 def stimulation(
     folder: Path = argument("STUDY", "Study folder with a plan."),
     state: str = argument("[STATE]", "on, off, or since when on the clock: `off since 10:42`.", ""),
@@ -169,7 +173,7 @@ def stimulation(
     plan = plan_of(folder)
     subject = subject_of(plan, subject)
     if not state:
-        _switch_list(plan, subject)
+        show_switches(plan, subject)
         return
     change = parse_change(state, subject, datetime.now(UTC), by)
     add_change(folder, change)
@@ -180,72 +184,47 @@ def stimulation(
         echo(wait_words(due, datetime.now(UTC)))
 
 
-def plan_of(folder: Path) -> StudyPlan:
-    """Return the plan of a study folder.
+def rehearse_plan(
+    folder: Path = argument("STUDY", "Study folder with a plan."),
+    wait_share: float = OPTIONS.option(
+        "--wait-share X",
+        "Share of each wait that passes, to see waits cut short.",
+        1.0,
+        min=0.0,
+        max=1.0,
+    ),
+) -> None:
+    """Carry out what is left of a plan on the virtual rig.
 
-    Raises
-    ------
-    UserError
-        If it has none, or it cannot be read.
+    No wait takes time: every day is a calendar day of a clock of its own, which begins tomorrow.
+
+    \b
+    For example:
+      rigidimeter study rehearse study
+      rigidimeter compare study
     """
-    from rigidimeter.core.study_files import read_plan
+    from rigidimeter.virtual import rehearse
 
-    plan = read_plan(folder)
-    if plan is None:
-        raise UserError(
-            f"{folder}: has no plan; draw one with rigidimeter study plan {folder} --subjects CODE"
-        )
-    return plan
+    plan = plan_of(folder)
+    left = len(plan.blocks)
+    tomorrow = datetime.now(UTC) + timedelta(days=1)
+    with Meter("rehearse", left) as meter:
+        done: list[Path] = []
 
+        def on_session(session: Path) -> None:
+            done.append(session)
+            meter.reach(len(done))
 
-def subject_of(plan: StudyPlan, subject: str) -> str:
-    """Return the subject that was named, or the only one of the plan.
-
-    Raises
-    ------
-    UserError
-        If it is not in the plan, or the plan has several and none was named.
-    """
-    known = plan.about.subjects
-    if not subject and len(known) == 1:
-        return known[0]
-    if subject not in known:
-        what = f"--subject {subject}: is not in the plan" if subject else "name a --subject"
-        raise UserError(f"{what}; the plan has {', '.join(known)}")
-    return subject
+        rehearse(plan, tomorrow, wait_share=wait_share, on_session=on_session)
+    echo(f"{len(done)} sessions of {folder} were recorded on the virtual rig")
+    echo(f"Next: rigidimeter compare {folder}")
 
 
-def due_of(plan: StudyPlan, subject: str) -> DueBlock | None:
-    """Return the session of a subject that is due; None if all were recorded."""
-    from rigidimeter.core.study_files import due_block, recorded_blocks
-
-    return due_block(plan, recorded_blocks(plan.folder), subject)
-
-
-def due_words(plan: StudyPlan, due: DueBlock) -> str:
-    """Return which session is due, with the code of its condition where examiners are blinded."""
-    block, (number, of) = due.block, due.place
-    part = f", part {due.part}" if due.part > 1 else ""
-    raters = f", rated by {', '.join(block.raters.split())}" if block.raters else ""
-    return (
-        f"Session {number} of {of} of {block.subject}: day {block.day}, number {block.order}, "
-        f"{plan.shown(block.condition)}{part}{raters}"
-    )
-
-
-def wait_words(due: DueBlock, now: datetime, speed: float = 1.0) -> str:
-    """Return how long to wait, without the state of the stimulation and since when it is on."""
-    left = due.left_min(now, speed)
-    if left is None and due.change is not None and due.change.stimulation != due.stimulation:
-        return "The wait has not begun: the stimulation is not yet as this session needs it"
-    if left is None:
-        return (
-            f"The wait of {due.block.wait_min:g} min has not begun: the stimulation was not set "
-            "for this session, or nobody wrote down when"
-        )
-    if left > 0.0:
-        return f"Wait {left:.0f} min more, of {due.block.wait_min:g} min"
-    return "No wait is left"
+def add_plan_commands(study: typer.Typer) -> None:
+    """Add the commands of this module to the group `study`."""
+    study.command("plan", cls=HelpCommand)(plan_days)
+    study.command("rehearse", cls=HelpCommand)(rehearse_plan)
+    study.command("stimulation", cls=HelpCommand)(stimulation)
 
 
 def days_of_design(path: Path) -> tuple[int, int]:
@@ -270,70 +249,6 @@ def days_of_design(path: Path) -> tuple[int, int]:
             "two conditions"
         )
     return max(days), max(max(one["epochs_a_day"]) for one in found if one)
-
-
-def _show(plan: StudyPlan) -> None:
-    """Show the plan of each subject, what was recorded of it, and what is due."""
-    from rigidimeter.core.study_files import recorded_blocks
-
-    recorded = recorded_blocks(plan.folder)
-    done = [one.key for one in recorded]
-    waits = sum(block.wait_min for block in plan.blocks) / 60.0
-    edited = " Edited after it was drawn." if plan.edited else ""
-    show(
-        [
-            f"{plan.folder}: {len(plan.blocks)} sessions on {plan.about.days} days, "
-            f"{waits:.0f} h of waits, order {plan.about.order}, seed {plan.about.seed}.{edited}",
-            "",
-        ]
-    )
-    for subject in plan.about.subjects:
-        own = [block for block in plan.blocks if block.subject == subject]
-        rows = [
-            (
-                block.day,
-                str(block.order),
-                plan.shown(block.condition),
-                block.task,
-                f"{block.wait_min:g}",
-                block.raters,
-                "recorded" if block.key in done else "",
-            )
-            for block in own
-        ]
-        first = next((k for k, row in enumerate(rows) if not row[-1]), 0)
-        start = max(min(first - 2, len(rows) - _SHOWN), 0)
-        shown = rows[start : start + _SHOWN]
-        headings = ("day", "order", "condition", "task", "wait\nmin", "raters", "")
-        more = len(rows) - len(shown)
-        show([f"Subject {subject}", Table(headings, shown, "<<<<><<")])
-        if more:
-            echo(f"  {more} more in {plan.folder / 'plan.csv'}")
-        due = due_of(plan, subject)
-        echo(f"  {due_words(plan, due)}" if due else "  All sessions are recorded.")
-    echo(f"Run the next one: rigidimeter run --next {plan.folder}")
-
-
-def _switch_list(plan: StudyPlan, subject: str) -> None:
-    """Show what to set before each session of the day that is due, for who sets the stimulator."""
-    due = due_of(plan, subject)
-    if due is None:
-        echo(f"{subject}: all sessions are recorded")
-        return
-    day = [b for b in plan.blocks if (b.subject, b.day) == (subject, due.block.day)]
-    rows = [
-        (
-            str(block.order),
-            block.condition,
-            plan.about.stimulation_of(block.condition),
-            f"{block.wait_min:g}",
-        )
-        for block in day
-        if block.order >= due.block.order
-    ]
-    headings = ("order", "condition", "stimulation", "wait\nmin")
-    show([f"Subject {subject}, day {due.block.day}", Table(headings, rows, "<<<>")])
-    echo(wait_words(due, datetime.now(UTC)))
 
 
 def _protocol(base: Settings, condition: str, prbs: int, sinusoid: int) -> str:

@@ -1,5 +1,6 @@
 """Recordings and whole studies of a subject that does not exist, made on the virtual rig."""
 
+from rigidimeter.virtual.rehearsal import rehearse
 from rigidimeter.virtual.study_design import (
     DESIGNS,
     NULL,

@@ -69,6 +69,7 @@ def run_virtual_session(
     real_time: bool = False,
     progress: Callable[[float], None] = lambda _: None,
     created_utc: str = "",
+    about: Mapping[str, Any] | None = None,
 ) -> SessionResult:
     """Run the protocol of the settings on the virtual rig and record it.
 
@@ -87,6 +88,8 @@ def run_virtual_session(
     created_utc : str
         When the session took place, for its manifest; now if empty. A planned day has a date of
         its own, and with it the whole folder is the same byte for byte.
+    about : mapping, optional
+        What its manifest says of subject, day and plan.
 
     Raises
     ------
@@ -102,6 +105,7 @@ def run_virtual_session(
         [asdict(epoch) for epoch in protocol.epochs],
         {"session": settings.seed},
         virtual=True,
+        about=about,
         created_utc=created_utc,
         repeatable=not real_time,
     )

@@ -23,8 +23,9 @@ from rigidimeter.core.study_files.plan_progress import (
     RecordedBlock,
     due_block,
     named_block,
-    plan_facts,
     recorded_blocks,
+    session_facts,
+    session_settings_of,
 )
 from rigidimeter.core.study_files.recorded_sessions import recorded_session, session_rows
 from rigidimeter.core.study_files.stimulation_log import (

@@ -14,7 +14,7 @@ import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -157,10 +157,6 @@ class StudyPlan:
     def shown(self, condition: str) -> str:
         """Return the code of a condition, or its name where nobody is blinded."""
         return self.about.codes.get(condition, condition)
-
-    def facts(self, block: PlannedBlock) -> dict[str, Any]:
-        """Return what the manifest of a session says of its place in the plan."""
-        return {"sha256": self.sha256, **asdict(block)}
 
 
 def read_plan(study: Path) -> StudyPlan | None:

@@ -79,7 +79,8 @@ def write_new_study(
     shown = title.strip() or folder.resolve().name
     conditions = dict(planned or {OFF: ConditionTable(), DBS: ConditionTable()})
     primary = PrimaryTable(declared=date.today())
-    text = study_text(shown, *tuple(conditions)[:2], conditions, primary)
+    reference, other = list(conditions)[:2]
+    text = study_text(shown, reference, other, conditions, primary)
     write_text(folder / STUDY_FILE, text if planned is None else own_text(text))
 
 
