@@ -8,7 +8,13 @@ from collections.abc import Iterator
 from markupsafe import Markup
 
 from rigidimeter.analysis import report  # what is taken from it is imported when it is used
-from rigidimeter.analysis.study import StudyResult, difference_cells, lead, statements
+from rigidimeter.analysis.study import (
+    StudyResult,
+    deviation_words,
+    difference_cells,
+    lead,
+    statements,
+)
 from rigidimeter.cli.terminal_tables import Block, Heading, Table, paragraph, shown_table
 from rigidimeter.core.records import Analysis
 from rigidimeter.core.words import condition_name, plural
@@ -38,7 +44,8 @@ def comparison_blocks(found: StudyResult, *, full: bool = False) -> Iterator[Blo
         yield ""
         yield from statement_blocks(pair)
     analysis = found.analysis
-    notes = [*stiffness_notes(analysis), *_left_out(found), *finding_notes(analysis, full)]
+    notes = [*stiffness_notes(analysis), *_plan(found), *_left_out(found)]
+    notes += finding_notes(analysis, full)
     if notes:
         yield ""
         yield Table((), notes, "<<", 1)
@@ -78,6 +85,12 @@ def statement_blocks(found: StudyResult) -> Iterator[Block]:
     rows = [("measured", said.measured), ("tested", said.tested)]
     rows += [("concluded" * (not k), sentence) for k, sentence in enumerate(said.concluded)]
     yield Table((), rows, "<<", 1)
+
+
+def _plan(found: StudyResult) -> Iterator[tuple[str, str]]:
+    """Yield where the study was not carried out as planned."""
+    if words := deviation_words(found):
+        yield "plan", words
 
 
 def _left_out(found: StudyResult) -> Iterator[tuple[str, str]]:

@@ -119,7 +119,10 @@ def test_the_short_page_imports_nothing_heavy():
     [
         ("rigidimeter comp", {"compare"}),
         ("rigidimeter estimate --clock", {"--clock-offset"}),  # behind --help-all
-        ("rigidimeter study ", {"new", "add", "exclude", "include", "simulate"}),
+        (
+            "rigidimeter study ",
+            {"new", "add", "exclude", "include", "simulate", "plan", "rehearse", "stimulation"},
+        ),
         ("rigidimeter --inst", {"--install-completion"}),
     ],
 )

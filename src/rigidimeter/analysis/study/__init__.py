@@ -21,6 +21,7 @@ from rigidimeter.analysis.study.conclusions import (
     conclusion_rows,
 )
 from rigidimeter.analysis.study.day_scatter import DayScatter, day_scatter
+from rigidimeter.analysis.study.deviations import deviation_words
 from rigidimeter.analysis.study.difference_rows import (
     DifferenceRow,
     difference_cells,

@@ -138,6 +138,33 @@ class LeftOut:
 
 
 @dataclass(frozen=True)
+class Deviation:
+    """One way in which a session was not as planned.
+
+    Attributes
+    ----------
+    subject, day : str
+    order : int
+        Place in the day that was planned; 0 where none was.
+    condition : str
+    path : str
+        Of the session; empty where none was recorded.
+    kind : str
+        ``not done``, ``not planned``, ``out of order``, ``short wait``, ``unknown wait``, ``other
+        protocol``, ``cut short``, ``plan edited``.
+    detail : str
+    """
+
+    subject: str
+    day: str
+    order: int
+    condition: str
+    path: str
+    kind: str
+    detail: str
+
+
+@dataclass(frozen=True)
 class StudyResult:
     """Everything that was concluded from two conditions of recordings, a study or a table.
 
@@ -167,6 +194,8 @@ class StudyResult:
         Of a study folder alone; `sessions` is empty if there is none. `blinded`: the conditions are
         codes, for no key was given. `virtual`: every session comes from the virtual rig.
         `changes`: what is new since the last analysis was kept, in sentences.
+    deviations : tuple of Deviation
+        Of a study folder with a plan.
     own_rig : bool
         Whether a session of this program was among what was analysed, so that the settings of the
         rig are those that it was recorded with.
@@ -200,6 +229,7 @@ class StudyResult:
     own_rig: bool = False
     further: tuple[Comparison, ...] = ()
     primary: Primary = Primary()  # noqa: RUF009
+    deviations: tuple[Deviation, ...] = ()
 
     @property
     def further_pairs(self) -> tuple[StudyResult, ...]:

@@ -29,6 +29,7 @@ from rigidimeter.analysis.study.comparison import (
     gathered,
     with_further,
 )
+from rigidimeter.analysis.study.deviations import deviations
 from rigidimeter.analysis.study.exclusions import exclusions_of, operators_exclusions
 from rigidimeter.analysis.study.families import Primary, primary_of
 from rigidimeter.analysis.study.measures import MEASURES, RATING, chosen_pair
@@ -259,6 +260,9 @@ def analyse_study(
         own_rig=read.gathered.settings is not None,
         further=further,
         primary=read.primary,
+        deviations=deviations(
+            read.folder.folder, [session.entry for session in read.gathered.sessions]
+        ),
     )
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from rigidimeter.analysis.reading import estimates_document
 from rigidimeter.analysis.study.compared import comparison_rows, comparison_values, measure_names
 from rigidimeter.analysis.study.conclusions import conclusion_rows, reasons
+from rigidimeter.analysis.study.deviations import deviation_words, without_deviating
 from rigidimeter.analysis.study.rating_relation import relations
 from rigidimeter.analysis.study.ratings_found import (
     RatingsFound,
@@ -69,6 +70,11 @@ def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
         ],
         "days": result_table(result, "days"),
         "effect_differences": result_table(result, "effect_differences"),
+        "plan": {
+            "words": deviation_words(result),
+            "deviations": result_table(result, "deviations"),
+            "without_deviating": result_table(result, "without_deviating"),
+        },
         "ratings": None if result.ratings is None else ratings_document(result.ratings),
         "rating_relation": result_table(result, "rating_relation"),
         "sensitivity": result_table(result, "sensitivity"),
@@ -234,6 +240,8 @@ TABLES: Mapping[str, Callable[[StudyResult], Rows]] = {
     "sessions": lambda result: [asdict(session) for session in result.sessions],
     "excluded_epochs": lambda result: [asdict(exclusion) for exclusion in result.exclusions],
     "left_out": lambda result: [asdict(out) for out in result.left_out],
+    "deviations": lambda result: [asdict(one) for one in result.deviations],
+    "without_deviating": without_deviating,
     "account": lambda result: list(_account(result)),
     "estimates": lambda result: list(_estimates(result)),
     "scores": lambda result: list(_scores(result)),

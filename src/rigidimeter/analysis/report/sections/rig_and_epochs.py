@@ -29,7 +29,7 @@ from rigidimeter.analysis.report.curves import (
 from rigidimeter.analysis.report.methods_prose import method_of
 from rigidimeter.analysis.report.sections.every_epoch import HOW, WHO
 from rigidimeter.analysis.report.style import drawn
-from rigidimeter.analysis.study import StudyResult, result_table
+from rigidimeter.analysis.study import StudyResult, deviation_words, result_table
 from rigidimeter.analysis.study.examples import analysed_epoch, representative_fits
 from rigidimeter.core.records import Delay, Fit, Score
 from rigidimeter.core.words import SESSION, Column, Table, condition_name, plural, series
@@ -174,6 +174,23 @@ def _study_exclusions(result: StudyResult) -> Iterator[Block]:
         Column("reason", "Reason", "reason"),
     )
     yield from _exclusions(result)
+    yield from _plan(result)
+
+
+def _plan(result: StudyResult) -> Iterator[Block]:
+    """Yield where the study was not carried out as planned."""
+    if words := deviation_words(result):
+        yield paragraph(words)
+    yield from_result(
+        result,
+        "deviations",
+        "Deviations from the plan",
+        *SESSION,
+        Column("order", "Number in the day", "count"),
+        Column("kind", "Deviation", "label"),
+        Column("detail", "Detail", "reason"),
+        Column("path", "Session", "text"),
+    )
 
 
 def _recorded(result: StudyResult) -> Iterator[Block]:
