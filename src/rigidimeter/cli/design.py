@@ -84,6 +84,8 @@ def design(
     size = {"body_mass_kg": body_mass_kg, "length_m": forearm_m}
     given = {name: value for name, value in size.items() if value is not None}
     scatter = None if from_study is None else _scatter_of(from_study)
+    if from_study is not None and not given:
+        given = _forearm_of(from_study)
     with Meter("design", 1.0, from_first=True) as meter:
         designed = compute(
             settings,
@@ -104,6 +106,18 @@ def design(
     if json_out is not None:
         write_json(json_out, design_document(designed))
     refuse_unstable(designed.settings, designed.stability)
+
+
+def _forearm_of(folder: Path) -> dict[str, float]:
+    """Return mass and length of the only subject of a study for which both are given, else none."""
+    from rigidimeter.core.study_files import STUDY_FILE, read_study_toml
+
+    sizes = [
+        {"body_mass_kg": one.body_mass_kg, "length_m": one.forearm_length_m}
+        for one in read_study_toml(folder / STUDY_FILE).subjects.values()
+        if one.body_mass_kg is not None and one.forearm_length_m is not None
+    ]
+    return sizes[0] if len(sizes) == 1 else {}
 
 
 def _scatter_of(folder: Path) -> dict[str, Scatter]:

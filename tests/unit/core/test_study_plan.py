@@ -18,6 +18,7 @@ from rigidimeter.core.study_files import (
     parse_change,
     read_changes,
     read_plan,
+    read_study_toml,
     write_plan,
 )
 from rigidimeter.planning import StudyDays, draw_days
@@ -127,3 +128,13 @@ def test_changes_are_in_order(plan: StudyPlan) -> None:
     table.write_text(table.read_text().replace(",on,", ",half,"))
     with pytest.raises(UserError, match="line 2"):
         read_changes(plan.folder)
+
+
+def test_a_study_file_does_not_say_who_a_subject_is(tmp_path: Path) -> None:
+    about = 'schema = "rigidimeter.study/1"\ntitle = "T"\nreference = "OFF"\nother = "DBS"\n'
+    path = tmp_path / "study.toml"
+    path.write_text(f'{about}[subjects.S1]\nside = "R"\nmedication_since_h = 12\n')
+    assert read_study_toml(path).subjects["S1"].side == "R"
+    path.write_text(f"{about}[subjects.S1]\ndate_of_birth = 1950-01-01\n")
+    with pytest.raises(UserError, match="date_of_birth would say who the subject is"):
+        read_study_toml(path)

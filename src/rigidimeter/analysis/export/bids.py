@@ -24,7 +24,7 @@ import pyarrow.csv
 
 from rigidimeter.analysis.export.document_tables import document_tables, exclusion_reasons
 from rigidimeter.analysis.export.exported_sessions import ExportedSession
-from rigidimeter.analysis.export.names import entities, joined, label
+from rigidimeter.analysis.export.names import ABOUT_SUBJECT, entities, joined, label
 from rigidimeter.analysis.reading.formats.clocked_table import Stream
 from rigidimeter.core.files import as_written, write_json, write_text
 
@@ -71,6 +71,7 @@ def write_bids(sessions: Sequence[ExportedSession], folder: Path) -> None:
             "age": person.get("age_years"),
             "sex": {"U": None}.get(person.get("sex", "U"), person.get("sex")),
             "species": str(person.get("species", "Homo sapiens")).lower(),
+            **{key: person[key] for key in ABOUT_SUBJECT if person.get(key) not in (None, "")},
         }
         day = days.setdefault(names["sub"], {}).setdefault(names["ses"], {})
         day["session_id"] = f"ses-{names['ses']}"
@@ -80,7 +81,9 @@ def write_bids(sessions: Sequence[ExportedSession], folder: Path) -> None:
     for path, rows in scans.items():
         _write_tsv(path, rows)
     _write_tsv(folder / "participants.tsv", participants.values())
-    write_json(folder / "participants.json", _PARTICIPANTS)
+    used = {key for row in participants.values() for key in row}
+    described = {key: _PARTICIPANTS[key] for key in _PARTICIPANTS if key in used}
+    write_json(folder / "participants.json", described)
     for subject, sessions_of in days.items():
         table = folder / f"sub-{subject}" / f"sub-{subject}_sessions.tsv"
         _write_tsv(table, sessions_of.values())
@@ -91,6 +94,23 @@ _PARTICIPANTS = {
     "age": {"Description": "Age at the time of the study.", "Units": "year"},
     "sex": {"Description": "Sex.", "Levels": {"F": "female", "M": "male", "O": "other"}},
     "species": {"Description": "Species, a Latin binomial."},
+    "group": {"Description": "Group of the study."},
+    "body_mass_kg": {"Description": "Mass of the body.", "Units": "kg"},
+    "forearm_length_m": {"Description": "Length of the forearm.", "Units": "m"},
+    "side": {"Description": "Side that was measured.", "Levels": {"L": "left", "R": "right"}},
+    "handedness": {
+        "Description": "Handedness.",
+        "Levels": {"L": "left", "R": "right", "A": "ambidextrous"},
+    },
+    "diagnosis": {"Description": "Diagnosis."},
+    "severity": {"Description": "Severity, with its scale."},
+    "medication": {"Description": "Medication at the time of the study."},
+    "medication_since_h": {"Description": "Time since the last dose.", "Units": "h"},
+    "implant_target": {"Description": "Target of the implanted electrodes."},
+    "implant_side": {
+        "Description": "Side of the implanted electrodes.",
+        "Levels": {"L": "left", "R": "right", "B": "both"},
+    },
 }
 _EVENTS = {
     "trial_type": {

@@ -8,6 +8,12 @@ from typing import Any
 
 from rigidimeter.analysis.export.exported_sessions import ExportedSession
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.study_files import SubjectTable
+
+ABOUT_SUBJECT = tuple(
+    name for name in SubjectTable.model_fields if name not in ("age_years", "sex", "species")
+)
+"""What a study says of a subject for which archives have no field of their own."""
 
 
 def label(text: str, otherwise: str) -> str:

@@ -28,7 +28,7 @@ from rigidimeter.analysis.export.document_tables import (
     exclusion_reasons,
 )
 from rigidimeter.analysis.export.exported_sessions import ExportedSession
-from rigidimeter.analysis.export.names import label, subject_label
+from rigidimeter.analysis.export.names import ABOUT_SUBJECT, label, subject_label
 from rigidimeter.analysis.reading.formats.clocked_table import ROUNDING_S, Stream
 from rigidimeter.core.files import json_text
 
@@ -109,7 +109,7 @@ def _file(about: Mapping[str, Any]) -> NWBFile:
     coded = " The condition is a blinded code." if about.get("blinded") else ""
     started_utc = recorded.get("created_utc", "")
     started = datetime.fromisoformat(started_utc) if started_utc else UNKNOWN_START
-    age_years = participant.get("age_years")
+    age_years, mass_kg = participant.get("age_years"), participant.get("body_mass_kg")
     name, _, version = str(about["software"]).partition(" ")
     digest = blake2b(json_text(about).encode(), digest_size=16).hexdigest()
     return NWBFile(
@@ -137,9 +137,17 @@ def _file(about: Mapping[str, Any]) -> NWBFile:
             age=UNKNOWN_AGE if age_years is None else f"P{age_years:g}Y",
             sex=participant.get("sex", "U"),
             species=participant.get("species", "Homo sapiens"),
-            description=SIMULATED if virtual else about["subject"] or "unknown",
+            weight=None if mass_kg is None else f"{mass_kg:g} kg",
+            description=SIMULATED if virtual else subject_text(about),
         ),
     )
+
+
+def subject_text(about: Mapping[str, Any]) -> str:
+    """Return a subject's code with what NWB has no field for, as ``S1; side: R; …``."""
+    own = about.get("participant", {})
+    told = (f"{key}: {own[key]}" for key in ABOUT_SUBJECT if own.get(key) not in (None, ""))
+    return "; ".join([about["subject"] or "unknown", *told])
 
 
 def _surname_first(author: str) -> str:

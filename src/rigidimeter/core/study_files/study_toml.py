@@ -134,11 +134,54 @@ class RatingTable(Section):
 
 
 class SubjectTable(Section):
-    """``[subjects.NAME]``: what archives ask about a subject."""
+    """``[subjects.NAME]``: what archives and readers ask about a subject, but not who it is.
+
+    Parameters
+    ----------
+    group : str
+        Such as ``patients``.
+    body_mass_kg, forearm_length_m : float or None
+        With both, `design --from` computes the bandwidth of this arm (App. A).
+    side : str
+        The side that is measured, ``L`` or ``R``.
+    handedness : str
+        ``L``, ``R`` or ``A`` (both).
+    diagnosis, severity : str
+        Severity with its scale, such as ``Hoehn and Yahr 2.5``.
+    medication : str
+    medication_since_h : float or None
+        Since the last dose.
+    implant_target : str
+        Such as ``STN``.
+    implant_side : str
+        ``L``, ``R`` or ``B`` (both).
+    """
 
     age_years: float | None = _optional("years", 0.0, 130.0)
     sex: Literal["F", "M", "O", "U"] = "U"
     species: str = _text("Homo sapiens")
+    group: str = _text("", 0, 40)
+    body_mass_kg: float | None = _optional("kg", 0.01, 500.0)
+    forearm_length_m: float | None = _optional("m", 0.005, 1.0)
+    side: Literal["L", "R", ""] = ""
+    handedness: Literal["L", "R", "A", ""] = ""
+    diagnosis: str = _text("", 0)
+    severity: str = _text("", 0)
+    medication: str = _text("", 0)
+    medication_since_h: float | None = _optional("h", 0.0, 10000.0)
+    implant_target: str = _text("", 0, 40)
+    implant_side: Literal["L", "R", "B", ""] = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _nobody_is_named(cls, values: Any) -> Any:
+        for key in ("name", "date_of_birth", "birth_date", "birthday", "initials"):
+            if isinstance(values, Mapping) and key in values:
+                raise ValueError(
+                    f"{key} would say who the subject is; remove it, and give age_years instead of "
+                    "a date of birth"
+                )
+        return values
 
 
 class ArchiveTable(Section):

@@ -72,13 +72,22 @@ def test_a_session(exported, tmp_path: Path) -> None:
 def test_a_study_with_ratings_and_stimulation(fitted_study: Path, tmp_path: Path) -> None:
     study = Path(shutil.copytree(fitted_study, tmp_path / "study"))
     with (study / "study.toml").open("a") as file:
-        file.write('[subjects.M1]\nage_years = 61\nsex = "F"\n[archive]\nauthors = ["A. Bee"]\n')
+        about = 'age_years = 61\nsex = "F"\nbody_mass_kg = 7.7\nside = "R"\nimplant_target = "STN"'
+        file.write(f'[subjects.M1]\n{about}\n[archive]\nauthors = ["A. Bee"]\n')
     (study / "exclusions.csv").write_text("path,epoch,reason,by\nsessions/2-DBS,1,cough,A\n")
     out = tmp_path / "bids"
     export_sessions(sessions_of_study(read_study(study), None), "bids", out)
     assert errors(out) == []
     assert rows(out / "participants.tsv") == [
-        {"participant_id": "sub-M1", "age": "61.0", "sex": "F", "species": "homo sapiens"}
+        {
+            "participant_id": "sub-M1",
+            "age": "61.0",
+            "sex": "F",
+            "species": "homo sapiens",
+            "body_mass_kg": "7.7",
+            "side": "R",
+            "implant_target": "STN",
+        }
     ]
     days = {row["session_id"]: row for row in rows(out / "sub-M1" / "sub-M1_sessions.tsv")}
     assert list(days) == ["ses-1", "ses-2", "ses-3", "ses-4"]

@@ -88,7 +88,8 @@ def test_tables_of_a_study(fitted_study: Path, tmp_path: Path) -> None:
 
     study = Path(shutil.copytree(fitted_study, tmp_path / "study"))
     with (study / "study.toml").open("a") as file:
-        file.write('[subjects.M1]\nage_years = 61\nsex = "F"\n[archive]\nauthors = ["A. Bee"]\n')
+        about = 'age_years = 61\nsex = "F"\nbody_mass_kg = 7.7\nside = "R"\nimplant_target = "STN"'
+        file.write(f'[subjects.M1]\n{about}\n[archive]\nauthors = ["A. Bee"]\n')
     (study / "exclusions.csv").write_text("path,epoch,reason,by\nsessions/2-DBS,1,cough,A\n")
     session = next(
         each
@@ -99,6 +100,7 @@ def test_tables_of_a_study(fitted_study: Path, tmp_path: Path) -> None:
     assert complaints(path) == []
     with pynwb.NWBHDF5IO(path, "r") as io:
         file = io.read()
+        assert file.subject.weight == "7.7 kg"
         dbs = file.intervals["dbs_settings"].to_dataframe()
         row = dbs[["frequency_hz", "amplitude_ua", "pulse_width_us"]].iloc[0]
         assert row.tolist() == [130.0, 320.0, 60.0]
