@@ -21,7 +21,7 @@ from rigidimeter.analysis.report.inline_svg import inline_svg
 from rigidimeter.analysis.report.methods_prose import methods_prose
 from rigidimeter.analysis.report.sections import SECTIONS
 from rigidimeter.analysis.report.style import svg_text
-from rigidimeter.analysis.study import StudyResult, lead, traffic_light
+from rigidimeter.analysis.study import StudyResult, deviation_words, lead, traffic_light
 from rigidimeter.core.files import csv_text, visible
 from rigidimeter.core.version import __version__
 from rigidimeter.core.words import Column, Table, epoch_name, short_names, shown_below, shown_value
@@ -184,6 +184,7 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
         script=Markup(script),
         script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii"),
         lead=lead(result),
+        deviations=deviation_words(result),
         strips=first_screen.strips(result),
         precision=first_screen.precision_tables(result),
         light=light,
