@@ -116,10 +116,9 @@ def by_measure(found: Sequence[SensitivityRow]) -> dict[Measure, list[Sensitivit
 
 
 def methods_in(found: Sequence[SensitivityRow]) -> list[tuple[str, str]]:
-    """Return methods with how J was treated: a row of each panel, those of a method together."""
-    methods = list(dict.fromkeys(row.method for row in found))
-    pairs = {(row.method, row.inertia) for row in found}
-    return sorted(pairs, key=lambda pair: (methods.index(pair[0]), pair[1]))
+    """Return methods with how J was treated, a row of each panel: what is concluded from first."""
+    every = sorted(found, key=lambda row: (not row.chosen, row.inertia == "fixed"))
+    return list(dict.fromkeys((row.method, row.inertia) for row in every))
 
 
 def draw_methods(panels: Sequence[Axes], found: Sequence[SensitivityRow], label: str) -> None:

@@ -163,7 +163,7 @@ def test_equal_ratings_are_drawn_side_by_side_and_the_means_are_those_of_the_mod
     assert points(corrected, "_") == [mean.mean for mean in found.means]
 
 
-def test_sensitivity_keeps_methods_together_and_marks_the_chosen_one() -> None:
+def test_what_is_concluded_from_is_above_other_methods_and_those_with_j_held() -> None:
     measure = Measure("b", "B", "N", "fixed_inertia")
     rows = [
         SensitivityRow(measure, method, inertia, 9, 9, shift, low, high, 0.1, 0.2, 0.1, chosen)
@@ -176,8 +176,8 @@ def test_sensitivity_keeps_methods_together_and_marks_the_chosen_one() -> None:
     (axes,) = drawn((7.4, 2.0), draw_methods, rows, "Shift").axes
     assert axes.get_title(loc="left") == "B (N)"
     labels = [text.get_text() for text in axes.get_yticklabels()]
-    assert labels == ["published, J fixed", "published, J free", "iv, J fixed"]
-    assert points(axes, "s") == [2, 0]
+    assert labels == ["iv, J fixed", "published, J free", "published, J fixed"]
+    assert points(axes, "s") == [0, 2]
     assert points(axes, "o") == [1]
     low, high = axes.get_xlim()
     assert low < -0.4  # other − reference: the shifts are turned

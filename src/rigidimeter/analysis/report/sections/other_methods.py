@@ -13,7 +13,6 @@ from rigidimeter.analysis.report.contents import (
     Figure,
     Section,
     bullets,
-    from_result,
     from_study_folder,
     paragraph,
     part,
@@ -27,7 +26,7 @@ from rigidimeter.analysis.report.interval_rows import (
     methods_in,
 )
 from rigidimeter.analysis.report.style import drawn
-from rigidimeter.analysis.study import StudyResult, method_caveats, split_pooled
+from rigidimeter.analysis.study import StudyResult, method_caveats, result_table, split_pooled
 from rigidimeter.core.records import PARAMETERS
 from rigidimeter.core.words import INTERVAL, TURNED, Column, Table, condition_name, interval, number
 
@@ -44,17 +43,17 @@ def _methods(result: StudyResult) -> Iterator[Block]:
         f"{interval(-row.shift_high, -row.shift_low, 3)} {row.measure.unit}"
         for row in found
     )
-    columns = min(len(by_measure(found)), MOST_BESIDE)
-    rows = math.ceil(len(by_measure(found)) / columns)
+    across = min(len(by_measure(found)), MOST_BESIDE)
+    rows = math.ceil(len(by_measure(found)) / across)
     size = 7.4, 0.5 + (1.0 + 0.26 * len(methods_in(found))) * rows
     shown = found, f"Shift, {other} − {reference}"
     yield Figure(
         "sensitivity",
         "The Hodges–Lehmann shift with its interval by each method, in the unit above the "
-        "panel. Filled squares: J held at its median; open circles: J estimated in each epoch. "
-        "Black: the method of this report.",
+        "panel. At the top, black: the method of this report. Open circles: J estimated in each "
+        "epoch; filled squares: J held at its median, as in the second stage of the paper.",
         f"Shifts by method. {words}.",
-        partial(drawn, size, draw_methods, *shown, rows=rows, columns=columns, sharey=True),
+        partial(drawn, size, draw_methods, *shown, rows=rows, columns=across, sharey=True),
         "tall",
     )
     titles = {row.measure.name: row.measure.title for row in found}
@@ -66,13 +65,9 @@ def _methods(result: StudyResult) -> Iterator[Block]:
             "where days could not be tested, if p over epochs is.",
             "remark",
         )
-    yield from_result(
-        result,
-        "sensitivity",
-        f"The shift by each method, {other} − {reference}",
+    columns = (
         Column("title", "Measure", "text", below="unit"),
         Column("method", "Method", "check"),
-        Column("inertia", "J", "label"),
         Column("n_reference", f"n {reference}", "count"),
         Column("n_other", f"n {other}", "count"),
         Column("shift", f"Shift {INTERVAL}", ends=("shift_low", "shift_high"), page_factor=TURNED),
@@ -81,6 +76,18 @@ def _methods(result: StudyResult) -> Iterator[Block]:
         Column("p_day", "p, days", "p"),
         Column("chosen", "Used here", "label"),
     )
+    every = result_table(result, "sensitivity")
+    for inertia, title in (
+        ("free", f"The shift by each method, {other} − {reference}"),
+        (
+            "fixed",
+            f"The shift with J held at its median, {other} − {reference}: the paper’s second stage",
+        ),
+    ):
+        yield Table(
+            "sensitivity", title, columns, [row for row in every if row["inertia"] == inertia]
+        )
+    yield Table("sensitivity", "The shift by each method", (), every)
 
 
 def _bands(result: StudyResult) -> Iterator[Block]:
