@@ -9,6 +9,11 @@ alone, are slow: they get fewer draws.
     python -m benchmarks.day_tests 4000 100     # draws, those of the mixed models; three minutes
 
 The table is in `docs/explanation/days-not-epochs.md`.
+
+    python -m benchmarks.day_tests plan 2000    # studies a row; one minute
+
+prints what `design` plans, days and the chance to show a difference, beside how many studies of so
+many days show it by the test by days and the rule of the primary measures.
 """
 
 from __future__ import annotations
@@ -21,15 +26,18 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri, stdtrit
+from scipy.special import ndtri, stdtr, stdtrit
 
 from rigidimeter.analysis.statistics import (
     SubjectEpochs,
     difference,
     fit_mixed,
+    holm,
     nested,
     test_by_levels,
 )
+from rigidimeter.core.study_files import primary_named, primary_words
+from rigidimeter.planning import Detection, design, paired_power
 
 Array = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int], Array]
@@ -212,8 +220,113 @@ def shares(case: Case, draws: int, mixed: int, seed: list[int]) -> list[float]:
     return [float(share) for share in 100 * np.nanmean(found, axis=0)]
 
 
+PLANS = (
+    ("stiffness", "holm", "K 20 %", 5),
+    ("stiffness", "holm", "K 12 %", 3),
+    ("stiffness,damping", "holm", "K 20 %", 5),
+    ("stiffness,damping", "holm", "B 15 %", 1),
+    ("stiffness,damping", "holm", "K 20 %, B 20 %", 3),
+    ("stiffness,damping", "sequence", "K 20 %, B 20 %", 3),
+    ("damping,stiffness", "sequence", "B 13 %, K 18 %", 10),
+)
+"""Primary measures, their rule, by how much they are lower, and epochs a day and condition."""
+
+
+def planned_rows(studies: int) -> Iterator[list[str]]:
+    """Yield for each plan and measure the days, the chance that is planned, and what is found."""
+    for k, (names, rule, effects, epochs) in enumerate(PLANS):
+        differences = {
+            {"K": "stiffness", "B": "damping"}[symbol]: share
+            for symbol, share, _ in (effect.split() for effect in effects.split(", "))
+        }
+        wanted = [f"{name}={share}%" for name, share in differences.items()]
+        found = {
+            one.wanted.parameter: one
+            for one in design(differences=wanted, primary=names, rule=rule).detections
+        }
+        for name, one in found.items():
+            place = [each.epochs[0] for each in one.needed].index(epochs)
+            days = one.needed[place].days
+            assert days is not None
+            chance = float(
+                np.prod(
+                    [
+                        paired_power(each.difference, each.needed[place].day_sd, days,
+                                     alpha=each.level)
+                        for each in (*one.before, one)
+                    ]
+                )
+            )  # fmt: skip
+            shown = _shown(name, found, names.split(","), rule, epochs, days, studies, [SEED, k])
+            row = [primary_words(primary_named(names, rule)), f"{effects} lower", f"{epochs}"]
+            yield [*row, name, f"{days}", f"{100 * chance:.1f}", f"{100 * shown:.1f}"]
+
+
+def _shown(
+    name: str,
+    found: dict[str, Detection],
+    order: list[str],
+    rule: str,
+    epochs: int,
+    days: int,
+    studies: int,
+    seed: list[int],
+) -> float:
+    """Return the share of studies that show a measure, with its sign.
+
+    What is in no plan does not differ, and varies as the others do.
+    """
+    rng = np.random.default_rng([*seed, days])
+    usual = next(iter(found.values()))
+    shown = 0
+    for _ in range(studies):
+        p, right = [], {}
+        for each in order:
+            plan = found.get(each, usual)
+            share = plan.difference / plan.value if each in found else 0.0
+            test = test_by_levels({"": _days(rng, plan, share, epochs, days)}, ("x", "y"), "day")
+            p.append(2.0 * float(stdtr(test.df, -abs(test.estimate / test.se))))
+            right[each] = test.estimate > 0
+        adjusted = holm(p) if rule == "holm" else np.maximum.accumulate(p)
+        shown += adjusted[order.index(name)] < LEVEL and right[name]
+    return shown / studies
+
+
+def _days(
+    rng: np.random.Generator, plan: Detection, share: float, epochs: int, days: int
+) -> dict[str, tuple[list[float], list[float]]]:
+    """Return epochs by day, the first condition of 1, as the plan assumes that they vary."""
+    scatter = plan.scatter
+    of_one = scatter.condition_in_day_percent / 100.0
+    alike = np.sqrt((scatter.between_days_percent / 100.0) ** 2 - of_one**2)
+    both = alike * rng.standard_normal((days, 1))
+    x, y = (
+        level
+        + both
+        + of_one * level * rng.standard_normal((days, 1))
+        + np.hypot(scatter.between_epochs_percent / 100.0 * level, se / plan.value)
+        * rng.standard_normal((days, epochs))
+        for level, se in zip((1.0, 1.0 - share), plan.epoch_se, strict=True)
+    )
+    return {f"{day}": (list(x[day]), list(y[day])) for day in range(days)}
+
+
+def print_plans(studies: int) -> None:
+    """Print the table of plans."""
+    print(
+        f"{studies} studies a row, seed {SEED}; in % ({100 / studies**0.5:.1f} two SE at most).\n"
+    )
+    print("| primary measures | differences | epochs | shown | days | planned | found |")
+    print("| --- | --- | ---: | --- | ---: | ---: | ---: |")
+    for row in planned_rows(studies):
+        print(f"| {' | '.join(row)} |", flush=True)
+
+
 def main() -> None:
     """Print the table of the cases whose names hold some text."""
+    if sys.argv[1:2] == ["plan"]:
+        print_plans(int(sys.argv[2]) if sys.argv[2:] else 2000)
+        return
     draws, mixed = map(int, sys.argv[1:3] or ("4000", "100"))
     chosen = " ".join(sys.argv[3:])
     print(f"{draws} draws, {mixed} of the mixed models, seed {SEED}; size / power in %.\n")

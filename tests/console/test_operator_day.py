@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from datetime import date
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from tests.console.operator_day import (
 )
 
 from rigidimeter.core.session import read_manifest, read_samples
-from rigidimeter.core.study_files import read_study_folder
+from rigidimeter.core.study_files import declared_primary, read_study_folder
 
 PROTOCOL = """
 rig = {{tick_rate_hz = 250.0, torque = {{rate_hz = 250.0}}, motion = {{rate_hz = 250.0}}}}
@@ -77,7 +78,11 @@ def test_all_processes_are_killed_and_a_new_page_runs_the_rest(console, chromium
     """What was recorded is whole; the rest is run from a new page; the folder is a study."""
     desk = console(1, 1, 3.0)
     page = open_page(chromium, desk)
+    page.get_by_label("Primary measures of the study").click()
+    page.get_by_role("option", name="stiffness", exact=True).click()
     start(page)
+    declared = declared_primary(desk.sessions)
+    assert (declared.measures, declared.declared) == (["stiffness_nm_rad"], date.today())
     in_epoch(page, "2 of 2")
     kill_all(desk)
     broken = desk.folder()
@@ -86,6 +91,7 @@ def test_all_processes_are_killed_and_a_new_page_runs_the_rest(console, chromium
     desk = console(1, 1, 3.0)
     page = open_page(chromium, desk)
     page.get_by_text(f"{broken.name}: 1 of 2 epochs are good, it was interrupted").wait_for()
+    page.get_by_text(f"Primary measures: stiffness, declared {date.today()}").wait_for()
     session = opened_session(page, broken.name)
     session.get_by_role("button", name="Recover").click()
     page.get_by_text("is closed: ").wait_for()
@@ -97,6 +103,7 @@ def test_all_processes_are_killed_and_a_new_page_runs_the_rest(console, chromium
     study = read_study_folder(desk.sessions)
     rows = {(row["path"], row["condition"], row["part"]) for row in study.sessions}
     assert rows == {(broken.name, "OFF", ""), (broken.name, "DBS", ""), (rest.name, "DBS", "2")}
+    assert declared_primary(desk.sessions) == declared
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ from rigidimeter.planning import (
     PredictedPrecision,
     Scatter,
     WantedDifference,
-    detect,
+    detections,
     paired_power,
     prbs_nm,
     predicted_precision,
@@ -114,7 +114,7 @@ def test_studies_see_the_difference_as_often_as_predicted() -> None:
     torque_nm = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
     of_epochs = {"damping": Scatter(15.0, 0.0, 0.0, "drawn")}
     wanted = WantedDifference.parse("damping=20%")
-    found = detect(settings, torque_nm, wanted, scatter=of_epochs)
+    (found,) = detections(settings, torque_nm, [wanted], scatter=of_epochs)
     assert found.planned is not None
     assert found.planned.epochs == (n, n)
     days = found.planned.days

@@ -25,7 +25,7 @@ SMALLEST = {
     "calibration": "0.001",
     "checks_cost": "--epochs 1 --repeats 1 --parts",
     "cpu_commands": "--command estimate --repeats 1 --study {study}",
-    "day_tests": "2 1 3 days each",
+    "day_tests": "2 1 3 days each\nplan 1",
     "false_alarms": "--hours 1e-5",
     "drive_torque": "--hours 1e-5",
     "file_faults": "--files 8",

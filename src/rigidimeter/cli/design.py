@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,7 @@ from rigidimeter.cli.terminal_tables import show
 from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
+    from rigidimeter.core.study_files import PrimaryTable
     from rigidimeter.planning import Scatter
 
 
@@ -36,8 +38,25 @@ def design(
         "Study whose SDs between days and epochs are used. A folder with a study.toml and two "
         "conditions; without it the SDs are assumed.",
     ),
-    power: float = DETECT.option("--power P", "Power of the test.", 0.8),
-    alpha: float = DETECT.option("--alpha P", "Significance level of the test.", 0.05),
+    primary: str | None = DETECT.option(
+        "--primary NAMES",
+        "Primary measures of the study. Default: those that STUDY of --from declares, else "
+        "stiffness,damping; also impulse, work, rating.",
+    ),
+    rule: str | None = DETECT.further(
+        "--rule holm|sequence",
+        "How the primary measures are tested. Holm; or in sequence, where each is shown only if "
+        "those before it are.",
+    ),
+    declare: Path | None = DETECT.option(
+        "--declare STUDY",
+        "Declare them in the study.toml of a study. With the date of today; the study is made if "
+        "there is none. Not changed once sessions are recorded.",
+    ),
+    power: float = DETECT.further("--power P", "Chance to show the difference.", 0.8),
+    alpha: float = DETECT.further(
+        "--alpha P", "Significance level. Of all primary measures together.", 0.05
+    ),
     optimise: bool = PERTURB.flag(
         "--optimise",
         "Search for the most precise PRBS. Its clock, bits and amplitude, within the guard's "
@@ -71,7 +90,7 @@ def design(
     For example:
       rigidimeter design
       rigidimeter design --settings rig.toml --out planned --json numbers.json
-      rigidimeter design --detect damping=20% --detect stiffness=20% --from study
+      rigidimeter design --primary stiffness --detect stiffness=20% --from study
     """
     from rigidimeter.cli.design_text import design_blocks
     from rigidimeter.core.files import write_json
@@ -83,6 +102,7 @@ def design(
     check_criterion(criterion)
     size = {"body_mass_kg": body_mass_kg, "length_m": forearm_m}
     given = {name: value for name, value in size.items() if value is not None}
+    family = _primary(primary, rule, from_study, detect or ())
     scatter = None if from_study is None else _scatter_of(from_study)
     if from_study is not None and not given:
         given = _forearm_of(from_study)
@@ -90,6 +110,7 @@ def design(
         designed = compute(
             settings,
             differences=detect or (),
+            primary=family,
             power=power,
             alpha=alpha,
             scatter=scatter,
@@ -103,6 +124,10 @@ def design(
         from rigidimeter.analysis.report.design_folder import write_design_folder
 
         echo(f"\nWritten to {out}: {', '.join(write_design_folder(out, designed))}")
+    if declare is not None:
+        from rigidimeter.core.study_files import declare_primary
+
+        echo(f"{declare_primary(declare, family)}.")
     if json_out is not None:
         write_json(json_out, design_document(designed))
     refuse_unstable(designed.settings, designed.stability)
@@ -118,6 +143,26 @@ def _forearm_of(folder: Path) -> dict[str, float]:
         if one.body_mass_kg is not None and one.forearm_length_m is not None
     ]
     return sizes[0] if len(sizes) == 1 else {}
+
+
+def _primary(
+    names: str | None, rule: str | None, study: Path | None, differences: Sequence[str]
+) -> PrimaryTable:
+    """Return the primary measures: those that are named, those of a study, or the usual ones.
+
+    The smallest difference that is to be detected is the smallest worth finding.
+    """
+    from rigidimeter.core.study_files import PrimaryTable, declared_primary, primary_named
+    from rigidimeter.planning import WantedDifference
+
+    declared = None if study is None else declared_primary(study)
+    if names is None and rule is None and declared is not None:
+        return declared
+    wanted = [WantedDifference.parse(text) for text in differences]
+    percents = [abs(one.amount) for one in wanted if one.percent and one.parameter != "inertia"]
+    smallest = {"difference_percent": min(max(min(percents), 1.0), 100.0)} if percents else {}
+    usual = declared or PrimaryTable()
+    return primary_named(names or ",".join(usual.measures), rule or usual.rule, **smallest)
 
 
 def _scatter_of(folder: Path) -> dict[str, Scatter]:

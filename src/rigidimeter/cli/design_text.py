@@ -9,10 +9,18 @@ from decimal import Decimal
 from rigidimeter.cli.document_tables import document_tables
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
 from rigidimeter.core.records import PARAMETERS
+from rigidimeter.core.study_files import primary_words
 from rigidimeter.core.units import deg_from_rad
 from rigidimeter.core.words import number, scaled
 from rigidimeter.model import Margins
-from rigidimeter.planning import Design, Detection, chip_count, design_document, prbs_toml
+from rigidimeter.planning import (
+    Design,
+    Detection,
+    chip_count,
+    count_words,
+    design_document,
+    prbs_toml,
+)
 
 _HEADS = ("J\n10⁻³ kg·m²", "B\nN·m·s/rad", "K\nN·m/rad")
 _SCALES = (1e3, 1.0, 1.0)
@@ -49,20 +57,21 @@ def _days_needed(detections: Sequence[Detection]) -> Iterator[Block]:
     """Yield the table of days by epochs a day, and the scatter that it assumes."""
     first = detections[0]
     yield Heading(
-        f"Days with both conditions that show a difference from {first.condition}: power "
-        f"{first.power:g}, level {first.alpha:g}"
+        f"Days with both conditions that show a difference from {first.condition} with a chance "
+        f"of {100 * first.power:.3g} %"
     )
+    yield f"primary measures: {primary_words(first.primary)} (level {first.alpha:g})"
     heads = [f"{each.epochs[0]}" for each in first.needed]
     if first.planned is not None:
         heads.append("plan {}+{}".format(*first.planned.epochs))
     rows = []
     for found in detections:
         each = [*found.needed, *([] if found.planned is None else [found.planned])]
-        rows += [
-            (f"{_difference(found)}: days", *(_count(one.days) for one in each)),
-            ("  days, Holm for J, B and K", *(_count(one.days_holm) for one in each)),
-            ("  subjects, one day each", *(_count(one.subjects) for one in each)),
-        ]
+        rows.append((f"{_difference(found)}: days", *(count_words(one.days) for one in each)))
+        if found.before or found.level != found.alpha:
+            alone = (count_words(one.days_alone) for one in each)
+            rows.append(("  days, as the only primary", *alone))
+        rows.append(("  subjects, one day each", *(count_words(one.subjects) for one in each)))
     align = "<" + ">" * len(heads)
     yield Table(("epochs a day and condition", *heads), rows, align, 1)
     yield from _scatter(detections)
@@ -121,24 +130,10 @@ def _difference(found: Detection) -> str:
     return f"{found.wanted.parameter} {percent:+.3g} %".replace("-", "−")
 
 
-def _count(needed: int | None) -> str:
-    return "> 1000" if needed is None else f"{needed}"
-
-
 def _scatter(detections: Sequence[Detection]) -> Iterator[Block]:
-    by_source: dict[str, list[str]] = {}
-    for found in detections:
-        s = found.scatter
-        by_source.setdefault(s.source, []).append(
-            f"{found.wanted.parameter} {s.between_epochs_percent:.2g}, "
-            f"{s.between_days_percent:.2g}, {s.condition_in_day_percent:.2g} %"
-        )
+    texts = {f"{found.wanted.parameter} {found.scatter}": None for found in detections}
     share = 100.0 * detections[0].scatter.between_subjects
-    yield (
-        f"SD of epochs, of days, of one condition on a day; effect between subjects {share:.0f} %"
-    )
-    for source, texts in by_source.items():
-        yield f" {'; '.join(dict.fromkeys(texts))} ({source})"
+    yield f"Assumed SD: {'; '.join(texts)}; between subjects {share:.0f} % of the difference"
 
 
 def _found_by_search(design: Design) -> Iterator[Block]:

@@ -1,19 +1,18 @@
 """The experiment before it runs: perturbations, session order, predicted precision, power."""
 
-from rigidimeter.planning.days_needed import (
+from rigidimeter.planning.assumed_scatter import (
     ASSUMED,
     CORRELATION,
     DAY_CV_PERCENT,
     EPOCH_CV_PERCENT,
-    HOLM_MEASURES,
+    Scatter,
+    day_difference_sd,
+)
+from rigidimeter.planning.days_needed import (
     Detection,
     Needed,
-    Scatter,
     WantedDifference,
-    day_difference_sd,
-    detect,
-    paired_power,
-    pairs_needed,
+    detections,
     planned_epochs,
 )
 from rigidimeter.planning.document import DESIGN_SCHEMA, design_document
@@ -49,6 +48,7 @@ from rigidimeter.planning.multisine import (
     multisine_phases_rad,
 )
 from rigidimeter.planning.overview import Design, design
+from rigidimeter.planning.paired_test import paired_power, pairs_needed
 from rigidimeter.planning.perturbation_band import (
     HALF_POWER_DB,
     check_band,
@@ -71,6 +71,7 @@ from rigidimeter.planning.perturbations import (
     tick_count,
     tick_times_s,
 )
+from rigidimeter.planning.plan_sentence import count_words, plan_sentence
 from rigidimeter.planning.precision import PARAMETER_NAMES, PredictedPrecision, predicted_precision
 from rigidimeter.planning.predicted_record import (
     PredictedRecord,

@@ -18,8 +18,10 @@ at least σ_b1² + σ_b2². The SDs of the joint are shares of the value of thei
 Of S subjects with one day each, δ differs between subjects with SD τ: SE = √((τ² + v)/S), tested
 with S − 1 degrees of freedom.
 
-With σ_d the SD between days in one condition and ρ the correlation of the two conditions of a day,
-σ_b = σ_d √(1 − ρ).
+α is the level of the first test of the primary measures (`PrimaryTable.first_level`). By Holm's
+method the others are tested at higher levels, so the chance is at least the power at this one. In
+a sequence a measure is shown only if those before it are: its chance is the product of the powers,
+as of independent tests; measures that vary together have more.
 
 The test is `rigidimeter.analysis.statistics.day_difference`. Below three days, or three subjects,
 that is not the paired t-test alone, so three is the smallest number here.
@@ -29,83 +31,23 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-
-import scipy
+from functools import cache
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import PARAMETERS
-from rigidimeter.core.settings import Settings, SubjectSettings
+from rigidimeter.core.settings import Settings
+from rigidimeter.core.study_files import PrimaryTable
 from rigidimeter.model import Array
+from rigidimeter.planning.assumed_scatter import Scatter, assumed_scatter, day_difference_sd
+from rigidimeter.planning.paired_test import fewest_pairs, paired_power, pairs_needed
 from rigidimeter.planning.precision import PARAMETER_NAMES, predicted_precision
 
 EPOCHS_A_DAY = (1, 2, 3, 5, 10, 20)
 """Epochs a day in each condition for which days and subjects are found."""
 
-HOLM_MEASURES = 3
-"""J, B and K are tested together: by Holm's method the first of them has α/3."""
-
-_FEWEST = 3
-_MOST = 1000
-"""Days or subjects, where the search ends."""
-
-_CERTAIN = 40.0
-"""Above this noncentrality the power is 1, and the series of the distribution may not converge."""
-
 _NAMES = {"inertia": 0, "damping": 1, "stiffness": 2}
-
-CORRELATION = 0.5
-"""ρ where it is not known; chosen, as for the weights of the test by days."""
-
-_OF_EFFECT = 0.5
-
-
-@dataclass(frozen=True)
-class Scatter:
-    """How much one measure varies beyond the error of an epoch: SDs in % of a condition's value.
-
-    Attributes
-    ----------
-    between_epochs_percent : float
-        σ_e, within a day and a condition, without the error of the measurement.
-    between_days_percent : float
-        σ_d, of one condition.
-    condition_in_day_percent : float
-        σ_b, what remains of σ_d in the difference of two conditions of one day, over √2.
-    source : str
-        Where the numbers are from.
-    between_subjects : float
-        τ as a share of the difference.
-    """
-
-    between_epochs_percent: float
-    between_days_percent: float
-    condition_in_day_percent: float
-    source: str
-    between_subjects: float = _OF_EFFECT
-
-
-DAY_CV_PERCENT = {"inertia": 2.0, "damping": 9.0, "stiffness": 12.0}
-EPOCH_CV_PERCENT = {"inertia": 2.0, "damping": 12.0, "stiffness": 16.0}
-"""Coefficients of variation between days and between epochs of a day.
-
-Table 2 of the paper: r = .35 and .37 with 78 + 23 epochs mean that OFF and DBS differ by 0.92 and
-0.98 standard deviations. With B lower by 13 % and K by 18 % that is 15 and 20 % between epochs of
-all days. How much of it is between days the paper does not say: a third of the variance is chosen,
-and both of J.
-"""
-
-ASSUMED: Mapping[str, Scatter] = {
-    name: Scatter(
-        EPOCH_CV_PERCENT[name],
-        DAY_CV_PERCENT[name],
-        DAY_CV_PERCENT[name] * math.sqrt(1.0 - CORRELATION),
-        "chosen" if name == "inertia" else "Table 2 of the paper; of days a third, chosen",
-    )
-    for name in _NAMES
-}
-"""Where no study of the user's own is named."""
 
 
 @dataclass(frozen=True)
@@ -156,18 +98,18 @@ class Needed:
     ----------
     epochs : (int, int)
         Of a day, in each condition.
-    days, days_holm : int or None
-        Of one subject, both conditions on each, for the one measure that is tested and for the
-        first of `HOLM_MEASURES` by Holm's method; None if 1000 are not enough.
+    days, days_alone : int or None
+        Of one subject, both conditions on each: as one of the primary measures, and if it were the
+        only one; None if 1000 are not enough.
     subjects : int or None
-        With one day each, for the one measure.
+        With one day each, as one of the primary measures.
     day_sd : float
         √v, the SD of the difference of one day, in the parameter's unit.
     """
 
     epochs: tuple[int, int]
     days: int | None
-    days_holm: int | None
+    days_alone: int | None
     subjects: int | None
     day_sd: float
 
@@ -187,6 +129,13 @@ class Detection:
         Predicted standard error of one epoch in both conditions.
     scatter : Scatter
     power, alpha : float
+        The chance to show it, and the level of all primary measures together.
+    primary : PrimaryTable
+        What the study concludes from.
+    level : float
+        Of the first test of these; of inertia, which checks the instrument, `alpha`.
+    before : tuple of Detection
+        In a sequence, what must be shown first.
     needed : tuple of Needed
         For `EPOCHS_A_DAY`.
     planned : Needed or None
@@ -201,6 +150,9 @@ class Detection:
     scatter: Scatter
     power: float
     alpha: float
+    primary: PrimaryTable
+    level: float
+    before: tuple[Detection, ...]
     needed: tuple[Needed, ...]
     planned: Needed | None
 
@@ -214,32 +166,101 @@ def planned_epochs(settings: Settings) -> dict[str, int]:
     return counts
 
 
-def detect(
+def detections(
     settings: Settings,
     perturbation_nm: Array,
-    wanted: WantedDifference,
+    wanted: Sequence[WantedDifference],
     *,
+    primary: PrimaryTable | None = None,
     scatter: Mapping[str, Scatter] | None = None,
     power: float = 0.8,
     alpha: float = 0.05,
-) -> Detection:
-    """Return the days, epochs a day and subjects that a difference needs.
+) -> tuple[Detection, ...]:
+    """Return the days, epochs a day and subjects that differences need.
 
     The first condition of the settings is the baseline; the other one is its joint with the
     parameter lowered by the amount (or raised, for a negative amount). Standard errors are those of
     `iv` with J, B and K of each epoch. Without `scatter` it is `ASSUMED`, with the coefficient of
-    variation between epochs of the baseline where the settings give it.
+    variation between epochs of the baseline where the settings have one. J checks the instrument
+    and is tested by itself.
+
+    Parameters
+    ----------
+    settings : Settings
+    perturbation_nm : array, shape (n,)
+    wanted : sequence of WantedDifference
+    primary : PrimaryTable, optional
+        What the study concludes from; K and B by Holm's method without it. What comes first in a
+        sequence and is not among `wanted` is taken at its ``difference_percent``.
+    scatter : mapping of str to Scatter, optional
+    power, alpha : float
 
     Raises
     ------
     UserError
-        If the power or level is out of range, or the other joint would not exist.
+        If the power or level is out of range, the other joint would not exist, or a difference is
+        in no primary measure.
     """
     if not (0.0 < power < 1.0 and 0.0 < alpha < 1.0):
         raise UserError(
             f"--power {power:g} and --alpha {alpha:g} must both be between 0 and 1, for example "
             "0.8 and 0.05"
         )
+    family = PrimaryTable() if primary is None else primary
+    sizes = {one.parameter: one for one in reversed(wanted)}
+
+    @cache
+    def found(one: WantedDifference) -> Detection:
+        before: tuple[Detection, ...] = ()
+        if one.parameter != "inertia":
+            before = tuple(
+                found(sizes.get(name, WantedDifference(name, family.difference_percent, True)))
+                for name in _first_shown(one, family)
+            )
+        return _detection(
+            settings,
+            perturbation_nm,
+            one,
+            before=before,
+            scatter=scatter,
+            power=power,
+            alpha=alpha,
+            primary=family,
+            level=alpha if one.parameter == "inertia" else family.first_level(alpha),
+        )
+
+    return tuple(map(found, wanted))
+
+
+def _first_shown(wanted: WantedDifference, family: PrimaryTable) -> list[str]:
+    """Return which parameters must be shown before the wanted one."""
+    names = [name.partition("_")[0] for name in family.measures]
+    if wanted.parameter not in names:
+        raise UserError(
+            f"--detect {wanted.parameter}: {wanted.parameter} is not a primary measure "
+            f"({', '.join(names)}); add it to --primary, or leave it out here"
+        )
+    before = names[: names.index(wanted.parameter)] if family.rule == "sequence" else []
+    if unknown := [name for name in before if name not in _NAMES]:
+        raise UserError(
+            f"--detect {wanted.parameter}: {unknown[0]} comes first in the sequence, and no chance "
+            "to show it can be predicted; leave the difference out"
+        )
+    return before
+
+
+def _detection(
+    settings: Settings,
+    perturbation_nm: Array,
+    wanted: WantedDifference,
+    *,
+    before: tuple[Detection, ...],
+    scatter: Mapping[str, Scatter] | None,
+    power: float,
+    alpha: float,
+    primary: PrimaryTable,
+    level: float,
+) -> Detection:
     condition, subject = next(iter(settings.subject.items()))
     place = _NAMES[wanted.parameter]
     key = PARAMETER_NAMES[place]
@@ -249,9 +270,9 @@ def detect(
         raise UserError(_too_large(wanted, condition, value))
     errors = [
         predicted_precision(
-            perturbation_nm, settings, subject.model_copy(update={key: level})
+            perturbation_nm, settings, subject.model_copy(update={key: each})
         ).iv.free[place]
-        for level in (value, value - difference)
+        for each in (value, value - difference)
     ]
     found = Detection(
         wanted=wanted,
@@ -261,9 +282,12 @@ def detect(
         epoch_se=(errors[0], errors[1]),
         scatter=scatter[wanted.parameter]
         if scatter is not None
-        else _assumed(wanted.parameter, condition, subject),
+        else assumed_scatter(wanted.parameter, condition, subject),
         power=power,
         alpha=alpha,
+        primary=primary,
+        level=level,
+        before=before,
         needed=(),
         planned=None,
     )
@@ -276,108 +300,31 @@ def detect(
     )
 
 
-def day_difference_sd(
-    scatter: Scatter,
-    values: tuple[float, float],
-    epoch_se: tuple[float, float],
-    epochs: tuple[int, int],
-) -> float:
-    """Return √v, the SD of the difference of two conditions on one day, in the unit of `values`.
-
-    Parameters
-    ----------
-    scatter : Scatter
-    values, epoch_se : (float, float)
-        Of both conditions, and the standard errors of one epoch, in one unit.
-    epochs : (int, int)
-        Of a day, in each condition.
-
-    Examples
-    --------
-    >>> round(day_difference_sd(Scatter(10.0, 0.0, 0.0, ""), (1.0, 1.0), (0.0, 0.0), (2, 2)), 3)
-    0.1
-    """
-    of_day = scatter.condition_in_day_percent / 100.0
-    of_epoch = scatter.between_epochs_percent / 100.0
-    return math.sqrt(
-        sum(
-            (of_day * value) ** 2 + ((of_epoch * value) ** 2 + se**2) / n
-            for value, se, n in zip(values, epoch_se, epochs, strict=True)
-        )
-    )
-
-
-def paired_power(difference: float, sd: float, pairs: float, *, alpha: float = 0.05) -> float:
-    """Return the power of the two-sided paired t-test to find the difference with its sign.
-
-    Parameters
-    ----------
-    difference, sd : float
-        Mean and SD of the differences of pairs, in one unit.
-    pairs : float
-        Their number, above 1.
-    alpha : float
-        The level of the test.
-
-    Raises
-    ------
-    ValueError
-        If a number is out of range.
-
-    Examples
-    --------
-    >>> round(paired_power(1.0, 1.0, 10), 3)
-    0.803
-    """
-    if pairs <= 1 or sd < 0 or not 0 < alpha < 1:
-        raise ValueError(
-            f"more than 1 pair, an SD of at least 0 and alpha between 0 and 1 are needed, got "
-            f"{pairs}, {sd} and {alpha}"
-        )
-    if abs(difference) * math.sqrt(pairs) > _CERTAIN * sd:
-        return 1.0
-    shift = abs(difference) * math.sqrt(pairs) / sd
-    critical = float(scipy.stats.t.isf(alpha / 2.0, pairs - 1))
-    return float(scipy.stats.nct.sf(critical, pairs - 1, shift))
-
-
-def pairs_needed(
-    difference: float, sd: float, power: float = 0.8, *, alpha: float = 0.05
-) -> int | None:
-    """Return the fewest pairs, from three, that reach the power; None if 1000 do not.
-
-    Raises
-    ------
-    ValueError
-        If a number is out of range.
-    """
-    low, high = _FEWEST - 1, _FEWEST
-    while paired_power(difference, sd, high, alpha=alpha) < power:
-        low, high = high, 2 * high
-        if low >= _MOST:
-            return None
-    while high - low > 1:
-        middle = (low + high) // 2
-        if paired_power(difference, sd, middle, alpha=alpha) < power:
-            low = middle
-        else:
-            high = middle
-    return high if high <= _MOST else None
-
-
 def _needed(found: Detection, epochs: tuple[int, int]) -> Needed:
-    values = found.value, found.value - found.difference
-    sd = day_difference_sd(found.scatter, values, found.epoch_se, epochs)
-    of_subjects = math.hypot(found.scatter.between_subjects * found.difference, sd)
+    tests = [(one.difference, *_sds(one, epochs)) for one in (*found.before, found)]
+
+    def chance(pairs: int, of_subjects: bool) -> float:
+        """Return the chance that this and all before it are shown."""
+        return math.prod(
+            paired_power(difference, sds[of_subjects], pairs, alpha=found.level)
+            for difference, *sds in tests
+        )
+
+    *_, (_, sd, _) = tests
     return Needed(
         epochs=epochs,
-        days=pairs_needed(found.difference, sd, found.power, alpha=found.alpha),
-        days_holm=pairs_needed(
-            found.difference, sd, found.power, alpha=found.alpha / HOLM_MEASURES
-        ),
-        subjects=pairs_needed(found.difference, of_subjects, found.power, alpha=found.alpha),
+        days=fewest_pairs(lambda days: chance(days, False), found.power),
+        days_alone=pairs_needed(found.difference, sd, found.power, alpha=found.alpha),
+        subjects=fewest_pairs(lambda subjects: chance(subjects, True), found.power),
         day_sd=sd,
     )
+
+
+def _sds(found: Detection, epochs: tuple[int, int]) -> tuple[float, float]:
+    """Return the SD of the difference of one day, and of one subject with one day."""
+    values = found.value, found.value - found.difference
+    sd = day_difference_sd(found.scatter, values, found.epoch_se, epochs)
+    return sd, math.hypot(found.scatter.between_subjects * found.difference, sd)
 
 
 def _too_large(wanted: WantedDifference, condition: str, value: float) -> str:
@@ -393,19 +340,4 @@ def _too_large(wanted: WantedDifference, condition: str, value: float) -> str:
         f"--detect {wanted.parameter}={amount}: {amount} {parameter.unit} is "
         f"{'more than' if wanted.amount > value else 'all of'} {parameter.symbol} itself "
         f"({place}); did you mean {amount} %?"
-    )
-
-
-def _assumed(parameter: str, condition: str, subject: SubjectSettings) -> Scatter:
-    """Return what is assumed, with the SD between epochs of the settings where it is above 0.
-
-    0 is the default of a virtual joint, and no joint of a person.
-    """
-    assumed, of_epochs = ASSUMED[parameter], float(getattr(subject, f"{parameter}_cv_percent"))
-    if of_epochs == 0.0:
-        return assumed
-    return replace(
-        assumed,
-        between_epochs_percent=of_epochs,
-        source=f"epochs: subject.{condition} of the settings; days: {assumed.source}",
     )

@@ -1,4 +1,4 @@
-"""A design as one document of plain values, units in the names (`rigidimeter.design/2`)."""
+"""A design as one document of plain values, units in the names (`rigidimeter.design/3`)."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from rigidimeter.core.files import plain_values
 from rigidimeter.core.records import PARAMETERS
 from rigidimeter.core.units import rad_from_deg
 from rigidimeter.model import Margins
-from rigidimeter.planning.days_needed import HOLM_MEASURES, Detection, Needed
+from rigidimeter.planning.days_needed import Detection, Needed
 from rigidimeter.planning.joint_bandwidth import Corner
 from rigidimeter.planning.motion_demand import time_constant_s
 from rigidimeter.planning.overview import Design
 from rigidimeter.planning.perturbations import prbs_period_s
+from rigidimeter.planning.plan_sentence import plan_sentence
 from rigidimeter.planning.precision import PARAMETER_NAMES, Errors, PredictedPrecision
 from rigidimeter.planning.search import Candidate
 
-DESIGN_SCHEMA = "rigidimeter.design/2"
+DESIGN_SCHEMA = "rigidimeter.design/3"
 
 
 def design_document(design: Design) -> dict[str, Any]:
@@ -163,11 +164,14 @@ def _detection(found: Detection) -> dict[str, Any]:
         "difference": found.difference,
         "power": found.power,
         "alpha": found.alpha,
-        "holm_measures": HOLM_MEASURES,
+        "primary": {"measures": list(found.primary.measures), "rule": found.primary.rule},
+        "level": found.level,
+        "after": [one.wanted.parameter for one in found.before],
         "epoch_se": found.epoch_se,
         "scatter": vars(found.scatter),
         "needed": [_needed(each) for each in found.needed],
         "planned": found.planned and _needed(found.planned),
+        "sentence": plan_sentence(found),
     }
 
 
@@ -175,7 +179,7 @@ def _needed(found: Needed) -> dict[str, Any]:
     return {
         "epochs_a_day": found.epochs,
         "days_needed": found.days,
-        "days_needed_holm": found.days_holm,
+        "days_needed_alone": found.days_alone,
         "subjects_needed": found.subjects,
         "day_sd": found.day_sd,
     }

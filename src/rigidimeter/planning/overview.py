@@ -20,13 +20,14 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import PARAMETERS, readonly
 from rigidimeter.core.session import Protocol
 from rigidimeter.core.settings import Settings, settings_from
+from rigidimeter.core.study_files import PrimaryTable, primary_named
 from rigidimeter.core.words import html_table, one_line, plural
 from rigidimeter.model import JointDynamics, Stability, loop_stability, median_joint
+from rigidimeter.planning.assumed_scatter import Scatter
 from rigidimeter.planning.days_needed import (
     Detection,
-    Scatter,
     WantedDifference,
-    detect,
+    detections,
     planned_epochs,
 )
 from rigidimeter.planning.dose import dose_objection
@@ -143,10 +144,10 @@ class Design:
             (found.wanted.parameter, found.difference, each.epochs[0], *counts)
             for found in self.detections
             for each in found.needed
-            for counts in [(each.days, each.days_holm, each.subjects)]
+            for counts in [(each.days, each.days_alone, each.subjects)]
         ]
         of = ["parameter", "difference", "epochs_a_day"]
-        needed = ["days_needed", "days_needed_holm", "subjects_needed"]
+        needed = ["days_needed", "days_needed_alone", "subjects_needed"]
         return pd.DataFrame(rows, columns=[*of, *needed]).set_index(of).astype("Int64")
 
     def plot(self, *, axes: Sequence[Axes] | None = None) -> NDArray[Any]:
@@ -203,6 +204,8 @@ def design(
     settings: Settings | Path | str | Mapping[str, Any] | None = None,
     *,
     differences: Sequence[str] = (),
+    primary: PrimaryTable | str | None = None,
+    rule: str = "holm",
     power: float = 0.8,
     alpha: float = 0.05,
     scatter: Mapping[str, Scatter] | None = None,
@@ -223,8 +226,12 @@ def design(
         None stands for the defaults.
     differences : sequence of str
         Differences for which to find the days and epochs needed, such as ``"damping=20%"``.
+    primary : str or PrimaryTable, optional
+        Primary measures of the study, such as ``"stiffness,damping"``, which is the default.
+    rule : {"holm", "sequence"}
+        How they are tested together.
     power, alpha : float
-        Power and level of the test by days for them.
+        The chance to show them by the test by days, and the level of all primary measures.
     scatter : mapping of str to Scatter, optional
         How much inertia, damping and stiffness vary, by name; without it what is assumed.
     search : {"minimax", "A", "D"}, optional
@@ -245,6 +252,7 @@ def design(
     """
     chosen = settings_from(settings, **changes)
     wanted = [WantedDifference.parse(text) for text in differences]
+    family = primary_named(primary, rule) if isinstance(primary, str) else primary
     if search is not None:
         check_criterion(search)
     rate_hz, guard = chosen.rig.tick_rate_hz, chosen.guard
@@ -289,10 +297,14 @@ def design(
         precision=precision,
         remarks=remarks,
         warnings=tuple(warnings),
-        detections=tuple(
-            detect(chosen, perturbation_nm, difference, scatter=scatter, power=power, alpha=alpha)
-            for difference in wanted
-            if stable
+        detections=detections(
+            chosen,
+            perturbation_nm,
+            wanted if stable else (),
+            primary=family,
+            scatter=scatter,
+            power=power,
+            alpha=alpha,
         ),
         criterion=search,
         present=assess(chosen, search) if searched and search else None,

@@ -78,7 +78,7 @@ def test_writes_what_will_be_commanded(tmp_path: Path) -> None:
 
     document = json.loads(numbers.read_text())
     assert document == json.loads((folder / "design.json").read_text())
-    assert document["schema"] == DESIGN_SCHEMA == "rigidimeter.design/2"
+    assert document["schema"] == DESIGN_SCHEMA == "rigidimeter.design/3"
     assert document["prbs"]["covered"] is True
     assert len(document["bandwidth"]["corners"]) == 8
     assert document["protocol"]["total_s"] == 304.0
@@ -239,9 +239,9 @@ def test_the_first_screen_has_the_perturbation_the_loop_the_errors_and_the_days(
     assert [int(cell) for cell in row[4:]] == [one["days_needed"] for one in each]
     assert damping["unit"] == "N·m·s/rad"
     assert damping["planned"]["epochs_a_day"] == [3, 3]
-    assert "epochs: subject.OFF of the settings; days: Table 2 of the paper" in " ".join(
-        text.split()
-    )
+    words = " ".join(text.split())
+    assert "primary measures: stiffness and damping, by Holm (level 0.05)" in words
+    assert "damping 12 % between epochs (subject.OFF), 6.4 % between days (chosen)" in words
 
 
 def test_without_a_difference_it_names_the_option_that_asks_for_days() -> None:
@@ -269,7 +269,7 @@ def test_the_scatter_comes_from_a_study(tmp_path: Path) -> None:
     assert scatter["source"] == f"{small_study}, 8 epochs, 2 days with both conditions"
     assert 0 < scatter["between_epochs_percent"] < 60
     assert not (small_study / "analysis").exists()
-    assert f"stiffness {scatter['between_epochs_percent']:.2g}, " in text
+    assert f"stiffness {scatter['between_epochs_percent']:.2g} % between epochs, " in text
 
 
 def test_a_study_without_days_of_both_conditions_has_half_the_variance(tmp_path: Path) -> None:

@@ -11,13 +11,13 @@ from rigidimeter.analysis.statistics import day_difference
 from rigidimeter.analysis.statistics import test_by_levels as by_levels
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.core.study_files import PrimaryTable, primary_named
 from rigidimeter.planning import (
     ASSUMED,
-    HOLM_MEASURES,
     Scatter,
     WantedDifference,
     day_difference_sd,
-    detect,
+    detections,
     paired_power,
     pairs_needed,
     planned_epochs,
@@ -116,19 +116,24 @@ def perturbation(settings: Settings) -> np.ndarray:
 
 def found_for(text: str, tables: dict = VARIED, **options):
     settings = parse_settings(tables)
-    return detect(settings, perturbation(settings), WantedDifference.parse(text), **options)
+    wanted = [WantedDifference.parse(text)]
+    return detections(settings, perturbation(settings), wanted, **options)[0]
 
 
 @pytest.mark.parametrize(
-    ("text", "epochs", "holm"),
-    [("damping=15%", 1, False), ("stiffness=12%", 3, False), ("stiffness=15%", 5, True)],
+    ("text", "epochs", "primary"),
+    [
+        ("damping=15%", 1, "damping"),
+        ("stiffness=12%", 3, "stiffness"),
+        ("stiffness=15%", 5, "stiffness,damping"),
+    ],
 )
-def test_studies_of_that_many_days_find_it_by_the_test_of_compare(text, epochs, holm):
+def test_studies_of_that_many_days_find_it_by_the_test_of_compare(text, epochs, primary):
     """2,000 virtual studies of as many days and epochs; days are whole, so that 0.8 is exceeded."""
-    found = found_for(text)
+    found = found_for(text, primary=primary_named(primary))
     one = next(each for each in found.needed if each.epochs[0] == epochs)
-    days = one.days_holm if holm else one.days
-    alpha = found.alpha / (HOLM_MEASURES if holm else 1)
+    days, alpha = one.days, found.level
+    assert alpha == 0.05 / len(primary.split(","))
     predicted = paired_power(found.difference, one.day_sd, days, alpha=alpha)
     assert predicted >= 0.8
     assert paired_power(found.difference, one.day_sd, days - 1, alpha=alpha) < 0.8
@@ -155,7 +160,7 @@ def _p(tested):
 
 
 def test_subjects_of_one_day_find_it_by_the_test_of_compare():
-    found = found_for("damping=30%")
+    found = found_for("damping=30%", primary=primary_named("damping"))
     one = next(each for each in found.needed if each.epochs[0] == 5)
     effect_sd = found.scatter.between_subjects * found.difference
     sd = math.hypot(effect_sd, one.day_sd)
@@ -213,9 +218,10 @@ def test_days_follow_from_error_and_scatter() -> None:
     for each in (*found.needed, found.planned):
         sd = day_difference_sd(found.scatter, (0.1368, 0.8 * 0.1368), found.epoch_se, each.epochs)
         assert each.day_sd == pytest.approx(sd)
-        assert each.days == pairs_needed(found.difference, sd)
-        assert each.days_holm == pairs_needed(found.difference, sd, alpha=0.05 / 3)
-        assert each.subjects == pairs_needed(found.difference, math.hypot(found.difference / 2, sd))
+        assert each.days_alone == pairs_needed(found.difference, sd)
+        assert each.days == pairs_needed(found.difference, sd, alpha=0.05 / 2)
+        of_subjects = math.hypot(found.difference / 2, sd)
+        assert each.subjects == pairs_needed(found.difference, of_subjects, alpha=0.05 / 2)
     assert found.planned.epochs == (5, 3)
     same = found_for(f"damping={0.2 * 0.1368}")
     assert same.difference == pytest.approx(found.difference)
@@ -227,11 +233,41 @@ def test_settings_that_give_the_scatter_of_epochs_are_used() -> None:
     found = found_for("damping=20%", tables)
     assert found.scatter.between_epochs_percent == 25.0
     assert found.scatter.condition_in_day_percent == ASSUMED["damping"].condition_in_day_percent
-    assert found.scatter.source.startswith("epochs: subject.OFF of the settings; days: Table 2")
+    assert f"{found.scatter}" == "25 % between epochs (subject.OFF), 6.4 % between days (chosen)"
     unvaried = {"subject": {"OFF": {"damping_cv_percent": 0.0}, "DBS": {}}}
     assert found_for("damping=20%", VARIED | unvaried).scatter == ASSUMED["damping"]
     given = {"damping": Scatter(1.0, 2.0, 3.0, "a study")}
     assert found_for("damping=20%", tables, scatter=given).scatter == given["damping"]
+
+
+def test_in_a_sequence_those_before_it_must_be_shown_too() -> None:
+    """Its chance is the product, also where the difference of the first is not named."""
+    sequence = primary_named("stiffness,damping", "sequence")
+    first = found_for("stiffness=20%", primary=sequence)
+    (second,) = (found_for("damping=20%", primary=sequence),)
+    assert first.level == second.level == 0.05
+    assert first.before == ()
+    assert [one.wanted for one in second.before] == [first.wanted]
+    one, other = second.needed[2], first.needed[2]
+
+    def chance(days: int) -> float:
+        return paired_power(second.difference, one.day_sd, days) * paired_power(
+            first.difference, other.day_sd, days
+        )
+
+    assert chance(one.days) >= 0.8 > chance(one.days - 1)
+    assert other.days == other.days_alone
+    assert one.days > max(one.days_alone, other.days - 1)
+
+
+def test_inertia_is_tested_by_itself_and_what_is_no_primary_measure_is_refused() -> None:
+    assert found_for("inertia=5%").level == 0.05
+    assert found_for("damping=20%").primary == PrimaryTable()
+    with pytest.raises(UserError, match=r"damping is not a primary measure \(stiffness\); add"):
+        found_for("damping=20%", primary=primary_named("stiffness"))
+    scores = primary_named("work,damping", "sequence")
+    with pytest.raises(UserError, match="work comes first in the sequence"):
+        found_for("damping=20%", primary=scores)
 
 
 def test_a_stricter_wish_needs_more() -> None:

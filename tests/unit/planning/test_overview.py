@@ -79,4 +79,4 @@ def test_the_days_needed_are_a_table() -> None:
     assert list(days.loc["damping", "days_needed"]) == [each.days for each in needed]
     assert list(days.loc["damping", "subjects_needed"]) == [each.subjects for each in needed]
     assert days.loc["stiffness"].isna().all(axis=None)  # 0.6 % takes more than 1000 days
-    assert "days_needed_holm" in found._repr_html_()
+    assert "days_needed_alone" in found._repr_html_()

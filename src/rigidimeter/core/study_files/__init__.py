@@ -10,6 +10,12 @@ from rigidimeter.core.study_files.day_plan import (
     read_plan,
     write_plan,
 )
+from rigidimeter.core.study_files.declaration import (
+    declare_primary,
+    declared_primary,
+    primary_named,
+    primary_words,
+)
 from rigidimeter.core.study_files.exclusions import (
     exclude_epoch,
     excluded_epochs,

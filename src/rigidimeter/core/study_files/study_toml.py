@@ -355,8 +355,19 @@ def study_text(
     about = toml_text({"schema": STUDY_SCHEMA, "title": title})
     pair = _REFERENCE + toml_text({"reference": reference, "other": other})
     described = (_condition(*one, reference) for one in conditions.items())
-    declared = [] if primary is None else [_declaration(primary)]
+    declared = [] if primary is None else [primary_text(primary)]
     return "\n".join([about, pair, _TABLES, *described, *declared, _TAIL])
+
+
+def primary_text(primary: PrimaryTable) -> str:
+    """Return the table ``[primary]`` of a `study.toml`."""
+    day = primary.declared
+    return _PRIMARY.format(
+        measures=", ".join(f'"{name}"' for name in primary.measures),
+        rule=primary.rule,
+        difference=primary.difference_percent,
+        declared="# declared = 2026-01-31" if day is None else f"declared = {day}",
+    )
 
 
 def own_text(text: str) -> str:
@@ -389,13 +400,3 @@ def _condition(name: str, table: ConditionTable, reference: str) -> str:
     title = table.title or _TITLES.get(name, "")
     written = toml_text({"conditions": {name: {"title": title, **given}}})
     return written + (_NOT_WRITTEN if not given and name != reference else "")
-
-
-def _declaration(primary: PrimaryTable) -> str:
-    day = primary.declared
-    return _PRIMARY.format(
-        measures=", ".join(f'"{name}"' for name in primary.measures),
-        rule=primary.rule,
-        difference=primary.difference_percent,
-        declared="# declared = 2026-01-31" if day is None else f"declared = {day}",
-    )

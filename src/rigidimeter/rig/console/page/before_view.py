@@ -15,9 +15,10 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import read_json, read_toml, toml_text, write_json
 from rigidimeter.core.session import count_epochs
 from rigidimeter.core.settings import Settings, dump_settings, load_settings
-from rigidimeter.core.study_files import STUDY_FILE
+from rigidimeter.core.study_files import STUDY_FILE, PrimaryTable
 from rigidimeter.rig.console.page.jobs import Jobs
-from rigidimeter.rig.console.page.prediction import dry_run_lines, prediction_lines
+from rigidimeter.rig.console.page.prediction import detected, dry_run_lines, prediction_lines
+from rigidimeter.rig.console.page.primary_view import PrimaryView
 from rigidimeter.rig.console.page.rig_steps import start_refusal
 from rigidimeter.rig.console.page.rig_view import RigView
 from rigidimeter.rig.console.page.server_state import ServerState, StartRequest
@@ -26,6 +27,7 @@ from rigidimeter.rig.console.page.session_form import (
     MAX_BLOCKS,
     METADATA,
     NOTE,
+    PRIMARY,
     RANGE,
     SETTINGS,
     STIMULATION,
@@ -40,7 +42,6 @@ from rigidimeter.rig.console.page.session_form import (
 )
 
 DRAFT = "draft.json"
-DETECTED = ("--detect", "damping=20%", "--detect", "stiffness=20%")
 
 MAX_FILES = 100
 OF_A_RIG = ("torque_sensor", "drive")
@@ -92,6 +93,7 @@ class BeforeView:
             blinded = ui.checkbox("Blinded: show codes for conditions").mark("blinded")
             blinded.value = self._form[BLINDED] == YES
             blinded.on_value_change(lambda event: self._change(BLINDED, YES if event.value else ""))
+            self._primary = PrimaryView(state.place, self._form[PRIMARY], self._change)
         with ui.expansion("Perturbation, controller and limits").classes("w-full").props("dense"):
             with ui.row().classes("w-full"):
                 for one in SETTINGS:
@@ -115,7 +117,7 @@ class BeforeView:
             tested = ui.button("Test the tones").mark("tones")
             tested.on("click", js_handler="() => window.rigTones.test()")
             tested.tooltip("Two short low tones, a caution, then a long high one, a stop")
-        self._answer = ui.html("", sanitize=False).classes("answer")
+        self._answer = ui.html("", sanitize=False).classes("answer").props("data-name=computed")
         self._check()
         ui.timer(5.0, self._show_steps)
 
@@ -250,6 +252,11 @@ class BeforeView:
         request = StartRequest(
             self._state.place.one_session or folder, entered.settings, entered.about
         )
+        try:
+            self._primary.declare(entered.primary)
+        except UserError as error:
+            self._refused.text = f"No session can start: {error}."
+            return
         self._state.ask(request)
 
     async def _predict(self) -> None:
@@ -261,7 +268,9 @@ class BeforeView:
                 return []
             return prediction_lines(read_json(document), settings.margins)
 
-        await self._compute(("design",), (*DETECTED, "--json", "design.json"), lines)
+        entered = self._entered.primary if self._entered is not None else None
+        options = detected(self._primary.declared or entered or PrimaryTable())
+        await self._compute(("design",), (*options, "--json", "design.json"), lines)
 
     async def _dry_run(self) -> None:
         """Run the protocol on a simulated clock; the folder is deleted."""

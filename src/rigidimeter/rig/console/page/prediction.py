@@ -7,6 +7,7 @@ from statistics import NormalDist
 from typing import Any
 
 from rigidimeter.core.settings import MarginsSettings
+from rigidimeter.core.study_files import PrimaryTable
 
 SYMBOLS = {"inertia_kg_m2": "J", "damping_nm_s_rad": "B", "stiffness_nm_rad": "K"}
 Z95 = NormalDist().inv_cdf(0.975)
@@ -19,14 +20,14 @@ def prediction_lines(document: Mapping[str, Any], wanted: MarginsSettings) -> li
     Parameters
     ----------
     document : mapping
-        A `rigidimeter.design/2`.
+        A `rigidimeter.design/3`.
     wanted : MarginsSettings
         The margins that are required.
     """
     return [
         _stability(document["stability"], wanted),
         *_precision(document["precision"]),
-        *_days(document["detection"]),
+        *(one["sentence"] for one in document["detection"]),
         *(f"! {text}." for text in (*document["warnings"], *document["remarks"])),
     ]
 
@@ -85,40 +86,19 @@ def _precision(found: Mapping[str, Any]) -> list[str]:
     return lines or ["The protocol has no epoch of PRBS, which alone gives J, B and K."]
 
 
-def _days(found: list[Mapping[str, Any]]) -> list[str]:
-    """Say how many days like the planned one show a difference, and what that assumes."""
-    lines = []
-    for one in found:
-        percent = 100.0 * one["difference"] / one["value"]
-        what = (
-            f"a {one['parameter']} {'lower' if percent > 0 else 'higher'} by {abs(percent):.3g} % "
-            f"({abs(one['difference']):.3g} {one['unit']})"
-        )
-        planned = one["planned"]
-        if planned is None:
-            lines.append(
-                f"! To show {what} a day needs PRBS in two conditions, which the protocol has not."
-            )
-            continue
-        days, holm, subjects = (
-            "more than 1000" if planned[key] is None else f"{planned[key]}"
-            for key in ("days_needed", "days_needed_holm", "subjects_needed")
-        )
-        lines.append(
-            f"{days} days like this one, with {' and '.join(map(str, planned['epochs_a_day']))} "
-            f"epochs, show {what} with {100.0 * one['power']:.0f} % power; {holm} if J, B and K "
-            f"are all tested (Holm); of subjects with one day each {subjects}. Assumed: "
-            f"{_assumed(one['scatter'])}."
-        )
-    return lines
+def detected(primary: PrimaryTable) -> list[str]:
+    """Return the options of `design` that plan for the primary measures of a study.
 
-
-def _assumed(scatter: Mapping[str, Any]) -> str:
-    return (
-        f"SD of {scatter['between_epochs_percent']:.2g} % between epochs and "
-        f"{scatter['condition_in_day_percent']:.2g} % of one condition between days "
-        f"({scatter['source']})"
-    )
+    Examples
+    --------
+    >>> detected(PrimaryTable(measures=["stiffness_nm_rad"]))
+    ['--primary', 'stiffness_nm_rad', '--rule', 'holm', '--detect', 'stiffness=20%']
+    """
+    options = ["--primary", ",".join(primary.measures), "--rule", primary.rule]
+    for name in (one.partition("_")[0] for one in primary.measures):
+        if name in ("stiffness", "damping"):
+            options += ["--detect", f"{name}={primary.difference_percent:g}%"]
+    return options
 
 
 def dry_run_lines(good: int, planned: int) -> list[str]:

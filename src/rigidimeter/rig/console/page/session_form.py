@@ -17,7 +17,7 @@ from typing import Any
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings, changed_settings, dump_settings, validated
-from rigidimeter.core.study_files import ConditionTable
+from rigidimeter.core.study_files import ConditionTable, PrimaryTable, primary_named, primary_words
 from rigidimeter.rig.console.page.form_values import (
     parse_integer,
     parse_line,
@@ -74,7 +74,20 @@ STIMULATION = (
 BLINDED, YES = "blinded", "yes"
 """The box that hides conditions behind codes, and what it holds where it is ticked."""
 
-_OF_THE_SESSION = (*(one.key for one in (*METADATA, NOTE, *RANGE, *STIMULATION)), BLINDED)
+PRIMARY = "primary"
+PRIMARIES: Mapping[str, PrimaryTable] = {
+    primary_words(one): one
+    for one in (
+        primary_named("stiffness,damping"),
+        primary_named("stiffness"),
+        primary_named("damping"),
+        primary_named("stiffness,damping", "sequence"),
+        primary_named("damping,stiffness", "sequence"),
+    )
+}
+"""What may be declared as the primary measures of the study; a form that declares none is empty."""
+
+_OF_THE_SESSION = (*(one.key for one in (*METADATA, NOTE, *RANGE, *STIMULATION)), BLINDED, PRIMARY)
 """Fields that no protocol fills."""
 
 _NEVER_KEPT = {one.key for one in RANGE}
@@ -92,13 +105,14 @@ class EnteredSession:
     """What a form says: settings and facts about the session, and what is wrong with it.
 
     `settings` is None as long as something is wrong; `errors` has a sentence for each field, under
-    the key "" what belongs to none.
+    the key "" what belongs to none. `primary` is what the form declares, if it does.
     """
 
     settings: Settings | None
     about: Mapping[str, Any]
     subject: str
     errors: Mapping[str, str] = field(default_factory=dict)
+    primary: PrimaryTable | None = None
 
 
 def empty_form(settings: Settings) -> dict[str, str]:
@@ -217,7 +231,8 @@ def read_form(form: Mapping[str, str], base: Settings) -> EnteredSession:
         errors |= _placed(str(error).removeprefix("form: "), SETTINGS)
     conditions = list(dict.fromkeys(block["condition"] for block in blocks))
     about["conditions"] = conditions
-    return EnteredSession(None if errors else settings, about, about["subject"], errors)
+    primary = PRIMARIES.get(form.get(PRIMARY, ""))
+    return EnteredSession(None if errors else settings, about, about["subject"], errors, primary)
 
 
 def _with_subjects(base: Settings, blocks: Sequence[Mapping[str, Any]]) -> Settings:

@@ -3,10 +3,11 @@
 import pytest
 
 from rigidimeter.core.settings import MarginsSettings, parse_settings
+from rigidimeter.core.study_files import primary_named
 from rigidimeter.planning import design, design_document
-from rigidimeter.rig.console.page import dry_run_lines, prediction_lines
+from rigidimeter.rig.console.page import detected, dry_run_lines, prediction_lines
 
-KEYS = ("days_needed", "days_needed_holm", "subjects_needed")
+KEYS = ("days_needed", "days_needed_alone", "subjects_needed")
 TWO = [{"condition": "OFF", "epochs": 4}, {"condition": "DBS", "epochs": 4}]
 
 
@@ -25,31 +26,51 @@ def test_the_planned_epochs_of_a_condition_have_an_interval():
     assert said[2].startswith("DBS: 4 epochs give J ± ")
     assert said[0].startswith("✓ The loop is stable; smallest margins 28.3 dB and 92 deg (6 dB")
     one = document["detection"][0]
-    days, holm, subjects = (one["planned"][key] for key in KEYS)
+    days, alone, subjects = (one["planned"][key] for key in KEYS)
     assert said[3] == (
-        f"{days} days like this one, with 4 and 4 epochs, show a stiffness lower by 20 % "
-        f"(0.35 N·m/rad) with 80 % power; {holm} if J, B and K are all tested (Holm); of subjects "
-        f"with one day each {subjects}. Assumed: SD of 16 % between epochs and 8.5 % of one "
-        f"condition between days ({one['scatter']['source']})."
+        "To detect 20 % less stiffness among stiffness and damping, by Holm (chance 80 %): "
+        f"{days} days with 4 + 4 epochs ({alone} if it were the only primary measure), or "
+        f"{subjects} subjects with one day each. Assumed SD: 16 % between epochs (Table 2 of the "
+        "paper), 8.5 % between days (chosen); between subjects 50 % of the difference (chosen)."
     )
-    assert 3 < days < holm < 20
+    assert 3 < alone < days < 20
+
+
+def test_a_single_primary_measure_and_one_after_another_are_named():
+    settings = parse_settings({"protocol": {"blocks": TWO}})
+    alone = design(settings, differences=["damping=20%"], primary="damping")
+    (one,) = design_document(alone)["detection"]
+    assert one["sentence"].startswith("To detect 20 % less damping (chance 80 %): ")
+    assert "only primary" not in one["sentence"]
+    second = design(
+        settings, differences=["damping=20%"], primary="stiffness,damping", rule="sequence"
+    )
+    (one,) = design_document(second)["detection"]
+    assert one["after"] == ["stiffness"]
+    assert " less damping after stiffness is shown (chance 80 %): " in one["sentence"]
 
 
 def test_a_difference_that_a_thousand_days_do_not_show_is_said():
     _, said = lines(("damping=-0.1%",), protocol={"blocks": TWO})
-    assert said[-1].startswith(
-        "more than 1000 days like this one, with 4 and 4 epochs, show a damping higher by 0.1 % "
-        "(0.000137 N·m·s/rad)"
-    )
+    assert said[-1].startswith("To detect 0.1 % more damping among")
+    assert "(chance 80 %): > 1000 days with 4 + 4 epochs, or > 1000 subjects" in said[-1]
 
 
 def test_one_condition_cannot_be_compared_and_one_without_prbs_tells_no_stiffness():
     _, said = lines(protocol={"blocks": [{"condition": "OFF", "task": "sinusoid"}]})
     assert "no epoch of PRBS" in said[1]
     assert said[2] == (
-        "! To show a stiffness lower by 20 % (0.35 N·m/rad) a day needs PRBS in two conditions, "
-        "which the protocol has not."
+        "To detect 20 % less stiffness, a day needs PRBS epochs in two conditions; the protocol "
+        "has them in one or none."
     )
+
+
+def test_predict_plans_for_the_primary_measures_of_the_study():
+    primary = primary_named("damping,work", "sequence", difference_percent=15.0)
+    assert detected(primary) == [
+        *("--primary", "damping_nm_s_rad,work_j", "--rule", "sequence"),
+        *("--detect", "damping=15%"),
+    ]
 
 
 @pytest.mark.parametrize(

@@ -45,6 +45,13 @@ def test_numbers_are_read_with_a_comma_and_refused_by_the_settings(form):
     assert read_form(form | {"prbs_clock": "fast"}, BASE).errors.keys() == {"prbs_clock"}
 
 
+def test_primary_measures_are_declared_where_they_are_chosen(form):
+    assert read_form(form, BASE).primary is None
+    chosen = read_form(form | {"primary": "stiffness, then damping"}, BASE).primary
+    assert (chosen.measures, chosen.rule) == (["stiffness_nm_rad", "damping_nm_s_rad"], "sequence")
+    assert restored_form(form | {"primary": "damping"}, BASE)["primary"] == "damping"
+
+
 def test_conditions_may_be_codes_that_the_settings_do_not_know(form):
     entered = read_form(form | {"condition0": "K7"}, BASE)
     assert entered.settings is not None
