@@ -181,7 +181,7 @@ def test_the_table_of_differences_is_one_on_page_and_terminal(study, json, page)
             assert row.p == "–"
         else:
             assert_shows(row.p, [one["p_holm"]], 2)
-        words = {"no difference shown": "none shown"}
+        words = {"no difference shown": "none shown", "cannot be decided": "undecided"}
         assert row.verdict == words.get(one["verdict"], one["verdict"])
 
 
