@@ -38,6 +38,7 @@ bench: install
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[all,bench]'
 	$(BIN)/python -m pytest -m slow
 	$(BIN)/python -m benchmarks
+	$(BIN)/python -m benchmarks.verdicts days --studies 20
 
 # Beside cyclictest, of Debian's rt-tests.
 bench-loop: install

@@ -17,26 +17,38 @@ below 0.05, and otherwise no difference.
 
     python -m benchmarks.verdicts run verdicts.jsonl --seconds 150   # again, until all are done
     python -m benchmarks.verdicts table verdicts.jsonl
+
+Many more studies are drawn as values of B and K, without recordings, and concluded upon by the same
+code (`STUDIES`): without a difference, with one (`TRUE`), and with one of the size that is worth
+finding, of which none may be excluded. The chance that `rigidimeter design` predicts stands beside.
+
+    python -m benchmarks.verdicts days --studies 2000   # ten minutes of processor time
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from tests.traps.recorded_studies import ALL, AT_REST, MOTION, Session, write_study
 
 import rigidimeter as rm
-from rigidimeter.analysis.study import conclude
+from rigidimeter.analysis.study import Observation, StudyResult, conclude
+from rigidimeter.analysis.study.comparison import day_test, measured
+from rigidimeter.analysis.study.measures import MEASURES as TESTED
 from rigidimeter.analysis.study.tested import LEVEL
+from rigidimeter.core.settings import Settings
+from rigidimeter.core.study_files import PrimaryTable
+from rigidimeter.planning import Scatter, day_difference_sd, paired_power
 
 DAYS = 4
 LOWER = 0.85
@@ -178,14 +190,190 @@ def table(rows: list[dict[str, Any]]) -> Iterator[str]:
             yield f"| {group} difference ({len(own)}) | {name} | {' | '.join(cells)} |"
 
 
+SETTINGS = Settings()
+EPOCHS = 5
+"""Of a day and condition."""
+WILD = (1 / 3, 3.0)
+SCATTER = {
+    "stiffness_nm_rad": Scatter(16.0, 10.0, 6.0, "measured"),
+    "damping_nm_s_rad": Scatter(12.0, 7.5, 4.5, "three quarters of it, as in Table 2"),
+}
+TRUE = {"stiffness_nm_rad": 0.18, "damping_nm_s_rad": 0.13}
+WORTH = dict.fromkeys(TRUE, PrimaryTable().difference_percent / 100.0)
+FOUND, NONE = ("lower", "higher"), ("no difference shown",)
+OTHERS = ("not supported",), NONE, ("cannot be decided",)
+
+
+class Concluded(NamedTuple):
+    """What is concluded of a measure, whether its interval holds the difference, and that share."""
+
+    verdict: str
+    held: bool
+    lower: float
+
+
+@dataclass(frozen=True)
+class Study:
+    """Days with epochs of two conditions, and what is wrong with them.
+
+    Attributes
+    ----------
+    name : str
+    off, dbs : range
+        Days of each condition; a number in both is one day.
+    subjects : int
+        Each with these days. Of several the difference is not the same: SD half of it.
+    wild : float
+        Share of epochs whose value is three times too high or too low.
+    high : float
+        How much the first day of OFF is too high, as a share.
+    """
+
+    name: str
+    off: range
+    dbs: range
+    subjects: int = 1
+    wild: float = 0.0
+    high: float = 0.0
+
+    def drawn(
+        self, name: str, lower: float, rng: np.random.Generator
+    ) -> tuple[list[Observation], float]:
+        """Return the epochs of a measure that is lower in DBS by a share, and that share.
+
+        Of one or two subjects it is theirs, else that of all, as the sentence speaks of them.
+        """
+        scatter = SCATTER[name]
+        epochs, days, own = (
+            percent / 100.0
+            for percent in (
+                scatter.between_epochs_percent,
+                scatter.between_days_percent,
+                scatter.condition_in_day_percent,
+            )
+        )
+        found, effects = [], []
+        for subject in range(self.subjects):
+            effect = lower
+            if self.subjects > 1:
+                effect *= 1 + scatter.between_subjects * rng.standard_normal()
+            effects.append(effect)
+            of_days = days * rng.standard_normal(max(self.off.stop, self.dbs.stop))
+            for condition, level, recorded in (
+                ("OFF", 1.0, self.off),
+                ("DBS", 1.0 - effect, self.dbs),
+            ):
+                for day in recorded:
+                    mean = 1 + of_days[day] + own * rng.standard_normal()
+                    values = level * (mean + epochs * rng.standard_normal(EPOCHS))
+                    hit = rng.random(EPOCHS) < self.wild
+                    values[hit] *= rng.choice(WILD, int(hit.sum()))
+                    if condition == "OFF" and day == recorded.start:
+                        values *= 1 + self.high
+                    found += [
+                        Observation(v, condition, f"S{subject}", f"{day}", unit=f"{subject}/{day}")
+                        for v in values.tolist()
+                    ]
+        return found, math.fsum(effects) / len(effects) if self.subjects < 3 else lower
+
+    def predicted(self, name: str) -> float:
+        """Return the chance of which `design` speaks; NaN where it plans no such study."""
+        lower, scatter = TRUE[name], SCATTER[name]
+        sd = day_difference_sd(scatter, (1.0, 1.0 - lower), (0.0, 0.0), (EPOCHS, EPOCHS))
+        days, level = len(self.off), PrimaryTable().first_level(LEVEL)
+        if self.off != self.dbs or max(days, self.subjects) < 3 or self.subjects == 2:
+            return math.nan
+        if self.subjects == 1:
+            return paired_power(lower, sd, days, alpha=level)
+        of_subject = math.hypot(scatter.between_subjects * lower, sd / math.sqrt(days))
+        return paired_power(lower, of_subject, self.subjects, alpha=level)
+
+    def concluded(self, lower: Mapping[str, float], seed: Sequence[int]) -> dict[str, Concluded]:
+        """Draw and compare a study; return what is concluded of each measure."""
+        rng = np.random.default_rng(seed)
+        compared, shares = [], {}
+        for measure in TESTED:
+            if measure.name in lower:
+                seen, shares[measure.name] = self.drawn(measure.name, lower[measure.name], rng)
+                one = measured(measure, seen, ("OFF", "DBS"))
+                compared.append(replace(one, days=day_test(one)))
+        result = StudyResult("", "OFF", "DBS", tuple(compared), settings=SETTINGS)
+        concluded = conclude(result)
+        assert concluded is not None
+        level = 1 + self.wild * (sum(WILD) / len(WILD) - 1)
+        found = {}
+        for one in concluded.each:
+            name, d = one.comparison.measure.name, one.difference
+            held = d.low <= -level * shares[name] <= d.high
+            found[name] = Concluded(one.verdict, held, shares[name])
+        return found
+
+
+STUDIES = (
+    Study("2 days", range(2), range(2)),
+    Study("3 days", range(3), range(3)),
+    Study("5 days", range(5), range(5)),
+    Study("8 days", range(8), range(8)),
+    Study("9 + 4 days", range(9), range(9, 13)),
+    Study("9 days, 4 with both", range(9), range(4)),
+    Study("2 subjects, 3 days", range(3), range(3), subjects=2),
+    Study("4 subjects, 3 days", range(3), range(3), subjects=4),
+    Study("8 days, 5 % wild epochs", range(8), range(8), wild=0.05),
+    Study("8 days, one 60 % too high", range(8), range(8), high=0.6),
+)
+
+
+def shares(found: Sequence[Concluded], *verdicts: Sequence[str]) -> str:
+    """Return how many per cent have one of these verdicts, for each group of them."""
+    counts = [sum(one.verdict in group for one in found) for group in verdicts]
+    return " / ".join(f"{100 * count / len(found):.1f}" for count in counts)
+
+
+def of_days(studies: int, only: str) -> Iterator[str]:
+    """Yield the table of verdicts on days of epochs, of the rows whose names hold some text."""
+    others = "not supported / no difference / undecided"
+    yield (
+        f"| studies | | either found, none there | none there: found / {others} | lower by 18 % "
+        f"(K), 13 % (B): lower / higher / {others} | planned | lower by 20 %: no difference | "
+        "interval holds |"
+    )
+    yield "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |"
+    for k, study in enumerate(STUDIES):
+        if only not in study.name:
+            continue
+        none, true, worth = (
+            [study.concluded(lower, [k, way, n]) for n in range(studies)]
+            for way, lower in enumerate((dict.fromkeys(TRUE, 0.0), TRUE, WORTH))
+        )
+        either = [any(one.verdict in FOUND for one in each.values()) for each in none]
+        for name in TRUE:
+            absent, there, at = ([each[name] for each in part] for part in (none, true, worth))
+            at = [one for one in at if one.lower >= WORTH[name]]
+            held = [one.held for one in (*absent, *there)]
+            planned = 100 * study.predicted(name)
+            cells = [
+                f"{100 * sum(either) / studies:.1f}",
+                shares(absent, FOUND, *OTHERS),
+                shares(there, ("lower",), ("higher",), *OTHERS),
+                "–" if math.isnan(planned) else f"{planned:.0f}",
+                shares(at, NONE),
+                f"{100 * sum(held) / len(held):.1f}" if any(held) else "–",
+            ]
+            yield f"| {study.name} | {MEASURES[name]} | {' | '.join(cells)} |"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("what", choices=("run", "table"))
-    parser.add_argument("file", type=Path)
+    parser.add_argument("what", choices=("run", "table", "days"))
+    parser.add_argument("file", type=Path, nargs="?", default=Path("verdicts.jsonl"))
     parser.add_argument("--studies", type=int, default=200)
+    parser.add_argument("--only", default="", help="of the rows of days")
     parser.add_argument("--seconds", type=float, default=150.0)
     chosen = parser.parse_args()
-    if chosen.what == "run":
+    if chosen.what == "days":
+        for line in of_days(chosen.studies, chosen.only):
+            print(line, flush=True)
+    elif chosen.what == "run":
         run(chosen.file, chosen.studies, chosen.seconds)
     else:
         print("\n".join(table(rows_of(chosen.file))))

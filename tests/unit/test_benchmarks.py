@@ -41,7 +41,8 @@ SMALLEST = {
     "torque_sign": "--epochs 1 --sizes small",
     "trips": "design",
     "untrue": "",
-    "verdicts": "run {folder}/studies --studies 1 --seconds 0.01\ntable {folder}/studies",
+    "verdicts": "run {folder}/studies --studies 1 --seconds 0.01\ntable {folder}/studies\n"
+    "days --studies 1 --only 4",
 }
 """Arguments by module, a line for each run."""
 
