@@ -21,10 +21,14 @@ from rigidimeter.cli.main import app
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import CHANNEL_UNITS
 from rigidimeter.core.settings import load_settings, parse_settings
-from rigidimeter.core.study_files import read_study_toml
+from rigidimeter.core.study_files import read_plan, read_study_toml
 
 RUN = CliRunner()
-EXAMPLES = sorted((ROOT / "examples").rglob("*.toml"))
+STUDIES = sorted((ROOT / "examples" / "studies").iterdir())
+EXAMPLES = [
+    *sorted((ROOT / "examples" / "settings").glob("*.toml")),
+    *(path for study in STUDIES for path in sorted((study / "protocols").glob("*.toml"))),
+]
 
 
 def commands(blocks: list[Block]) -> Iterator[tuple[str, list[str]]]:
@@ -169,6 +173,12 @@ def test_a_refusal_is_the_sentence_that_is_printed(block: Block, after: Block | 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.name)
 def test_an_example_file_is_accepted(path: Path) -> None:
     load_settings(path)
+
+
+@pytest.mark.parametrize("study", STUDIES, ids=lambda path: path.name)
+def test_an_example_of_a_planned_study_is_accepted(study: Path) -> None:
+    read_study_toml(study / "study.toml")
+    assert read_plan(study) is not None
 
 
 def test_there_are_the_two_example_files() -> None:
