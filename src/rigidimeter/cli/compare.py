@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from rigidimeter.cli.help_pages import COMPARE, ESTIMATE
-from rigidimeter.cli.options import CSV, FULL, JSON, KEY
+from rigidimeter.cli.options import CSV, FULL, GROUP, JSON, KEY
 from rigidimeter.cli.output import echo, keep_inputs, say
 from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
@@ -44,10 +44,7 @@ def compare(
         "With --value: the bootstrap resamples the labels of this column. Default: rows, or days "
         "where several rows are of one.",
     ),
-    group: str | None = COMPARE.option(
-        "--group NAME",
-        "Compare the subjects of this group alone: column `group` of the table or of sessions.csv.",
-    ),
+    group: str | None = GROUP,
     seed: int = ESTIMATE.further("--seed N", "Seed of the bootstrap.", 1, min=0),
     resamples: int = ESTIMATE.further(
         "--resamples N", "Resamples of the bootstrap.", 9999, min=100

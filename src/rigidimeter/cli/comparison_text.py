@@ -61,6 +61,9 @@ def _about(found: StudyResult) -> str:
         parts.append("virtual data")
     if found.blinded:
         parts.append("blinded: the conditions are codes")
+    groups = {o.group for c in found.comparisons for o in c.observations}
+    if len(groups) == 1 and (group := groups.pop()):
+        parts.append(f"group {group}")
     if found.sessions:
         parts.append(plural(len({each.subject for each in found.sessions}), "subject"))
         parts.append(plural(len({(s.subject, s.day) for s in found.sessions}), "day"))

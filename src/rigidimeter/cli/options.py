@@ -21,6 +21,11 @@ CPU = RUN.further("--cpu N", "Processor of the loop. Default: the last one.")
 NEW_STUDY = WRITE.option("--out DIR", "New folder for the study.", ...)
 SEED = RUN.further("--seed N", "Seed of all random numbers. Default: that of the settings.")
 STUDY_SEED = RUN.option("--seed N", "Seed of all random numbers.", 2023, min=0, max=2**31)
+GROUP = HOW_TO_READ.further(
+    "--group NAME",
+    "Take the subjects of this group alone: column `group` of sessions.csv, or of the table.",
+)
+
 KEY = HOW_TO_READ.further(
     "--key FILE",
     "Blinding key of a study folder (columns code and condition), if it is stored elsewhere.",

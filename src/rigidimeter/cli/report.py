@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from rigidimeter.cli.help_pages import WRITE
-from rigidimeter.cli.options import KEY
+from rigidimeter.cli.options import GROUP, KEY
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.progress import Meter
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
@@ -29,6 +29,7 @@ def report(
         "--title TEXT", "Title of the page. Default: the title of the study, or Joint rigidity."
     ),
     key: Path | None = KEY,
+    group: str | None = GROUP,
     overwrite: bool = WRITE.flag(
         "--overwrite",
         "Replace the report of something else, and write beside other files.",
@@ -67,7 +68,9 @@ def report(
                 f"--out {out}: is the study or its stored analysis; name another folder, such as "
                 f"{folder / 'report'}"
             )
-        analysed = analyse_study_folder(folder, recordings, key)
+        analysed = analyse_study_folder(folder, recordings, key, group=group)
+    elif group is not None:
+        raise UserError(f"--group {group}: recordings name no group; give a study folder")
     else:
         _, analysed = analyse_recordings(recordings)
     try:

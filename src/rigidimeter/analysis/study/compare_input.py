@@ -265,7 +265,7 @@ def _compare_columns(
                 "make a bootstrap interval too narrow"
             )
     return StudyResult(
-        "",
+        "" if group is None else f"group {group}",
         *names,
         tested,
         differences,

@@ -170,6 +170,7 @@ def _of_group(read: StudyFolder, group: str) -> StudyFolder:
     paths, subjects = ({row[name] for row in sessions} for name in ("path", "subject"))
     return replace(
         read,
+        about=read.about.model_copy(update={"title": f"{read.about.title}, group {group}"}),
         sessions=sessions,
         ratings=tuple(row for row in read.ratings if row["subject"] in subjects),
         exclusions=tuple(row for row in read.exclusions if row["path"] in paths),

@@ -96,4 +96,8 @@ def test_the_command_line_takes_a_group(tmp_path, rigidimeter) -> None:
     said = " ".join(ran.out.split())
     assert "a difference in k is not supported: groups differ: patients −18.0 %" in said
     ran = rigidimeter("compare", path, "--value", "k", "--resamples", "100", "--group", "patients")
+    assert ran.out.startswith("OFF and ON · group patients\n")
     assert "k is lower in ON than in OFF" in " ".join(ran.out.split())
+    ran = rigidimeter("report", path, "--group", "patients", "--out", tmp_path / "report")
+    assert ran.status
+    assert "--group patients: recordings name no group; give a study folder" in ran.err
