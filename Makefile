@@ -13,11 +13,14 @@ install: $(STAMP)
 $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "rigidimeter needs Python 3.11 or newer; $(PYTHON) is older. Try: make PYTHON=python3.12 $(MAKECMDGOALS)" >&2; exit 1; }
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --upgrade --constraint constraints.txt pip
-	$(BIN)/python -m pip uninstall --quiet --yes setuptools
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[all]'
-	touch $(STAMP)
+	@echo "installing: a new environment in $(VENV)"
+	@$(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install --quiet --upgrade --constraint constraints.txt pip
+	@$(BIN)/python -m pip uninstall --quiet --yes setuptools
+	@echo "installing: rigidimeter, its extras and what its tests need; each package is named as it is fetched"
+	@$(BIN)/python -m pip install --progress-bar off --constraint constraints.txt --editable '.[all,dev]' | \
+		sed -u -n -e 's/^Collecting \([^ ]*\).*/  \1/p' -e '/^Installing collected/s/:.*/ packages/p'
+	@touch $(STAMP)
 
 demo: install
 	$(BIN)/rigidimeter demo --out $(OUT)
@@ -35,7 +38,7 @@ check: install
 	$(BIN)/lint-imports
 
 bench: install
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[all,bench]'
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[all,dev,bench]'
 	$(BIN)/python -m pytest -m slow
 	$(BIN)/python -m benchmarks
 	$(BIN)/python -m benchmarks.verdicts days --studies 20

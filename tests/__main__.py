@@ -11,15 +11,20 @@ one comes after the other.
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
+import time
 from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
 TIMED = ["tests/console", "tests/docs", "tests/faults", "tests/wire", "tests/unit/rig/acquisition"]
 """The folders that hold tests marked `realtime`."""
+
+TELL_S = 20.0
+"""Between lines that say how far the tests are whose output is shown at the end."""
 
 
 def pytest(
@@ -75,14 +80,32 @@ def _both_halves(*timed_options: str) -> bool:
         beside = pytest(*untimed, idle=True, output=output)
         try:
             failed = pytest(*timed).wait()
-            print("the tests that keep no time still run", flush=True)
-            failed_beside = beside.wait()
+            failed_beside = _wait_telling(beside, output)
         finally:
             beside.kill()
             output.seek(0)
             sys.stdout.buffer.write(output.read())
             sys.stdout.flush()
     return bool(failed or failed_beside)
+
+
+def _wait_telling(beside: subprocess.Popen[bytes], output: IO[bytes]) -> int:
+    """Wait for the tests whose output goes into a file; print how far they are."""
+    began_s = time.monotonic()
+    while True:
+        with suppress(subprocess.TimeoutExpired):
+            return beside.wait(TELL_S)
+        # Its own place in the file stays where it writes.
+        written = os.pread(output.fileno(), os.fstat(output.fileno()).st_size, 0).decode("utf-8")
+        print(f"{progress(written)}, {time.monotonic() - began_s:.0f} s", flush=True)
+
+
+def progress(written: str) -> str:
+    """Return how many of pytest's tests have run, by what it has written so far."""
+    done = re.findall(r"^([.sxXFE]+) *\[ *(\d+)%\]$", written, re.MULTILINE)
+    failed = sum(len(re.findall("[FE]", marks)) for marks, _ in done)
+    percent = done[-1][1] if done else "0"
+    return f"tests that keep no time: {percent} % done" + (f", {failed} failed" if failed else "")
 
 
 if __name__ == "__main__":

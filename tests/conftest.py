@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import sys
+from collections import Counter
 from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -185,8 +186,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:
-    """Name the tests by the clock that a busy machine left without a result."""
-    lines = unjudged(terminalreporter.stats.get("skipped", []))
+    """Count what was skipped by its reasons; name the tests that a busy machine did not judge."""
+    skipped = terminalreporter.stats.get("skipped", [])
+    lines = unjudged(skipped)
+    reasons = Counter(
+        report.longrepr[2].removeprefix("Skipped: ")
+        for report in skipped
+        if not unjudged([report])  # its reason is a page
+    )
+    for reason, count in reasons.items():
+        terminalreporter.write_line(f"SKIPPED {count}: {reason}")
     if file := config.getoption("--unjudged"):
         Path(file).write_text("".join(f"{line}\n" for line in lines), "utf-8")
     elif lines:

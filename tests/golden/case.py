@@ -6,7 +6,6 @@ import contextlib
 import csv
 import io
 import json
-import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,9 +18,6 @@ from rigidimeter.cli.main import main
 
 ANSWER = "answer.json"
 """What the last command writes; a table may take its place."""
-
-SHARED = Path(os.environ.get("RIGIDIMETER_SHARED", Path(__file__).parents[3] / "shared")) / "data"
-"""Recordings of others, which lie beside the repository or nowhere."""
 
 
 @dataclass(frozen=True)

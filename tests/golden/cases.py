@@ -8,11 +8,12 @@ from functools import partial
 from pathlib import Path
 
 from tests.corpus import CORPUS
-from tests.golden.case import ANSWER, SHARED, Case, estimated
+from tests.golden.case import ANSWER, Case, estimated
 from tests.golden.spoiled import SPOILED, as_it_is
 from tests.golden.spoiled import write as write_spoiled
 from tests.scenarios.catalogue import SCENARIOS
 from tests.scenarios.session import write_session
+from tests.shared_files import SHARED
 from tests.small_study import build, record
 from tests.version_1 import as_version_1
 
@@ -310,7 +311,7 @@ def _of_plans() -> Iterator[Case]:
 
 
 def _of_others() -> Iterator[Case]:
-    ankle = SHARED / "ankle" / "z_pf.npz"
+    ankle = SHARED / "data" / "ankle" / "z_pf.npz"
     columns = ("--column", "angle_rad=position_rad", "--column", "torque_nm=torque_Nm")
     for method in ("bandlimited", "published"):
         yield Case(

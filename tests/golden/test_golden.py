@@ -13,6 +13,7 @@ import pytest
 from tests.golden.cases import CASES
 from tests.golden.page import PAGE, page_of
 from tests.golden.table import differences, read, text_of
+from tests.shared_files import skip_without
 
 from rigidimeter.core.settings import DiagnosticLevels
 
@@ -23,7 +24,7 @@ ANSWERS = read(Path(__file__).with_name("answers.txt"))
 def test_the_answers_are_what_they_were(name: str, tmp_path: Path) -> None:
     case = CASES[name]
     if case.needs and not case.needs.exists():
-        pytest.skip("the recordings of others are not here; RIGIDIMETER_SHARED names their folder")
+        skip_without()
     found = differences(ANSWERS.get(name, {}), case.answers(tmp_path))
     assert not found, f"{name} (make golden writes the table anew)\n" + "\n".join(found)
 

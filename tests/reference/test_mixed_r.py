@@ -3,13 +3,13 @@
 import csv
 import itertools
 import math
-import os
 import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.shared_files import SHARED, skip_without
 
 from rigidimeter.analysis.statistics import (
     Mixed,
@@ -20,7 +20,6 @@ from rigidimeter.analysis.statistics import (
     ranksum,
 )
 
-SHARED = Path(os.environ.get("RIGIDIMETER_SHARED", Path(__file__).parents[3] / "shared"))
 OURS = Path(__file__).parent / "mixed"
 RANDOM = {
     "unbalanced": ("examiner",),
@@ -39,7 +38,7 @@ TESTS = (
 
 def rows(path: Path) -> list[dict[str, str]]:
     if not path.is_file():
-        pytest.skip(f"{path} is absent; set RIGIDIMETER_SHARED to the folder that holds it")
+        skip_without()
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 

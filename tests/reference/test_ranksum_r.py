@@ -1,15 +1,13 @@
 """The rank-sum test against R (`wilcox.test` and coin), whose script lies beside the numbers."""
 
 import csv
-import os
 from collections import defaultdict
-from pathlib import Path
 
 import pytest
+from tests.shared_files import SHARED, skip_without
 
 from rigidimeter.analysis.statistics import RankSum, ranksum
 
-SHARED = Path(os.environ.get("RIGIDIMETER_SHARED", Path(__file__).parents[3] / "shared"))
 UNIROOT_TOLERANCE = 1e-4
 DATASETS = ("visc_like_78_23", "ties_27_12")
 
@@ -17,7 +15,7 @@ DATASETS = ("visc_like_78_23", "ties_27_12")
 def rows(name: str) -> list[dict[str, str]]:
     path = SHARED / "reference" / "ranksum" / name
     if not path.is_file():
-        pytest.skip(f"{path} is absent; set RIGIDIMETER_SHARED to the folder that holds it")
+        skip_without()
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 

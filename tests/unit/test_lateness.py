@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from tests import lateness
-from tests.__main__ import TIMED, too_many_unjudged
+from tests.__main__ import TIMED, progress, too_many_unjudged
 from tests.conftest import REALTIME
 from tests.lateness import ATTEMPTS, LatenessProbe
 
@@ -123,6 +123,12 @@ def test_what_was_judged_is_not_counted(pytester, tmp_path, capsys):
         assert not too_many_unjudged(path, 0)
     assert not too_many_unjudged(tmp_path / "broken off", 0)
     assert capsys.readouterr().out == ""
+
+
+def test_what_is_shown_at_the_end_says_meanwhile_how_far_it_is():
+    assert progress("bringing up nodes...\n") == "tests that keep no time: 0 % done"
+    written = "bringing up nodes...\n..s... [  1%]\n.F.xE. [ 43%]\n..."
+    assert progress(written) == "tests that keep no time: 43 % done, 2 failed"
 
 
 def test_make_test_looks_for_tests_in_real_time_wherever_there_are_some():
