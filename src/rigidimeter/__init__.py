@@ -8,7 +8,7 @@ From arrays, one estimate:
 
 From files, everything that the command line does:
 
-    recording = rm.read("elbow.csv", epoch_length_s=20)
+    recording = rm.read("demo-study/elbow.csv", column={"epoch": "trial"})
     estimates = rm.estimate(recording)
     rm.report(estimates, "report")
 

@@ -75,6 +75,8 @@ def test_the_documents_are_there() -> None:
 def test_a_command_line_is_one_that_exists(where: str, words: list[str]) -> None:
     if words[0] == "make":
         assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text("utf-8"), re.M), where
+    elif words[:3] == ["python3", "-m", "pip"]:
+        assert words[3] == "wheel" or f"rigidimeter-{__version__}-py3" in words[-1], where
     elif words[:2] == ["python", "-m"]:
         module = ROOT / words[2].replace(".", "/")
         assert module.with_suffix(".py").is_file() or (module / "__main__.py").is_file(), where

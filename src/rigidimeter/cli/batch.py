@@ -38,9 +38,10 @@ def batch(
 
     \b
     For example:
-      rigidimeter batch archive --out results.parquet --jobs 4
-      rigidimeter batch 'archive/**/*.csv' --mapping lab.toml --out results.csv
-      rigidimeter batch study --out results.parquet --scheduler tcp://host:8786
+      rigidimeter batch demo-study/sessions --out results.parquet --jobs 4
+      rigidimeter batch 'demo-study/el*.csv' --mapping lab.toml --out elbow.csv
+      rigidimeter batch demo-study/sessions --out cluster.parquet \\
+          --scheduler tcp://host:8786
     """
     from rigidimeter.analysis.batch import batch as run_batch
 

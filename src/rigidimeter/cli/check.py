@@ -69,7 +69,7 @@ def check(
 
     \b
     For example:
-      rigidimeter check RIG.toml --settings study.toml
+      rigidimeter check RIG.toml --settings examples/settings/human-elbow.toml
       rigidimeter check RIG.toml --known-inertia-kg-m2 0.012
       rigidimeter check RIG.toml --zero
       rigidimeter check RIG.toml --live

@@ -69,10 +69,10 @@ def compare(
     \b
     For example:
       rigidimeter compare demo-study
-      rigidimeter compare study/sessions/day-1 study/sessions/day-2
-      rigidimeter compare before.csv after.csv --condition OFF --condition DBS
-      rigidimeter compare estimates.json --reference OFF --other DBS
-      rigidimeter compare ratings.csv --value score --by condition
+      rigidimeter compare demo-study/sessions/day-1-OFF \\
+          demo-study/sessions/day-1-DBS
+      rigidimeter compare demo-study/analysis/estimates.json --reference DBS
+      rigidimeter compare demo-study/ratings.csv --value score --by condition
     """
     from rigidimeter.analysis import study as studies
     from rigidimeter.cli.comparison_text import comparison_blocks

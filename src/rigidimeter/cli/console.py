@@ -65,7 +65,7 @@ def console(
     \b
     For example:
       rigidimeter console
-      rigidimeter console protocol.toml --rig rig.toml --out study
+      rigidimeter console examples/settings/human-elbow.toml --rig RIG.toml
     """
     require_page()
     from rigidimeter.cli.page_session import PageAddress, serve_page

@@ -89,8 +89,8 @@ def design(
     \b
     For example:
       rigidimeter design
-      rigidimeter design --settings rig.toml --out planned --json numbers.json
-      rigidimeter design --primary stiffness --detect stiffness=20% --from study
+      rigidimeter design --settings examples/settings/study.toml --out planned
+      rigidimeter design --primary stiffness --from demo-study
     """
     from rigidimeter.cli.design_text import design_blocks
     from rigidimeter.core.files import write_json

@@ -34,11 +34,10 @@ def estimate(
 
     \b
     For example:
-      rigidimeter estimate demo-study/sessions/day-1
-      rigidimeter estimate elbow.csv --epoch-length-s 20 --json estimates.json
-      rigidimeter estimate ankle.npz --column angle_rad=position_rad \\
-          --column torque_nm=torque_Nm --rate-hz 1000 --reaction \\
-          --epoch-length-s 20
+      rigidimeter estimate demo-study/sessions/day-1-OFF
+      rigidimeter estimate demo-study/elbow.csv --column epoch=trial
+      rigidimeter estimate demo-study/elbow.csv --epoch-length-s 10 \\
+          --column "torque=torque [Nm]" --unit torque=Nm --json estimates.json
     """
     from rigidimeter.analysis.reading import write_estimates_csv, write_estimates_json
     from rigidimeter.analysis.study.subject_torque_table import check_name, write_subject_torque

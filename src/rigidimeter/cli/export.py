@@ -50,7 +50,8 @@ def export(
     \b
     For example:
       rigidimeter export demo-study --to mat --out matlab
-      rigidimeter export elbow.csv --to mat --out elbow.mat --subject S1
+      rigidimeter export demo-study/elbow.csv --column epoch=trial --to mat \\
+          --out elbow.mat --subject S1
     """
     from rigidimeter.analysis.export import export_sessions, format_named
     from rigidimeter.cli.inputs import study_of

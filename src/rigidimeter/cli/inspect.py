@@ -36,8 +36,8 @@ def inspect(
 
     \b
     For example:
-      rigidimeter inspect elbow.csv
-      rigidimeter inspect elbow.csv --unit torque=Nm --write-mapping lab.toml
+      rigidimeter inspect demo-study/elbow.csv
+      rigidimeter inspect demo-study/elbow.csv --write-mapping lab.toml
     """
     keep_inputs((write_mapping, plot), recordings.paths)
     several = len(recordings.paths) > 1

@@ -90,9 +90,9 @@ def _root(
     """Measure joint rigidity. Research software, not a medical device.
 
     \b
-    Analyse a recording:  rigidimeter estimate elbow.csv --epoch-length-s 20
     Try all of it:        rigidimeter demo (a virtual subject on a virtual rig)
-    Run a rig:            rigidimeter console protocol.toml --rig rig.toml
+    Analyse a recording:  rigidimeter inspect demo-study/elbow.csv
+    Run a rig:            rigidimeter console --rig RIG.toml
     """
 
 

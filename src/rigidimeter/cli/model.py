@@ -43,7 +43,7 @@ def model(
 
     \b
     For example:
-      rigidimeter model ankle.csv --terms inertia,stiffness,reflex --compare
+      rigidimeter model demo-study/elbow.csv --terms inertia,reflex --compare
     """
     from rigidimeter.analysis.estimation.terms import candidates, parse_terms
     from rigidimeter.analysis.study.torque_models import model_document, model_recording

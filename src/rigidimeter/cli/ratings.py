@@ -53,8 +53,8 @@ def ratings(
 
     \b
     For example:
-      rigidimeter ratings ratings.csv --json ratings.json
-      rigidimeter ratings ratings.csv --score updrs --scale 0 4 --step 1
+      rigidimeter ratings demo-study/ratings.csv --json ratings.json
+      rigidimeter ratings demo-study/ratings.csv --scale 0 4 --step 0.5
     """
     from rigidimeter.analysis.study.ratings_found import ratings_document
     from rigidimeter.analysis.study.ratings_model import model_ratings

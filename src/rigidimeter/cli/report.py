@@ -43,9 +43,9 @@ def report(
 
     \b
     For example:
-      rigidimeter report demo-study/sessions/day-1 --out report
-      rigidimeter report study --out study/report
-      rigidimeter report ankle.csv --reaction --epoch-length-s 20 --out report
+      rigidimeter report demo-study --out demo-study/report
+      rigidimeter report demo-study/sessions/day-1-OFF --out day-1
+      rigidimeter report demo-study/elbow.csv --column epoch=trial --out elbow
     """
     from rigidimeter.analysis.report import inputs_seen_from, why_not_own
     from rigidimeter.analysis.study import lead

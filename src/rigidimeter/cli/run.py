@@ -100,10 +100,11 @@ def run(
 
     \b
     For example:
-      rigidimeter run --out session
-      rigidimeter run protocol.toml --rig rig.toml --lead-range --out session
-      rigidimeter run --resume session --rig rig.toml --out session-2
-      rigidimeter run --next study --stimulation "on since 10:42"
+      rigidimeter run --out monday
+      rigidimeter run examples/settings/human-elbow.toml --rig RIG.toml \\
+          --lead-range --out tuesday
+      rigidimeter run --resume tuesday --rig RIG.toml --out tuesday-2
+      rigidimeter run --next demo-study --stimulation "on since 10:42"
     """
     from rigidimeter.cli.attendance import attendance
     from rigidimeter.cli.next_session import (

@@ -40,8 +40,8 @@ def simulate(
     \b
     For example:
       rigidimeter simulate --out session
-      rigidimeter simulate --out session --settings study.toml --seed 7
-      rigidimeter simulate --out session --task prbs --condition DBS --epochs 12
+      rigidimeter simulate --out human --settings examples/settings/study.toml
+      rigidimeter simulate --out dbs --task prbs --condition DBS --epochs 12
     """
     from rigidimeter.core.session import count_epochs, require_all
     from rigidimeter.core.settings import changed_settings, load_settings

@@ -48,8 +48,6 @@ def new(
     \b
     For example:
       rigidimeter study new study --title "Elbow, winter"
-      rigidimeter compare study
-      rigidimeter report study --out study/report
     """
     from rigidimeter.core.study_files import write_new_study
 
@@ -77,7 +75,7 @@ def add(
 
     \b
     For example:
-      rigidimeter run protocol.toml --out study/monday
+      rigidimeter simulate --out study/monday
       rigidimeter study add study study/monday --subject S01
       rigidimeter report study --out study/report
     """
@@ -158,8 +156,8 @@ def simulate(
 
     \b
     For example:
-      rigidimeter study simulate --out study
-      rigidimeter compare study
+      rigidimeter study simulate --out virtual
+      rigidimeter compare virtual
       rigidimeter study simulate --out pushing --design pushing --seed 7
     """
     from rigidimeter.virtual import DESIGNS
@@ -193,8 +191,9 @@ def demo(
 
     Each day has PRBS and sinusoidal epochs of 10 s in OFF and DBS on the virtual rig, 80 and 48 in
     all, and ratings. The same as study simulate, compare and report, for a smaller study. What was
-    simulated is shown beside what was found. An earlier demo in the same folder is moved aside, not
-    overwritten.
+    simulated is shown beside what was found. The PRBS epochs of the first session are also in
+    elbow.csv, to read as a recording of another laboratory. An earlier demo in the same folder is
+    moved aside, not overwritten.
 
     \b
     For example:
@@ -212,13 +211,15 @@ def demo(
         f"{2 * days * sinusoid_epochs} sinusoidal epochs of {SHORT_EPOCH_S:g} s"
     )
     _simulated(out, short_design(days, prbs_epochs, sinusoid_epochs), seed)
+    _write_plain_table(out / "sessions" / "day-1-OFF", out / "elbow.csv")
     found = analyse_study_folder(out, plain_recordings(out))
     try:
         page = write_page(found.result, out / "report", [out])
         show(["", *comparison_blocks(found.result), ""])
         echo(f"Done in {time.monotonic() - start_s:.0f} s. Open {page.resolve()}")
         echo(
-            f"Next: rigidimeter compare {out} --full; rigidimeter estimate {out}/sessions/day-1-OFF"
+            f"Next: rigidimeter compare {out} --full; rigidimeter inspect {out / 'elbow.csv'}; "
+            f"rigidimeter estimate {out / 'sessions' / 'day-1-OFF'}"
         )
     finally:
         status = found.say()
@@ -237,6 +238,30 @@ def _simulated(out: Path, design: StudyDesign, seed: int, processes: int = 2) ->
     for name in lost:
         echo(f"warning: ended before the work did: {name}; others have run its sessions", err=True)
     return plans
+
+
+def _write_plain_table(session: Path, path: Path) -> None:
+    """Write the PRBS epochs of a session as a table that says nothing of where it came from."""
+    import numpy as np
+
+    from rigidimeter.analysis.reading import read
+
+    rows = []
+    for epoch in read(session).epochs:
+        if epoch.task != "prbs":
+            continue
+        command = epoch.channels["perturbation_nm"]
+        time_s = command.time_s[:-1]  # the last of the sensors' samples is before its last
+        torque_nm, angle_rad = (
+            np.interp(time_s, epoch.channels[name].time_s, epoch.channels[name].values)
+            for name in ("torque_nm", "angle_rad")
+        )
+        trial = np.full(time_s.size, float(epoch.label))
+        columns = time_s, torque_nm, np.degrees(angle_rad), command.values[:-1], trial
+        rows.append(np.column_stack(columns))
+    head = "time [s],torque [Nm],angle [deg],PRBS command [Nm],trial"
+    forms = ("%.4f", "%.4f", "%.5f", "%.4g", "%d")
+    np.savetxt(path, np.vstack(rows), forms, ",", header=head, comments="")
 
 
 def _move_aside(out: Path) -> None:

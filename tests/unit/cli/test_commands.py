@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from tests.core_install import DEMO, commands, examples
 from tests.known_joint import angle_rad, torque_nm
 from tests.unit.analysis.report.parsed_page import ParsedPage
 from tests.unit.virtual.tiny import SHORT
@@ -340,6 +341,10 @@ def test_a_demo_moves_an_earlier_one_aside_and_nothing_else(
     assert ran.status == 0, ran.err
     report = (earlier / "report/report.html").resolve()
     assert f"Open {report}" in " ".join(ran.out.split())
+    named = {word for _, one in commands() for words in examples(one) for word in words}
+    paths = [word.removeprefix(DEMO) for word in named if word.startswith(DEMO)]
+    assert len(paths) > 5
+    assert [path for path in paths if not any(earlier.glob(path))] == []
     # What was simulated stands beside what was found, and a joint that is not the same in every
     # epoch is no warning.
     assert "warning" not in ran.err

@@ -3,8 +3,10 @@
 import re
 import subprocess
 import sys
+from itertools import pairwise
 
 import pytest
+from tests.core_install import DEMO, ROOT, examples
 from typer.main import get_command
 from typer.testing import CliRunner
 
@@ -39,6 +41,22 @@ def test_a_help_page_is_one_screen(path):
         most = 40
     assert len(lines) <= most
     assert max(map(len, lines)) <= 80
+
+
+def test_examples_can_be_run_after_make_demo():
+    """`python -m tests.core_install` runs them, and the test of the demo has its files."""
+    lines = [words for command in COMMANDS.values() for words in examples(command)]
+    assert len(lines) > 40
+    options = "--out", "--rig-out", "--json", "--write-mapping"
+    written = {path for words in lines for name, path in pairwise(words) if name in options}
+    others = written | {"drive.eds", "tcp://host:8786", "study"}  # of the drive; the study made
+    for words in lines:
+        size = 2 if words[0] == "study" else 1
+        command = COMMANDS[tuple(words[:size])]
+        command.make_context(words[0], words[size:])  # of options and values that there are
+        for word in words:
+            file = re.search(r"\.[a-z]+$|/", word) and not word.startswith(DEMO)
+            assert not file or word in others or (ROOT / word).exists(), " ".join(words)
 
 
 @pytest.mark.parametrize("path", COMMANDS, ids=" ".join)

@@ -1,0 +1,142 @@
+"""Every command of a wheel that is installed with the core's packages alone.
+
+`python -m tests.core_install` builds the wheel, installs it into an empty environment, makes the
+demo there and runs the help of each command and the examples in it. The table has what was run, its
+exit status and the first line that it printed. The status is 1 if one ended in a traceback, or a
+command that needs neither a rig nor an extra did not end with success.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import venv
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from typer.main import get_command
+
+from rigidimeter.cli.main import app
+
+ROOT = Path(__file__).parents[1]
+LIMIT_S = 600.0
+"""What takes longer is interrupted, as by Ctrl-C."""
+
+DEMO = "demo-study/"
+"""Where `make demo` writes."""
+
+ENVIRONMENT = {name: text for name, text in os.environ.items() if name != "PYTHONPATH"}
+
+MAY_REFUSE = {
+    "run": "a terminal, and a rig",
+    "console": "the extra console",
+    "commission": "a rig",
+    "check": "a rig",
+    "emulate": "the extras of the drives",
+}
+"""Commands whose examples need what is not there; they refuse in a sentence."""
+
+
+@dataclass(frozen=True)
+class Ran:
+    """A command line that was run."""
+
+    words: list[str]
+    status: int
+    printed: str
+
+    @property
+    def first_line(self) -> str:
+        lines = (line.strip() for line in self.printed.splitlines())
+        return next((line for line in lines if line), "")
+
+    @property
+    def failed(self) -> bool:
+        allowed = self.words[0] in MAY_REFUSE or "--scheduler" in self.words
+        return "Traceback (most recent call last)" in self.printed or bool(
+            self.status and not (allowed and self.status == 1)
+        )
+
+
+def commands() -> Iterator[tuple[list[str], Any]]:
+    """Yield the words of every command, with the command."""
+    for name, command in get_command(app).commands.items():  # type: ignore[attr-defined]
+        below = getattr(command, "commands", {})
+        yield from (([name, each], one) for each, one in below.items())
+        if not below:
+            yield [name], command
+
+
+def examples(command: Any) -> list[list[str]]:
+    """Return the words of each example in a command's help, after `rigidimeter`."""
+    lines = (command.help or "").partition("For example:\n")[2].split("\n\n")[0]
+    joined = lines.replace("\\\n", " ")
+    return [shlex.split(line)[1:] for line in joined.splitlines() if line.strip()]
+
+
+def installed(folder: Path) -> Path:
+    """Build the wheel, install it with the core's packages, and return the program."""
+    source = folder / "source"  # a build leaves files beside what it builds
+    leave = shutil.ignore_patterns("__pycache__", "*.egg-info")
+    shutil.copytree(ROOT / "src", source / "src", ignore=leave)
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, source)
+    pip = ["-m", "pip", "--quiet", "--disable-pip-version-check"]
+    build = [*pip, "wheel", "--no-deps", "--wheel-dir", str(folder), str(source)]
+    subprocess.run([sys.executable, *build], check=True, env=ENVIRONMENT)
+    (wheel,) = folder.glob("*.whl")
+    venv.create(folder / "core", with_pip=True)
+    install = [*pip, "install", "--constraint", str(ROOT / "constraints.txt"), str(wheel)]
+    subprocess.run([str(folder / "core/bin/python"), *install], check=True, env=ENVIRONMENT)
+    return folder / "core/bin/rigidimeter"
+
+
+def run(program: Path, words: list[str], folder: Path) -> Ran:
+    """Run a command line; interrupt it where it does not end."""
+    started = subprocess.Popen(
+        [str(program), *words],
+        cwd=folder,
+        env=ENVIRONMENT,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    try:
+        printed, _ = started.communicate(timeout=LIMIT_S)
+    except subprocess.TimeoutExpired:
+        started.send_signal(signal.SIGINT)
+        printed, _ = started.communicate()
+    return Ran(words, started.returncode, printed)
+
+
+def main() -> int:
+    """Print the table; return 1 if a command failed."""
+    failed = []
+    with tempfile.TemporaryDirectory() as place:
+        program = installed(Path(place))
+        tried = Path(place) / "tried"
+        shutil.copytree(ROOT / "examples", tried / "examples")
+        every = [*commands()]
+        lines = [["demo"], ["run", "--console"], *([*words, "--help"] for words, _ in every)]
+        lines += [words for _, command in every for words in examples(command)]
+        print("status  command: first line", flush=True)
+        for words in lines:
+            ran = run(program, words, tried)
+            print(f"{ran.status:6}  {shlex.join(words)}: {ran.first_line}", flush=True)
+            if ran.failed:
+                failed.append(ran)
+    for ran in failed:
+        print(f"\nfailed, with status {ran.status}: {shlex.join(ran.words)}\n{ran.printed}")
+    return int(bool(failed))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
