@@ -19,7 +19,7 @@ $(STAMP): pyproject.toml constraints.txt
 	@$(BIN)/python -m pip uninstall --quiet --yes setuptools
 	@echo "installing: rigidimeter, its extras and what its tests need; each package is named as it is fetched"
 	@$(BIN)/python -m pip install --progress-bar off --constraint constraints.txt --editable '.[all,dev]' | \
-		sed -u -n -e 's/^Collecting \([^ ]*\).*/  \1/p' -e '/^Installing collected/s/:.*/ packages/p'
+		sed -u -n -e 's/^Collecting \([^ ]*\).*/  \1/p' -e '/^Installing collected/s/:.*//p'
 	@touch $(STAMP)
 
 demo: install
