@@ -40,7 +40,7 @@ def simulate(
     \b
     For example:
       rigidimeter simulate --out session
-      rigidimeter simulate --out human --settings examples/settings/study.toml
+      rigidimeter simulate --out other --settings examples/settings/study.toml
       rigidimeter simulate --out dbs --task prbs --condition DBS --epochs 12
     """
     from rigidimeter.core.session import count_epochs, require_all
