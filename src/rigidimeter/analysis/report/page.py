@@ -29,6 +29,9 @@ from rigidimeter.core.words import Column, Table, epoch_name, short_names, shown
 MOST_PRINTED = 30
 """A longer table that is folded on the page is not printed unless everything is."""
 
+MOST_OPEN = 5
+"""A table that could be folded is open where it is as short as this."""
+
 Contents = Sequence[tuple[Section, Sequence[Block]]]
 """The sections of a result, each with its text, tables and figures."""
 
@@ -176,6 +179,7 @@ def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> 
         css=Markup("\n".join([_text("page.css"), *([_plot(".min.css")] if traces else [])])),
         parts=shown,
         most_printed=MOST_PRINTED,
+        most_open=MOST_OPEN,
         not_printed=[
             section.title for part in shown for section, _ in part.sections if not section.printed
         ],

@@ -197,7 +197,7 @@ def draw_days(panels: Sequence[Axes], c: Comparison, order: Sequence[str]) -> No
                 write_at(axes, place - 0.45, 1.0, subject[:24], share="y", **look)
             _day(axes, place, c, (subject, day), factor, colours, markers)
             places.append(place)
-        axes.set_xlim(-0.6, max(places[-1] + 0.6, 4.0))
+        axes.set_xlim(-0.6, max(places[-1] + 0.6, 1.6))
         axes.set_xticks(places, [wrapped(day, 12, 1) for _, day in row])
         axes.tick_params(axis="x", length=0, rotation=45 * (longest_day(c) > 3))
         axes.grid(visible=False, axis="x")

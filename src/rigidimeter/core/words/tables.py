@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from rigidimeter.core.words.numbers import interval, number, p_value, with_error
+from rigidimeter.core.words.numbers import interval, number, p_value, times_ten, with_error
 
 Kind = Literal[
     "text",
@@ -32,6 +32,9 @@ WORDS = ("text", "label", "check", "reason", "source", "condition", "outcome")
 
 TURNED = -1.0
 """`Column.page_factor` of what is stored as reference − other: people see other − reference."""
+
+SMALL = 0.01
+"""A value and its interval below this are written with a power of ten, as J is in text."""
 
 INTERVAL = "[95\N{NO-BREAK SPACE}%\N{NO-BREAK SPACE}interval]"
 """What the heading of a column with `ends` says after the quantity."""
@@ -130,7 +133,20 @@ def shown_value(row: Mapping[str, Any], column: Column, names: Mapping[str, str]
     if column.error and isinstance(value, float):
         error = row.get(column.error, math.nan)
         return with_error(value * column.page_factor, error * column.page_factor)
+    if column.kind == "number" and isinstance(value, float) and (power := _power(row, column)):
+        text = number(value * column.page_factor / 10.0**power, column.digits)
+        return text + times_ten(power) * math.isfinite(value)
     return _shown(value, column, names)
+
+
+def _power(row: Mapping[str, Any], column: Column) -> int:
+    """Return the power of ten that a small value and its interval share, 0 of others."""
+    if column.ends is None:
+        return 0
+    shown = [row.get(name) for name in (column.name, *column.ends)]
+    largest = max((abs(x) for x in shown if isinstance(x, float) and math.isfinite(x)), default=0.0)
+    largest *= abs(column.page_factor)
+    return 3 * math.floor(math.log10(largest) / 3) if 0 < largest < SMALL else 0
 
 
 def _shown(value: Any, column: Column, names: Mapping[str, str]) -> str:
@@ -164,5 +180,6 @@ def shown_below(row: Mapping[str, Any], column: Column, names: Mapping[str, str]
     low, high = (row.get(name) for name in column.ends)
     if not isinstance(low, float) or not isinstance(high, float) or not low < high:
         return ""
-    low, high = sorted((low * column.page_factor, high * column.page_factor))
-    return interval(low, high, column.digits)
+    power = _power(row, column)
+    low, high = sorted(end * column.page_factor / 10.0**power for end in (low, high))
+    return interval(low, high, column.digits) + times_ten(power)

@@ -36,6 +36,7 @@ from rigidimeter.cli.terminal_tables import Block, Heading, Table
 from rigidimeter.core.files import read_json, write_json
 
 NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:·10[⁻⁰-⁹¹²³]+)?")
+SHARED = re.compile(r"\[([^]]*)\](·10[⁻⁰-⁹¹²³]+)")
 LOWERED = str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789")
 PARAMETERS = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
 DRAWN = ("distributions", "days", "perturbation", "torque", "voluntary", "loops", "impedance")
@@ -44,6 +45,7 @@ Row = dict[str, str]
 
 
 def numbers(text: str) -> list[float]:
+    text = SHARED.sub(lambda all_: NUMBER.sub(rf"\g<0>{all_[2]}", all_[1]), text)
     return [float(found.replace("·10", "e").translate(LOWERED)) for found in NUMBER.findall(text)]
 
 

@@ -136,8 +136,8 @@ def test_the_print_has_rig_settings_and_provenance_and_names_what_is_not_in_it(
     for shown in ("#design table:has-text('Estimation')", "#provenance table"):
         assert page.locator(shown).is_visible(), shown
     # What is folded on a screen cannot be unfolded on paper.
-    excluded = page.locator("#exclusions details", has_text="by whom and why")
-    assert excluded.locator("td").first.is_visible()
+    assert page.locator("#exclusions td", has_text="the animal moved").is_visible()
+    assert page.locator("#design details td").first.is_visible()
     left_out = page.locator("footer .left-out").inner_text()
     hidden = page.locator("section.on-screen").all()
     assert len(hidden) >= 3

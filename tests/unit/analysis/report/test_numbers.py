@@ -2,7 +2,15 @@ import math
 
 import pytest
 
-from rigidimeter.core.words import number, p_and_r, p_value, short_names
+from rigidimeter.core.words import (
+    Column,
+    number,
+    p_and_r,
+    p_value,
+    short_names,
+    shown_below,
+    shown_value,
+)
 
 
 @pytest.mark.parametrize(
@@ -45,6 +53,17 @@ def test_p_is_never_printed_as_zero(p: float, text: str) -> None:
 
 def test_p_and_r_do_not_break_over_lines() -> None:
     assert p_and_r(0.0, -0.5) == "p < 10⁻³⁰⁰, r\xa0=\xa0−0.50"
+
+
+def test_a_small_value_and_its_interval_share_a_power_of_ten() -> None:
+    column = Column("x", "X", ends=("low", "high"), digits=3)
+    row = {"x": -5.9e-6, "low": -1.35e-4, "high": 1.23e-4}
+    assert shown_value(row, column, {}) == "−5.90·10⁻⁶"
+    assert shown_below(row, column, {}) == "[−135 to 123]·10⁻⁶"
+    row = {"x": 0.00452, "low": 0.0044, "high": 0.0046}
+    assert shown_value(row, column, {}) == "4.52·10⁻³"
+    assert shown_below(row, column, {}) == "[4.40 to 4.60]·10⁻³"
+    assert shown_below({"x": 1.0, "low": 0.001, "high": 2.0}, column, {}) == "[0.00100 to 2.00]"
 
 
 def test_short_names_tell_sources_apart() -> None:
