@@ -50,17 +50,19 @@ class Ran:
 
     words: list[str]
     status: int
-    printed: str
+    out: str
+    err: str
 
     @property
     def first_line(self) -> str:
-        lines = (line.strip() for line in self.printed.splitlines())
-        return next((line for line in lines if line), "")
+        """Of the answer, or of what stands in its place; not of the progress, which is in `err`."""
+        lines = (self.out if self.out.strip() else self.err).splitlines()
+        return next((line.strip() for line in lines if line.strip()), "")
 
     @property
     def failed(self) -> bool:
         allowed = self.words[0] in MAY_REFUSE or "--scheduler" in self.words
-        return "Traceback (most recent call last)" in self.printed or bool(
+        return "Traceback (most recent call last)" in self.out + self.err or bool(
             self.status and not (allowed and self.status == 1)
         )
 
@@ -106,15 +108,15 @@ def run(program: Path, words: list[str], folder: Path) -> Ran:
         env=ENVIRONMENT,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
+        stderr=subprocess.PIPE,
         text=True,
     )
     try:
-        printed, _ = started.communicate(timeout=LIMIT_S)
+        out, err = started.communicate(timeout=LIMIT_S)
     except subprocess.TimeoutExpired:
         started.send_signal(signal.SIGINT)
-        printed, _ = started.communicate()
-    return Ran(words, started.returncode, printed)
+        out, err = started.communicate()
+    return Ran(words, started.returncode, out, err)
 
 
 def main() -> int:
@@ -125,7 +127,11 @@ def main() -> int:
         tried = Path(place) / "tried"
         shutil.copytree(ROOT / "examples", tried / "examples")
         every = [*commands()]
-        lines = [["demo"], ["run", "--console"], *([*words, "--help"] for words, _ in every)]
+        lines = [
+            ["demo"],
+            ["run", "--console", "--out", "led"],
+            *([*words, "--help"] for words, _ in every),
+        ]
         lines += [words for _, command in every for words in examples(command)]
         print("status  command: first line", flush=True)
         for words in lines:
@@ -134,7 +140,7 @@ def main() -> int:
             if ran.failed:
                 failed.append(ran)
     for ran in failed:
-        print(f"\nfailed, with status {ran.status}: {shlex.join(ran.words)}\n{ran.printed}")
+        print(f"\nfailed, with status {ran.status}: {shlex.join(ran.words)}\n{ran.out}{ran.err}")
     return int(bool(failed))
 
 

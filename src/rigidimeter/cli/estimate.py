@@ -36,7 +36,7 @@ def estimate(
     For example:
       rigidimeter estimate demo-study/sessions/day-1-OFF
       rigidimeter estimate demo-study/elbow.csv --column epoch=trial
-      rigidimeter estimate demo-study/elbow.csv --epoch-length-s 10 \\
+      rigidimeter estimate demo-study/elbow.csv --column epoch=trial \\
           --column "torque=torque [Nm]" --unit torque=Nm --json estimates.json
     """
     from rigidimeter.analysis.reading import write_estimates_csv, write_estimates_json

@@ -1,7 +1,9 @@
 """The whole server on a real port, with raw requests: who gets in, and that nothing ends it."""
 
+import html
 import http.client
 import json
+import re
 import socket
 from contextlib import suppress
 
@@ -351,3 +353,28 @@ def test_without_a_token_no_network_reaches_the_page(tmp_path):
     for host in ("0.0.0.0", "::", "192.168.0.7"):
         with pytest.raises(UserError, match="--no-token: whoever reaches"):
             PageServer(ServerState(place), Jobs(), host, 0, "")
+
+
+def shown(page):
+    """Return what a person reads of the page: texts and labels, also of what is folded."""
+    (raw,) = re.findall(r"parseElements\(String\.raw`(.*?)`\)", page, re.DOTALL)
+    texts = []
+    for element in json.loads(html.unescape(raw)).values():
+        props = element.get("props", {})
+        texts += [element.get("text"), *(props.get(name) for name in ("label", "aria-label"))]
+        texts += [each["label"] for each in props.get("options", ())]
+        written = props.get("innerHTML") or ""
+        texts += re.findall(r'(?:title|placeholder|aria-label)="([^"]*)"', written)
+        texts += re.sub("<[^>]*>", "\n", written).split("\n")
+    return [text.strip() for text in texts if text and text.strip()]
+
+
+def test_no_label_of_the_page_is_a_name_of_the_program(port):
+    """As a rename over the text once made of `Condition`."""
+    page = ask(port, **cookie(port))[2]
+    texts = shown(page)
+    assert {"Condition, or its code", "Condition", "Start session", "EMERGENCY STOP"} <= {*texts}
+    assert "sinusoid: work, impulse" in texts
+    files = r"\S*/\S*|\S+\.toml"  # of this computer
+    names = r"\b[A-Za-z][a-z]+[A-Z]\w*|\w*[a-z]_\w+|\w+\.\w+\b|\w+\(\)|[{}]"
+    assert [text for text in texts if re.search(names, re.sub(files, "", text))] == []
