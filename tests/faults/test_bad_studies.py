@@ -52,7 +52,7 @@ def test_fewer_than_three_epochs(compared, study) -> None:
     path.write_text("\n".join(lines) + "\n")
     ran, _ = compared()
     assert (ran.status, errors(ran.err)) == (1, [])
-    undecided = "Whether OFF and DBS differ in impulse and work cannot be decided: a test needs 3"
+    undecided = "whether OFF and DBS differ in impulse and work cannot be decided: a test needs 3"
     assert undecided in " ".join(ran.out.split())
     assert "there are 6 in OFF and 2 in DBS" in " ".join(ran.out.split())
 

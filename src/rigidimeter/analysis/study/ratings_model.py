@@ -152,7 +152,7 @@ def ratings_days(found: RatingsFound) -> DayDifference:
         df=df,
         n_days_x=days_x,
         n_days_y=days_y,
-        test="mixed model with an offset for each examiner and each day, after Kenward and Roger",
+        test="mixed model of examiners and days",
         mean_x=found.means_days[0],
         mean_y=found.means_days[1],
     )

@@ -144,12 +144,14 @@ def _beginning(where: str, clause: str) -> str:
 
 
 def _measured(concluded: Conclusions) -> str:
-    """Return ``Between these recordings, DBS − OFF: K −26 % (−26.1 to −25.9), …``."""
+    """Return ``Between these recordings, DBS − OFF: K −26 % (−26.1 to −25.9), …``.
+
+    Measures without an interval of their own stand in the table alone, where others have one.
+    """
     parts: list[str] = []
-    for one in concluded.each:
+    known = [one for one in concluded.each if not math.isnan(one.difference.estimate)]
+    for one in [o for o in known if not math.isnan(o.difference.measured_half)] or known:
         c, d = one.comparison, one.difference
-        if math.isnan(d.estimate):
-            continue
         size = signed(d.measured_percent, d.measured, c.measure.unit, 1.0)
         ends = f" ({size.ends.removesuffix(' %')})" if size.ends else ""
         parts.append(f"{c.measure.short} {size.value}{ends}")
@@ -190,7 +192,7 @@ def _adjusted(concluded: Conclusions, *roles: Role) -> str:
         else:
             parts.append(f"Holm-adjusted over {names}{further}")
     text = ", and apart ".join(parts).replace("apart Holm-adjusted", "apart")
-    return f"; p {text}; each interval is an unadjusted 95 % interval" if parts else ""
+    return f"; p {text}; each 95 % interval is unadjusted" if parts else ""
 
 
 def _concluded(concluded: Conclusions) -> list[str]:
@@ -212,6 +214,11 @@ def _concluded(concluded: Conclusions) -> list[str]:
                 found.append(f"{names(own)} {are} {side} {_than(pair)}")
         return found
 
+    def foremost(members: Sequence[Conclusion]) -> Sequence[Conclusion]:
+        """Leave secondary measures to the table, where there are primary ones."""
+        primary = any(one.role == "primary" for one in concluded.each)
+        return [one for one in members if one.role == "primary" or not primary]
+
     outcomes = [one for one in concluded.each if one.role != "check"] or concluded.each
     found = claims("primary")
     if found and reach:
@@ -225,12 +232,12 @@ def _concluded(concluded: Conclusions) -> list[str]:
         why = f": {reason}" if reason else ""
         found.append(
             f"no difference of {wanted} between {both} is shown in {names(withheld)}{why}"
-            f"{_excluded(withheld)}"
+            f"{_excluded(foremost(withheld))}"
         )
     for reason, withheld in _by_reason(outcomes, "cannot be decided"):
         found.append(
             f"whether {both} differ in {names(withheld)} cannot be decided: {reason}"
-            f"{_excluded(withheld)}{_would_decide(withheld)}"
+            f"{_excluded(foremost(withheld))}{_would_decide(foremost(withheld))}"
         )
     sentences = [_beginning(where if k < of_whom else "", one) for k, one in enumerate(found)]
     in_whom = f"{where}, " if where and found else ""

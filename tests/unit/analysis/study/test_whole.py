@@ -286,7 +286,7 @@ def test_a_third_condition_is_compared_with_the_first_and_p_is_adjusted_for_all(
     ran = rigidimeter("compare", study, "--resamples", "200", "--json", out, "--full")
     assert ran.status == 0, ran.err
     text = " ".join(ran.out.split())
-    assert text.count("p Holm-adjusted over impulse and work (4 tests); each interval") == 2
+    assert text.count("p Holm-adjusted over impulse and work (4 tests); each 95 % interval") == 2
     assert "DBS − OFF 95 % interval p, Holm" in text
     assert "LOW − OFF 95 % interval p, Holm" in text
     assert "LOW − OFF: days counted" in text
