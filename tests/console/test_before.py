@@ -48,7 +48,7 @@ def test_before_a_session(console, chromium, rigidimeter):
         )
     fill(page, "subject", "S01")
     fill(page, "operator", "Op")
-    page.get_by_text("not right yet").wait_for(state="hidden")
+    page.get_by_text("correction").wait_for(state="hidden")
     assert_reached_by_tab(page, "Start session")
     page.get_by_role("button", name="Check the rig").focus()
     page.keyboard.press("Enter")

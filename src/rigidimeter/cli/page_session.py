@@ -154,9 +154,10 @@ def lead_session(
         for line in error.lines:
             echo(line, err=True)
         return None
-    sentences = [f"{good} of {of} epochs ended with success; session in {ended.folder}."]
+    sentences = [f"{good} of {of} epochs completed; session in {ended.folder}."]
     if ended.outcome != "success":
-        sentences.append(f"It ended with {ended.outcome or 'no outcome'}: {ended.reason}.")
+        how = "failed" if ended.outcome == "fail" else f"ended: {ended.outcome or 'no outcome'}"
+        sentences.append(f"The session {how}: {ended.reason}.")
     if planned.settings.sharing.nwb_at_close:
         sentences.append(write_nwb_beside(ended.folder))
     sentences += [*ended.remarks, *extended(state.place)]

@@ -296,7 +296,7 @@ def conclude(ended: Ended, out: Path, rig: Path | None, *, nwb: bool) -> None:
     """Say how the session ended; a session that is not whole ends the program with status 1."""
     folder = ended.folder if ended.folder != out.absolute() else out
     good, of = count_epochs(folder)
-    echo(f"{good} of {of} epochs ended with success; session in {folder}")
+    echo(f"{good} of {of} epochs completed; session in {folder}")
     if nwb:
         echo(write_nwb_beside(folder))
     closed = bool(ended.outcome)

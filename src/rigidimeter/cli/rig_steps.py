@@ -29,7 +29,7 @@ COMMISSIONED, CHECKED, ZEROED = (
     "Check of the day",
     "Zero and noise of the torque sensor",
 )
-BY_ITSELF = "a session begins with it and refuses by itself"
+BY_ITSELF = "every session repeats this check and will not start if it fails"
 
 
 def rig_steps(
@@ -49,10 +49,10 @@ def rig_steps(
     """
     zero = RigStep(ZEROED, "optional", BY_ITSELF, action="zero", required=False)
     if rig is None:
-        nobody = "the virtual rig moves nobody"
+        nobody = "not required on the virtual rig"
         return (
             RigStep(COMMISSIONED, "not needed", nobody),
-            RigStep(CHECKED, "not needed", f"{nobody}; try here how it is done", action="check"),
+            RigStep(CHECKED, "not needed", f"{nobody}; practise it here", action="check"),
             zero,
         )
     return (*_records(rig, settings, source, now_utc), zero)

@@ -75,7 +75,7 @@ def simulate(
     with Meter("simulate", session_length_s(chosen)) as meter:
         result = run_virtual_session(chosen, out, real_time=real_time, progress=meter.reach)
     good, of = count_epochs(out)
-    echo(f"{good} of {of} epochs ended with success; session in {out}")
+    echo(f"{good} of {of} epochs completed; session in {out}")
     if result.outcome != "success":
         raise UserError(f"{out}: the session ended with {result.outcome}: {result.reason}")
     require_all(out, good, of)

@@ -67,7 +67,7 @@ def test_a_session_goes_from_simulation_to_estimate_to_comparison(rigidimeter, t
     session, out, table = tmp_path / "session", tmp_path / "e.json", tmp_path / "e.csv"
     ran = rigidimeter("simulate", "--settings", settings, "--out", session)
     assert ran.status == 0
-    assert "7 of 7 epochs ended with success" in ran.out
+    assert "7 of 7 epochs completed" in ran.out
 
     ran = rigidimeter("estimate", session, "--json", out, "--csv", table)
     assert ran.status == 0, ran.err
@@ -313,7 +313,7 @@ def test_a_session_in_which_an_epoch_failed_is_recorded_and_ends_with_1(rigidime
     )
     ran = rigidimeter("simulate", "--settings", tmp_path / "tight.toml", "--out", tmp_path / "s")
     assert ran.status == 1
-    assert "1 of 2 epochs ended with success" in ran.out
+    assert "1 of 2 epochs completed" in ran.out
     assert "1 of 2 epochs did not end with success; events.jsonl holds the reason" in ran.err
 
 

@@ -246,7 +246,7 @@ def test_a_run_ends_with_1_where_a_planned_epoch_has_no_success(
     monkeypatch.setattr("rigidimeter.cli.planned_session.supervise", lambda *_, **__: result)
     ran = rigidimeter("run", "--out", tmp_path / "new", "--unattended")
     assert ran.status == status
-    assert f"{2 - status} of 2 epochs ended with success" in ran.out
+    assert f"{2 - status} of 2 epochs completed" in ran.out
     assert ("1 of 2 epochs did not end with success" in ran.err) == (status == 1)
 
 

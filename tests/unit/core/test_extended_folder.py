@@ -50,8 +50,8 @@ def test_sessions_become_a_study(tmp_path):
     record(tmp_path / "b", "DBS", note="resumed")
     said = extend_study(tmp_path)
     assert said == [
-        "a: is in sessions.csv, subject S01, day 2026-03-01.",
-        "b: is in sessions.csv, subject S01, day 2026-03-01.",
+        "a: added to sessions.csv, subject S01, day 2026-03-01.",
+        "b: added to sessions.csv, subject S01, day 2026-03-01.",
     ]
     assert cells(tmp_path, "sessions") == [
         ["a", "S01", "2026-03-01", "OFF", "", "", ""],
@@ -85,7 +85,7 @@ def test_what_a_person_wrote_stays(tmp_path):
     record(tmp_path / "b", "DBS", stimulation=STIMULATION)
     record(tmp_path / "c", "DBS")
     said = extend_study(tmp_path)
-    assert said[0] == "b: is in sessions.csv, subject S01, day 2026-03-01."
+    assert said[0] == "b: added to sessions.csv, subject S01, day 2026-03-01."
     assert "frequency_hz = 130.0, amplitude_ma = 2.5; study.toml says otherwise" in said[1]
     assert len(said) == 2
     after = (tmp_path / "sessions.csv").read_bytes().decode()
@@ -204,7 +204,7 @@ def test_the_command_adds_sessions_and_a_table_without_a_column_is_refused(rigid
     record(tmp_path / "sessions/a", "OFF", subject="")
     assert "name it with --subject" in rigidimeter("study", "add", tmp_path).err
     ran = rigidimeter("study", "add", tmp_path, "--subject", "S02")
-    assert "sessions/a: is in sessions.csv, subject S02, day 2026-03-01" in ran.out
+    assert "sessions/a: added to sessions.csv, subject S02, day 2026-03-01" in ran.out
     table = tmp_path / "sessions.csv"
     table.write_text("path,subject,day,condition\nsessions/a,S02,2026-03-01,OFF\n")
     record(tmp_path / "sessions/b", "OFF", subject="S02")

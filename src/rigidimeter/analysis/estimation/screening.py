@@ -48,9 +48,12 @@ def before_fit(epoch: Epoch, settings: EstimationSettings) -> str:
     start = max(float(channel.time_s[0]) for channel in (torque, *motion))
     stop = min(float(channel.time_s[-1]) for channel in (torque, *motion))
     if stop - start < settings.min_epoch_s * (1 - 1e-3):
+        spans_s = [float(channel.time_s[-1] - channel.time_s[0]) for channel in (torque, *motion)]
+        short = min(spans_s) - (stop - start) < 0.1 and max(spans_s) < settings.min_epoch_s
+        length = "this part is {:.3g} s long" if short else "torque and motion overlap for {:.3g} s"
         return (
-            f"torque and motion overlap for {max(stop - start, 0.0):.3g} s; at least "
-            f"{settings.min_epoch_s:g} s are needed (estimation.min_epoch_s)"
+            f"{length.format(max(stop - start, 0.0))}; at least {settings.min_epoch_s:g} s are "
+            "needed (estimation.min_epoch_s)"
         )
     if stop - start < 2 * settings.trim_s + 1:
         return (

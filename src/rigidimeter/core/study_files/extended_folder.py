@@ -199,7 +199,7 @@ def _added(
     add_rows(ratings, "ratings", recorded_rating_rows(session, table_rows(ratings, "ratings")))
     add_rows(table, "sessions", session_rows(session, before))
     # Not in which condition: the operator may be blinded.
-    return [f"{path}: is in {table.name}, subject {session.subject}, day {session.day}.", *said]
+    return [f"{path}: added to {table.name}, subject {session.subject}, day {session.day}.", *said]
 
 
 def _is_virtual(folder: Path) -> bool | None:

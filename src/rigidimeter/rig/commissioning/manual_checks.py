@@ -65,7 +65,7 @@ def mechanical_stops(setup: Setup, *, emulated: bool) -> tuple[RigCheck, dict[st
     ends_deg = _led_to_both_ends(setup, "its way")
     good = ends_deg is not None and setup.operator.ask(
         "Lead it back to where it was. Did mechanical stops end its way on both sides, where a "
-        "person's arm still bears it?"
+        "person's arm still tolerates it?"
     )
     if not good or ends_deg is None:
         return yes(STOPS, False, "no", "yes", _FIT_STOPS), {}
@@ -94,7 +94,7 @@ def lead_range(setup: Setup) -> MotionRange:
         rig.configure()
         setup.operator.say(
             "The range of motion of this person, without power. Lead the arm slowly, by hand, no "
-            "farther than the person bears it without pain or resistance."
+            "farther than the person tolerates without pain or resistance."
         )
         ends_deg = _led_to_both_ends(setup, "the range of this person")
         if ends_deg is None:

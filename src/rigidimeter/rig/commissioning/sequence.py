@@ -336,5 +336,5 @@ def _words(margins: Margins) -> str:
         return "unstable"
     return (
         f"{margins.gain_margin_db:.3g} dB, {margins.phase_margin_deg:.3g} deg, "
-        f"bears {with_unit(float(f'{margins.delay_margin_s:.3g}'), 's')} more delay"
+        f"tolerates {with_unit(float(f'{margins.delay_margin_s:.3g}'), 's')} of extra delay"
     )

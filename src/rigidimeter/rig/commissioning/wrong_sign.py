@@ -140,8 +140,8 @@ def sign_words(settings: Settings, checks: Sequence[RigCheck]) -> str:
     )
     imposed = any(block.task == "sinusoid" for block in blocks)
     return (
-        "If the torque sensor had the wrong sign, the guard would find it in a PRBS epoch up to "
-        f"this much torque of the subject's own (SD): {found}. Above that"
+        "During a PRBS epoch a wrong torque sign is detected only while the subject's own torque "
+        f"stays below (SD): {found}. Above that"
         f"{', and in an imposed sinusoid,' if imposed else ''} the daily check alone protects: "
         f"{daily}"
     )

@@ -100,8 +100,8 @@ def _no_factor(standard: str, column: str, unit: str, scale: str) -> str:
         )
     if unit and not expression(unit):
         return (
-            f"--unit {quantity.name}={unit}: is not a unit that is known; write one as in --unit "
-            f"{quantity.name}={quantity.usual[-1]}"
+            f"--unit {quantity.name}={unit}: unknown unit {unit!r}; known for {quantity.name}: "
+            f"{', '.join(quantity.usual)} and others"
         )
     return (
         f"column {column!r} is in {unit}, and {quantity.name} is needed in {usual}: say {example}"

@@ -1,4 +1,4 @@
-"""Does the model fit: the torque of an epoch, torque over angle, what is left, and loops."""
+"""Model fit: the torque of an epoch, torque over angle, what is left, and loops."""
 
 from __future__ import annotations
 
@@ -212,7 +212,7 @@ def _loops(result: StudyResult) -> Iterator[Block]:
 
 
 SECTIONS = part(
-    "Does the model fit",
+    "Model fit",
     Section("torque", "Measured and modelled torque", _torque),
     Section("impedance", "Torque over angle", _impedance),
     Section("voluntary", "Unexplained torque", _unexplained),

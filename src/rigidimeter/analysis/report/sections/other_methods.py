@@ -1,4 +1,4 @@
-"""Does the method matter: every method, with J fixed and with J free, and other bands."""
+"""Sensitivity: every method, with J fixed and with J free, and other bands."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def _bands(result: StudyResult) -> Iterator[Block]:
         "band_sensitivity",
         f"Change of J, B and K of all epochs together from those of the band of the fit, "
         f"{own.low_hz:.3g} to {own.high_hz:.3g} Hz, if another band or one half of "
-        "each epoch is used. Bars: 95 % interval of the change. Bands of colour: 95 % interval of "
+        "each epoch is used. Bars: 95 % interval of the change. Coloured bands: 95 % interval of "
         "the estimate.",
         f"How J, B and K depend on the band. {words}.",
         partial(drawn, size, draw_bands, found, half, columns=3, sharey=True),
@@ -133,7 +133,7 @@ def _bands(result: StudyResult) -> Iterator[Block]:
 
 
 SECTIONS = part(
-    "Does the method matter",
+    "Sensitivity",
     Section("sensitivity", "Other methods", _methods, from_study_folder),
     Section(
         "band_sensitivity", "Other bands", _bands, lambda result: bool(result.analysis.sensitivity)

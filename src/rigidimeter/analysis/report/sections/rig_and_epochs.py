@@ -1,4 +1,4 @@
-"""Was the rig right, and were the epochs good: messages, delays, exclusions, one epoch."""
+"""Rig checks and epoch quality: messages, delays, exclusions, one epoch."""
 
 from __future__ import annotations
 
@@ -230,13 +230,13 @@ def _provenance(result: StudyResult) -> Iterator[Block]:
 
 
 RIG = part(
-    "Was the rig right",
+    "Rig checks",
     Section("notices", "Notices", _notices),
     Section("estimation", "Estimation", _estimation),
     printed=2,
 )
 EPOCHS = part(
-    "Were the epochs good",
+    "Epoch quality",
     Section("exclusions", "Exclusions", _study_exclusions, from_study_folder),
     Section("exclusions", "Exclusions", _exclusions, lambda result: not from_study_folder(result)),
     Section("recorded", "As recorded", _recorded),

@@ -89,7 +89,8 @@ class BeforeView:
                 self._input(one)
         self._blocks()
         with ui.row().classes("w-full items-start"):
-            self._input(Field("rests", "Rests, drawn from (several by ;)", "s"))
+            rests = "Rest between epochs; several values, separated by ;, are drawn at random"
+            self._input(Field("rests", rests, "s"))
             blinded = ui.checkbox("Blinded: show codes for conditions").mark("blinded")
             blinded.value = self._form[BLINDED] == YES
             blinded.on_value_change(lambda event: self._change(BLINDED, YES if event.value else ""))
@@ -212,8 +213,8 @@ class BeforeView:
         for key, made in self._inputs.items():
             made.error = errors.get(key)
         general = [text for key, text in errors.items() if key not in self._inputs]
-        count = "1 field is" if len(errors) == 1 else f"{len(errors)} fields are"
-        wrong = f"{count} not right yet" if errors else ""
+        count = "1 field needs" if len(errors) == 1 else f"{len(errors)} fields need"
+        wrong = f"{count} correction" if errors else ""
         self._problem.text = " ".join([*general, wrong]) if general or wrong else ""
         self._show_steps()
 

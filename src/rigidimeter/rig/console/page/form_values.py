@@ -75,7 +75,7 @@ def parse_name(text: str, what: str) -> str:
         raise UserError(f"{what}: must be given")
     if _NAME.fullmatch(stripped) is None:
         raise UserError(
-            f"{what}: {stripped[:60]!r} is not possible; use 1 to 40 letters A-Z, digits, - and _, "
+            f"{what}: {stripped[:60]!r} is not allowed; use 1 to 40 letters A-Z, digits, - and _, "
             "the first a letter or digit"
         )
     return stripped

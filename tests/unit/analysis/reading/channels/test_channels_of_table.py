@@ -49,7 +49,7 @@ def test_every_fault_is_said_at_once():
     lines = refusal(data, columns={"torque": "M 3"}, units={"angle": "furlong"})
     text = "\n".join(lines)
     assert "there is no column M 3" in text
-    assert "--unit angle=furlong: is not a unit that is known" in text
+    assert "--unit angle=furlong: unknown unit 'furlong'; known for angle" in text
 
 
 def test_what_is_optional_and_in_doubt_is_not_used_and_said():

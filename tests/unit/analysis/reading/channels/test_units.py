@@ -130,7 +130,7 @@ def test_scale_and_offset(unit, scale, offset, raw, expected):
         ("V", "0 Nm/V", "", "must not be 0"),
         ("V", "fast", "", "does not make Nm"),
         ("V", "2.5 Nm/V", "3 deg", "what column 'T' reads at zero"),
-        ("furlong", "", "", "is not a unit that is known"),
+        ("furlong", "", "", "unknown unit 'furlong'"),
     ],
 )
 def test_what_does_not_make_a_torque_is_refused(unit, scale, offset, told):

@@ -82,7 +82,7 @@ def test_what_is_estimated_from_the_page_is_without_the_epochs_left_out(root, ri
 @pytest.mark.parametrize(
     ("session", "epoch", "reason", "by", "said"),
     [
-        ("../x", "1", "r", "b", "session: '../x' is not possible"),
+        ("../x", "1", "r", "b", "session: '../x' is not allowed"),
         ("S01-1", "9", "r", "b", "has no epoch 9"),
         ("S01-1", "1", " ", "b", "give a reason"),
         ("S01-1", "1", "r", "", "give a reason"),
