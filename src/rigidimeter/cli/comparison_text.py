@@ -16,7 +16,7 @@ from rigidimeter.analysis.study import (
     statements,
 )
 from rigidimeter.cli.terminal_tables import Block, Heading, Table, paragraph, shown_table
-from rigidimeter.core.records import Analysis
+from rigidimeter.core.records import Analysis, notes_text
 from rigidimeter.core.words import condition_name, plural
 
 MOST_FINDINGS = 3
@@ -118,7 +118,8 @@ def finding_notes(analysis: Analysis, full: bool) -> Iterator[tuple[str, str]]:
     """Yield each kind of finding once, the most serious first.
 
     Without `full` the first few that are more than a note, in two lines each: where the epochs'
-    names are too long for that, their number; and the names of the others.
+    names are too long for that, their number; the names of the others; and how many notes change
+    nothing.
     """
     groups = analysis.findings
     serious = [group for group in groups if group.finding.level != "note"]
@@ -132,11 +133,14 @@ def finding_notes(analysis: Analysis, full: bool) -> Iterator[tuple[str, str]]:
         words = [f"{text}; {where}" for where in wheres]
         yield group.finding.level, words[0] if full else two_lines(*words, text)
     seen = {group.finding.name for group in shown}
-    rest = dict.fromkeys(one.finding.name for one in groups[len(shown) :])
-    if names := [name for name in rest if name not in seen]:
-        label = "" if shown else "note"
-        listed = f"{'and ' * bool(shown)}{', '.join(names)} (--full)"
-        yield label, two_lines(listed, f"{len(names)} more (--full)")
+    rest = groups[len(shown) :]
+    quiet = {one.finding.name for one in rest if one.finding.harmless}
+    names = dict.fromkeys(one.finding.name for one in rest if not one.finding.harmless)
+    if listed := [name for name in names if name not in seen]:
+        text = f"{'and ' * bool(shown)}{', '.join(listed)} (--full)"
+        yield "" if shown else "note", two_lines(text, f"{len(listed)} more (--full)")
+    if quiet := quiet - seen - names.keys():
+        yield "" if listed and not shown else "note", f"{notes_text(quiet)} (--full)"
 
 
 def two_lines(*texts: str) -> str:

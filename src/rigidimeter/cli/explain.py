@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from rigidimeter.core.findings import Kind
 
 
+NOTHING_TO_DO = "Nothing has to be done."
+
 LINK = r" \(\[\w+\]\([^)]*\)\)"
 """To a page of the documentation."""
 
@@ -51,18 +53,19 @@ def _blocks(kind: Kind) -> list[Block]:
     if kind.setting:
         default = DiagnosticsSettings.model_fields[kind.setting].default
         settings.append(f"diagnostics.{kind.setting} = {default:g}")
-    (_, usual), *others = explained(kind)
+    (begins, usual), *others = explained(kind)
     blocks: list[Block] = [
         Heading(f"{kind.name}: {kind.level}"),
         f"Looked at: {re.sub(LINK, '', kind.checks)}.",
         *([f"Settings, with their defaults: {', '.join(settings)}."] if settings else []),
         "",
-        "For example:",
+        f"{begins}:",
         f"  {usual.headline}.",
         f"  {usual.details}",
-        f"  {usual.remedy}",
+        f"  {usual.remedy or NOTHING_TO_DO}",
     ]
-    for variant, words in others:
+    for when, words in others:
         differs = [new for new, old in zip(words, usual, strict=True) if new and new != old]
-        blocks += ["", f"Or ({variant.replace('_', ' ')}):", *(f"  {text}" for text in differs)]
+        differs += [NOTHING_TO_DO] * (usual.remedy != words.remedy == "")
+        blocks += ["", f"{when}:", *(f"  {text}" for text in differs)]
     return blocks

@@ -10,6 +10,7 @@ from rigidimeter.analysis.estimation.terms import Comparison, ModelRow
 from rigidimeter.analysis.study.torque_models import ModelledEpoch
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
 from rigidimeter.core.findings import SERIOUS_FIRST
+from rigidimeter.core.records import notes_text
 from rigidimeter.core.words import plural, with_error
 
 _COMPARED = ("parameters", "VAF %", "held out, 95 %", "AIC", "BIC", "white p", "input p")
@@ -108,11 +109,13 @@ def _models(fitted: Sequence[ModelledEpoch]) -> Iterator[Block]:
 def _findings(fitted: Sequence[ModelledEpoch]) -> Iterator[tuple[str, str]]:
     """Yield each kind of finding once, with the number of epochs that have it."""
     found = [one for each in fitted if each.models for one in each.models.findings]
-    counts = Counter((one.level, one.name) for one in found)
+    counts = Counter((one.level, one.name) for one in found if not one.harmless)
     ordered = sorted(counts.items(), key=lambda each: (SERIOUS_FIRST.index(each[0][0]), -each[1]))
     for (level, name), count in ordered[:MOST_FINDINGS]:
         first = next(one for one in found if (one.level, one.name) == (level, name))
         yield level, f"{name}  {first.headline}; {count} of {plural(len(fitted), 'epoch')}"
+    if quiet := [one.name for one in found if one.harmless]:
+        yield "note", f"{notes_text(quiet)} (--full)"
 
 
 def _epoch_blocks(found: ModelledEpoch) -> Iterator[Block]:

@@ -42,7 +42,7 @@ def test_words_are_few_and_complete(words):
     assert words.headline[-1] not in ".,;:"
     assert 5 <= len(words.details.split()) <= 60
     assert words.details.endswith(".")
-    assert words.remedy.endswith(".")
+    assert words.remedy.endswith(".") or not words.remedy
     assert not re.search(r"[.!?] [A-Z]", words.remedy)  # one sentence
     for text in words:
         assert not re.search(r"[{}]|\bnan\b|\binf\b|  ", text), text
@@ -80,7 +80,36 @@ def test_the_last_variant_that_has_a_part_gives_it():
     kind = KINDS["missing_term"]
     assert kind.template("headline", "coupling within") == kind.variants["coupling"]["headline"]
     assert kind.template("meaning", "coupling within") == kind.variants["within"]["meaning"]
-    assert kind.template("remedy", "within") == kind.remedy
+    assert kind.template("remedy", "several") == kind.variants["several"]["remedy"]
+    assert kind.template("remedy", "negligible") == ""
+
+
+def test_each_variant_says_when_it_is_used():
+    used = [when for kind in KINDS.values() for when, _ in explained(kind)]
+    assert not [when for when in used if "When it is" in when]
+
+
+def test_nothing_is_to_be_done_about_what_changes_nothing():
+    """Nor is a method that used the recorded perturbation asked to record it."""
+    for kind in KINDS.values():
+        for when, words in explained(kind):
+            if "intervals include it" in words.details or when.endswith("as the instrument"):
+                assert "record the perturbation" not in words.remedy.lower(), kind.name
+    voluntary = Finding(
+        "voluntary_torque",
+        "note",
+        77.0,
+        15.0,
+        facts={
+            "sd_nm": 0.2,
+            "low_hz": 0.3,
+            "high_hz": 4.0,
+            "method": "iv",
+            "variant": "instrument",
+        },
+    )
+    assert voluntary.remedy == ""
+    assert voluntary.harmless
 
 
 def test_a_kind_that_is_not_known_is_told_by_its_numbers(monkeypatch):

@@ -62,8 +62,6 @@ def found(
         if not harmless and effect.negligible:
             harmless = "negligible"
         level = "exclude" if excludes else "note" if harmless else level
-    else:
-        harmless = ""
     named = " ".join(filter(None, (variant, harmless)))
     shown = {**(facts or {}), **({"variant": named} if named else {})}
     unit = KINDS[name].unit if name in KINDS else ""

@@ -91,7 +91,7 @@ def choose_method(epochs: Sequence[PreparedEpoch]) -> tuple[str, str]:
     return (
         "iv",
         f"the perturbation was recorded{where}, so the motion that it causes is the instrument: "
-        "torque that something but the robot adds does not bias the estimate",
+        "torque not from the robot does not bias the estimate",
     )
 
 

@@ -128,8 +128,13 @@ class Finding:
 
     @property
     def remedy(self) -> str:
-        """What to do about it: one sentence."""
+        """What to do about it: one sentence, empty where nothing is to be done."""
         return self.words.remedy
+
+    @property
+    def harmless(self) -> bool:
+        """Whether it changes nothing: a note after which nothing is to be done."""
+        return self.level == "note" and self.name in KINDS and not self.remedy
 
     @property
     def _shown(self) -> dict[str, Any]:

@@ -56,7 +56,7 @@ class Kind:
     measured, meaning : str
         What was measured, and what that means for J, B and K; at most 60 words together.
     remedy : str
-        One sentence.
+        One sentence; empty where nothing is to be done.
     unit : str
         Of value and limit.
     level : {"note", "caution", "exclude"}
@@ -67,6 +67,8 @@ class Kind:
         From the name of a variant to the templates that differ.
     example : mapping
         `value`, `limit` and whatever else the templates show that is not as in `EXAMPLE`.
+    examples : mapping
+        From the name of a variant to what its example has otherwise.
     """
 
     name: str
@@ -80,9 +82,12 @@ class Kind:
     setting: str = ""
     variants: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     example: Mapping[str, object] = field(default_factory=dict)
+    examples: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
 
     def template(self, part: str, variant: str = "") -> str:
         """Return one of `PARTS`, as the variants have it."""
+        if part == "remedy" and "negligible" in variant.split():
+            return ""
         for name in reversed(variant.split()):
             if part in self.variants.get(name, {}):
                 return self.variants[name][part]

@@ -7,19 +7,25 @@ from rigidimeter.core.findings.kind import Kind
 OF_SUBJECT = {
     "instrument": {
         "meaning": "{method} uses only the motion that the perturbation causes: J, B and K are not "
-        "biased, and their intervals include it."
+        "biased, and their intervals account for it.",
+        "remedy": "",
     },
     "small_bias": {
         "meaning": "In this loop it biases J, B and K by {share:.2g} % of half their intervals at "
-        "most."
+        "most.",
+        "remedy": "",
     },
     "in_interval": {
-        "meaning": "Each frequency counts by its noise: it biases {changes}, which the intervals "
-        "include."
+        "meaning": "Each frequency is weighted by its noise: it biases {changes}, which the "
+        "intervals include.",
+        "remedy": "",
     },
-    "negligible": {"meaning": "It biases {changes}: below 1 % of each and half their intervals."},
+    "negligible": {
+        "meaning": "It biases {changes}: below 1 % of each and half their intervals.",
+        "remedy": "",
+    },
 }
-"""Why torque that something but the robot adds does not matter to an estimate."""
+"""Why torque that is not from the robot does not matter to an estimate: nothing is to be done."""
 
 FIT_KINDS = (
     Kind(
@@ -90,11 +96,10 @@ FIT_KINDS = (
         "Unrelated signals show about 0.2",
         headline="Only {percent:.0f} % of the {signal}'s power follows the perturbation",
         measured="The coherence of perturbation and {signal} has a median of {value:.2f} in the "
-        "band (at least {limit:g}); the rest is torque that something but the robot adds, noise, "
-        "or a joint that is not linear.",
+        "band (at least {limit:g}); the rest is torque not from the robot (voluntary, "
+        "friction), noise, or a joint that is not linear.",
         meaning="That may bias J, B and K.",
-        remedy="Perturb more strongly, pool epochs, or repeat while the robot alone moves the "
-        "joint.",
+        remedy="Perturb more strongly, pool epochs, or repeat with the subject relaxed.",
         unit="1",
         setting="min_coherence",
         variants=OF_SUBJECT,
@@ -103,11 +108,11 @@ FIT_KINDS = (
     Kind(
         "residual_whiteness",
         "spectral flatness of the residual in the band, 1 for white",
-        headline="What J, B and K leave is not white: flatness {value:.2f}",
+        headline="The residual is coloured (spectral flatness {value:.2f}; white = 1)",
         measured="The residual's spectral flatness in the band is {value:.2f} (at least {limit:g}; "
-        "1 is white): something but the robot adds torque, or the model lacks something.",
-        meaning="Standard errors for white noise would be too small.",
-        remedy="Use the intervals, which allow for a residual of any colour.",
+        "white = 1): there is torque not from the robot, or the model lacks a term.",
+        meaning="The intervals account for a residual of any colour.",
+        remedy="",
         level="note",
         unit="1",
         setting="min_residual_flatness",
@@ -119,18 +124,18 @@ FIT_KINDS = (
         "largest correlation of residual and perturbation up to 1 s either way, times the "
         "residual's SD, in % of the torque's SD",
         headline="{value:.2g} % of the torque follows the perturbation and is not explained",
-        measured="What J, B and K leave follows the perturbation by {value:.2g} % of the torque's "
+        measured="The residual follows the perturbation by {value:.2g} % of the torque's "
         "SD (at most {limit:g} %), with a correlation of {correlation:.2f} at a lag of {lag_s:.2g} "
         "s (by chance up to {chance:.2f}).",
-        meaning="The model lacks something that the perturbation causes; J, B and K may take it "
-        "for their own.",
-        remedy="Look for a delay, a reflex or stiffness that changes with the angle; torque from "
-        "elsewhere does this to least squares too.",
+        meaning="The model lacks something that the perturbation causes; J, B and K may absorb it.",
+        remedy="Look for a delay, a reflex or stiffness that changes with the angle; voluntary "
+        "torque does this to least squares too.",
         setting="max_residual_perturbation_percent",
         variants={
             "chance": {
                 "meaning": "The model lacks something, unless this is the one epoch in 20 that "
-                "shows as much by chance; lack_of_fit tests all epochs together."
+                "shows as much by chance; lack_of_fit tests all epochs together.",
+                "remedy": "",
             }
         },
         example={"value": 14.0, "limit": 10.0},
@@ -143,7 +148,7 @@ FIT_KINDS = (
         "torque (at least {limit:g} %).",
         meaning="The fit does not predict torque that it has not seen, so its "
         "numbers mean nothing.",
-        remedy="Look for torque from elsewhere than the robot, and for a change during the epoch.",
+        remedy="Look for voluntary torque, and for a change during the epoch.",
         level="exclude",
         setting="min_held_out_vaf_percent",
         variants=OF_SUBJECT,
@@ -154,10 +159,9 @@ FIT_KINDS = (
         "R² of the fit",
         headline="J, B and K explain little of the torque: R² {value:.2g}",
         measured="R² is {value:.2g} (at least {limit:g}).",
-        meaning="Most of the torque is not J, B and K, and least squares puts a part of it into "
-        "them.",
-        remedy="Look for torque from elsewhere than the robot, or record the perturbation and use "
-        "iv.",
+        meaning="Most of the torque is not explained by J, B and K, and least squares attributes "
+        "part of it to them.",
+        remedy="Look for voluntary torque, or use --method iv with the recorded perturbation.",
         unit="1",
         setting="min_r_squared",
         variants=OF_SUBJECT,
@@ -172,7 +176,7 @@ FIT_KINDS = (
         measured="K of {stiffness:.4g} N·m/rad includes {slope:.4g} of the limb's weight (m g l "
         "cos θ).",
         meaning="Without it K is {value:.4g} N·m/rad.",
-        remedy="State which of the two is given.",
+        remedy="Report which of the two is given.",
         level="note",
         unit="N·m/rad",
         setting="gravity_nm",
@@ -183,9 +187,9 @@ FIT_KINDS = (
         "number of J, B and K that are not positive",
         headline="{names}: not above zero",
         measured="{names}: not above zero.",
-        meaning="No joint is like that: something but the robot may have pushed, or the channels "
-        "are delayed relative to each other.",
-        remedy="Check the time stamps of torque and motion, and see the torque beyond J, B and K.",
+        meaning="No joint is like that: there may be voluntary torque, or the channels are delayed "
+        "relative to each other.",
+        remedy="Check the time stamps of torque and motion, and look for voluntary torque.",
         unit="1",
         variants={
             "noise": {
@@ -196,7 +200,7 @@ FIT_KINDS = (
             "reaction": {
                 "headline": "J, B and K are below zero: the torque's sign is wrong",
                 "meaning": "The torque has the sign of the joint's reaction.",
-                "remedy": "Say --reaction.",
+                "remedy": "Add --reaction.",
             },
         },
         example={"value": 1.0, "limit": 0.0},

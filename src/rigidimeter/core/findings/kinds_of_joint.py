@@ -6,12 +6,12 @@ from rigidimeter.core.findings.kind import Kind
 from rigidimeter.core.findings.kinds_of_fit import OF_SUBJECT
 
 _GOES = (
-    "{symbol} goes from {low:.3g} ± {low_half:.2g} {size_unit} at {low_at} to {high:.3g} ± "
+    "{symbol} changes from {low:.3g} ± {low_half:.2g} {size_unit} at {low_at} to {high:.3g} ± "
     "{high_half:.2g} {size_unit} at {high_at}, {value:.0f} % of its mean (at most {limit:g} %; {p})"
     "{others}."
 )
-_HEADLINE = "{symbol} goes from {low:.3g} to {high:.3g} {size_unit} "
-_MEAN = "The estimate is a mean over a joint that changed, and its interval "
+_HEADLINE = "{symbol} changes from {low:.3g} to {high:.3g} {size_unit} "
+_MEAN = "The estimate is an average over a joint that changed, and its interval "
 _ABOUT = "use a smaller perturbation about each angle of interest, and state the angle."
 
 JOINT_KINDS = (
@@ -20,36 +20,37 @@ JOINT_KINDS = (
         "bias of least squares from torque of the subject that comes back as motion by the loop, "
         "computed from the recording; the largest of J, B and K, in % of half the interval. Above "
         "56 % an interval for 95 % holds the truth in less than 80 %",
-        headline="Torque from elsewhere biases {changes}",
-        measured="Torque beyond J, B and K, which the loop turns into motion, moves {changes}, "
-        "{value:.2g} % of half their intervals at most (at most {limit:g} %).",
-        meaning="Least squares takes it for the joint, and the intervals do not include that.",
-        remedy="Record the perturbation and use iv, or repeat while the robot alone moves the "
-        "joint.",
+        headline="Torque not from the robot biases {changes}",
+        measured="Torque not explained by J, B and K, which the loop turns into motion, moves "
+        "{changes}, {value:.2g} % of half their intervals at most (at most {limit:g} %).",
+        meaning="Least squares attributes it to the joint, and the intervals do not include that.",
+        remedy="Use --method iv with the recorded perturbation, or repeat with the subject "
+        "relaxed.",
         setting="max_loop_bias_percent",
         variants={
             "unknown": {
-                "headline": "Torque from elsewhere biases J, B and K too far to compute",
-                "measured": "No J, B and K go with this torque in this loop.",
-                "meaning": "Least squares takes torque beyond J, B and K for the joint, and how "
-                "much cannot be computed.",
+                "headline": "Torque not from the robot biases J, B and K too far to compute",
+                "measured": "No J, B and K agree with this torque in this loop.",
+                "meaning": "Least squares attributes torque that is not from the robot to the "
+                "joint, and how much cannot be computed.",
             },
             "first_order": {
-                "meaning": "Least squares takes it for the joint. The intervals include it to the "
-                "first order, which so large a bias exceeds."
+                "meaning": "Least squares attributes it to the joint. The intervals include it to "
+                "the first order, which so large a bias exceeds."
             },
             "negligible": OF_SUBJECT["negligible"],
             "not_known": {
                 "headline": "Loop not known: a bias by it is not in the intervals",
                 "measured": "Neither settings nor a recorded perturbation or command say whether "
                 "the robot gives way to torque.",
-                "meaning": "If it does, torque from elsewhere biases least squares, and the "
+                "meaning": "If it does, torque not from the robot biases least squares, and the "
                 "intervals do not include that. If it does not, nothing is missing.",
-                "remedy": "Where the robot gives way, say --controller, or record the perturbation "
-                "and use iv.",
+                "remedy": "Where the robot gives way, add --controller J_C B_C, or use --method iv "
+                "with the recorded perturbation.",
             },
         },
         example={"value": 180.0, "limit": 50.0, "percent_of": (-17.0, -16.0, -7.2)},
+        examples={"negligible": {"value": 74.0, "percent_of": (-0.4, 0.31, 0.0)}},
     ),
     Kind(
         "unweighted_fit",
@@ -62,8 +63,8 @@ JOINT_KINDS = (
         "taken off.",
         meaning="Noise does not do that: the torque holds more than J, B and K, and the answer "
         "depends on the frequencies that count.",
-        remedy="Look for what is missing with rigidimeter model --compare, or record the "
-        "perturbation and use iv.",
+        remedy="Look for what is missing with rigidimeter model --compare, or use --method iv with "
+        "the recorded perturbation.",
         setting="max_unweighted_percent",
         example={"value": 24.0, "limit": 10.0, "way": "lower"},
     ),
@@ -83,12 +84,14 @@ JOINT_KINDS = (
         "voluntary_torque",
         "power of M_sub = J θ″ + B θ′ + K θ − M between `voluntary_low_hz` and "
         "`voluntary_high_hz`, in % of the torque's variance",
-        headline="Torque beyond J, B, K is {value:.2g} % of the torque's variance",
-        measured="The torque beyond J, B and K has an SD of {sd_nm:.3g} N·m; from {low_hz:g} to "
-        "{high_hz:g} Hz it is {value:.2g} % of the torque's variance (at most {limit:g} %).",
-        meaning="Least squares takes part of it for the joint: in a closed loop J and B come out "
-        "low.",
-        remedy="Record the perturbation, use iv and pool epochs, or leave the epoch out.",
+        headline="{value:.2g} % of the torque variance is not explained by J, B and K",
+        measured="The torque that J, B and K do not explain has an SD of {sd_nm:.3g} N·m; from "
+        "{low_hz:g} to {high_hz:g} Hz it is {value:.2g} % of the torque variance (at most "
+        "{limit:g} %).",
+        meaning="Least squares attributes part of it to the joint: in a closed loop J and B come "
+        "out low.",
+        remedy="Use --method iv with the recorded perturbation and pool epochs, or leave the epoch "
+        "out.",
         setting="max_voluntary_share_percent",
         variants=OF_SUBJECT,
         example={"value": 23.0, "limit": 15.0, "low_hz": 0.3, "high_hz": 4.0},
@@ -97,11 +100,12 @@ JOINT_KINDS = (
         "active_movement",
         "share of seconds in which the SD of M_sub passes `active_torque_nm` and "
         "`active_share_percent` of the torque's SD",
-        headline="Something but the robot pushed in {value:.0f} % of the seconds",
-        measured="The torque beyond J, B and K exceeds {above_nm:.2g} N·m in {value:.0f} % of the "
-        "seconds (at most {limit:g} %), first at {first_s:.1f} s: the joint was not at rest.",
-        meaning="Least squares takes part of such torque for the joint.",
-        remedy="Repeat while the robot alone moves the joint, or leave these seconds out.",
+        headline="Voluntary torque in {value:.0f} % of the seconds",
+        measured="The torque that J, B and K do not explain exceeds {above_nm:.2g} N·m in "
+        "{value:.0f} % of the seconds (at most {limit:g} %), first at "
+        "{first_s:.1f} s: the joint was not at rest.",
+        meaning="Least squares attributes part of such torque to the joint.",
+        remedy="Repeat with the subject relaxed, or leave these seconds out.",
         setting="max_active_percent",
         variants=OF_SUBJECT,
         example={"value": 44.0, "limit": 20.0},
@@ -125,13 +129,13 @@ JOINT_KINDS = (
         "of the torque's variance, if it is three times that beside it; frequency and amplitude in "
         "N·m",
         headline="Torque oscillates at {frequency_hz:.2g} Hz with {amplitude_nm:.2g} N·m",
-        measured="The torque beyond J, B and K has a line at {frequency_hz:.2g} Hz of "
+        measured="The unexplained torque has a line at {frequency_hz:.2g} Hz of "
         "{amplitude_nm:.2g} N·m (amplitude), {value:.2g} % of the torque's variance (at most "
         "{limit:g} %) and {stands_out:.2g} times what lies beside it: a tremor or another "
         "oscillation.",
-        meaning="Least squares takes part of it for the joint; in a closed loop J and B come out "
-        "low.",
-        remedy="Record the perturbation and use iv, or leave the epoch out.",
+        meaning="Least squares attributes part of it to the joint; in a closed loop J and B come "
+        "out low.",
+        remedy="Use --method iv with the recorded perturbation, or leave the epoch out.",
         setting="max_tremor_share_percent",
         variants=OF_SUBJECT,
         example={"value": 8.0, "limit": 3.0},
@@ -159,7 +163,7 @@ JOINT_KINDS = (
         setting="max_varying_percent",
         variants={
             "with_term": {
-                "meaning": "The estimate is a mean over a joint that changed; {terms}, which "
+                "meaning": "The estimate is an average over a joint that changed; {terms}, which "
                 "missing_term names, may have the same effect.",
                 "remedy": "Include what missing_term names and see whether J, B and K still "
                 f"change, or {_ABOUT}",
@@ -195,11 +199,11 @@ JOINT_KINDS = (
         "standard error says, in % of the mean, if they scatter by more than their errors "
         "(`varying_chance`); with the fit to all epochs, from three on",
         headline="{symbol} differs between epochs, {low:.3g} to {high:.3g} {size_unit}",
-        measured="{symbol} goes from {low:.3g} {size_unit} in {low_at} to {high:.3g} in {high_at}, "
-        "{value:.0f} % of the mean (at most {limit:g} %; {p}), with an SD of {sd:.2g} beyond the "
-        "errors{trend}{others}.",
-        meaning="The estimate from all epochs is a mean over a joint that was not the same in all.",
-        remedy="Compare the epochs in order, and state the scatter between them beside the mean.",
+        measured="{symbol} changes from {low:.3g} {size_unit} in {low_at} to {high:.3g} in "
+        "{high_at}, {value:.0f} % of the mean (at most {limit:g} %; {p}), with an SD of {sd:.2g} "
+        "beyond the errors{trend}{others}.",
+        meaning="The estimate from all epochs is an average; the joint changed between epochs.",
+        remedy="Compare the epochs in order, and report the scatter between them beside the mean.",
         level="note",
         setting="max_varying_percent",
         example={"value": 42.0, "limit": 10.0},

@@ -20,7 +20,7 @@ MODEL_KINDS = (
         measured="From {low_hz:.3g} to {high_hz:.3g} Hz {value:.2g} % of the torque's response to "
         "the perturbation is not J, B and K (at most {limit:g} %; {p}). The lower half of the band "
         "gives J {half_J:+.2g} %, B {half_B:+.2g} %, K {half_K:+.2g} %.",
-        meaning="Friction, a reflex, a soft cuff or a late channel is taken for the joint.",
+        meaning="Friction, a reflex, a soft cuff or a late channel is attributed to the joint.",
         remedy="Lower the upper edge of the band (--band-hz) and see whether J and B change; "
         "`rigidimeter model --compare` tries terms.",
         setting="max_lack_of_fit_percent",
@@ -109,7 +109,7 @@ MODEL_KINDS = (
         headline="The torque holds {terms}: {changes}",
         measured="The torque holds {sizes} ({p}). Left out, it moves {changes}, {value:.3g} % of "
         "half their intervals (at most {limit:g} %).",
-        meaning="J, B and K take it for their own.",
+        meaning="J, B and K absorb it.",
         remedy=_INCLUDE,
         variants={
             "several": {"headline": "The torque holds {terms}", "remedy": _INCLUDE},
@@ -120,10 +120,10 @@ MODEL_KINDS = (
                 "most {limit:g} %)."
             },
             "coupling": {
-                "headline": "Something gives between sensor and joint: {changes}",
-                "measured": "Between sensor and joint something gives with {size:.3g} N·m/rad, "
-                "{share:.0f} % of what J, B and K leave to a linear filter ({p}). It moves "
-                "{changes}, {value:.3g} % of half their intervals (at most {limit:g} %).",
+                "headline": "The coupling is compliant: {changes}",
+                "measured": "The coupling of sensor and joint has a stiffness of {size:.3g} "
+                "N·m/rad, {share:.0f} % of what J, B and K leave to a linear filter ({p}). It "
+                "moves {changes}, {value:.3g} % of half their intervals (at most {limit:g} %).",
                 "remedy": "Make the coupling stiffer, or lower the upper edge of the band "
                 "(--band-hz).",
             },
@@ -131,8 +131,9 @@ MODEL_KINDS = (
                 "meaning": "Below 2 % of the torque's SD it may be friction of the drive; "
                 "including it then does not help."
             },
-            "within": {"meaning": "That is less than half their intervals."},
+            "within": {"meaning": "That is less than half their intervals.", "remedy": ""},
         },
+        examples={"within": {"value": 34.0, "percent_of": (0.5, -0.3, 0.7)}},
         example={
             "value": 340.0,
             "limit": 100.0,
@@ -163,7 +164,7 @@ MODEL_KINDS = (
         measured="From perturbation and torque the controller of the settings makes a velocity "
         "command that differs from the recorded one by {value:.2g} % (at most {limit:g} %) and is "
         "{factor:.2g} times as large.",
-        meaning="What is computed of the loop holds for another controller.",
+        meaning="What is computed of the loop is for a different controller.",
         remedy="Give the values that were used, per radian: --controller J_C B_C, or inertia_kg_m2 "
         "and damping_nm_s_rad in [controller].",
         setting="max_controller_misfit_percent",
@@ -184,12 +185,12 @@ MODEL_KINDS = (
             },
             "instrument": {"meaning": "{method} is less precise with it, not biased."},
             "in_interval": {
-                "meaning": "Each frequency counts by its noise, and the intervals include what "
-                "torque from elsewhere does by the loop."
+                "meaning": "Each frequency is weighted by its noise, and the intervals include "
+                "what torque not from the robot does by the loop."
             },
             "small_bias": {
-                "meaning": "By the loop that the recording shows, torque from elsewhere biases J, "
-                "B and K by {share:.2g} % of half their intervals at most."
+                "meaning": "By the loop that the recording shows, torque not from the robot biases "
+                "J, B and K by {share:.2g} % of half their intervals at most."
             },
         },
         example={"value": 50.0, "limit": 20.0, "factor": 0.5},
@@ -201,7 +202,7 @@ MODEL_KINDS = (
         headline="This controller would be unstable with this joint",
         measured="With the controller of the settings and this joint the loop's slowest motion "
         "grows by a factor of e^({value:.2g}) a second (at most 1).",
-        meaning="The joint or the controller was another one.",
+        meaning="The joint or the controller was a different one.",
         remedy="Give the values that were used, per radian: --controller J_C B_C, or inertia_kg_m2 "
         "and damping_nm_s_rad in [controller].",
         unit="1/s",
@@ -211,12 +212,12 @@ MODEL_KINDS = (
                 "feedback, so it is less precise, not biased."
             },
             "in_interval": {
-                "meaning": "Each frequency counts by its noise, and the intervals include what "
-                "torque from elsewhere does by the loop."
+                "meaning": "Each frequency is weighted by its noise, and the intervals include "
+                "what torque not from the robot does by the loop."
             },
             "small_bias": {
-                "meaning": "By the loop, torque from elsewhere biases J, B and K by {share:.2g} % "
-                "of half their intervals at most."
+                "meaning": "By the loop, torque not from the robot biases J, B and K by "
+                "{share:.2g} % of half their intervals at most."
             },
         },
         example={"value": 3.1, "limit": 0.0},

@@ -97,6 +97,7 @@ SENSOR_KINDS = (
             }
         },
         example={"value": 55.0, "limit": 50.0, "reason": "batch 7 of samples.arrows is damaged"},
+        examples={"left_out": {"value": 9.1, "lost_s": 1.8}},
     ),
     Kind(
         "missed_ticks",
@@ -113,7 +114,8 @@ SENSOR_KINDS = (
         variants={
             "followed": {
                 "meaning": "The drive held its command there and the estimate allows for that: J, "
-                "B and K stay within their intervals."
+                "B and K stay within their intervals.",
+                "remedy": "",
             }
         },
         example={"value": 0.65, "limit": 0.1},
@@ -121,9 +123,9 @@ SENSOR_KINDS = (
     Kind(
         "velocity_scale",
         "ratio of the change of angle to the integrated velocity, minus 1, in %",
-        headline="The angle changes {scale:.3g} times as much as the velocity says",
-        measured="angle_rad changes {scale:.3g} times as much as velocity_rad_s says, {value:.2g} "
-        "% from once (at most {limit:g} %).",
+        headline="The angle changes {scale:.3g} times as much as the velocity states",
+        measured="angle_rad changes {scale:.3g} times as much as velocity_rad_s states, "
+        "{value:.2g} % from 1 (at most {limit:g} %).",
         meaning="One of them has another unit or sign, or is another joint's, so J, B and K are "
         "wrong.",
         remedy="Check the units and signs of both channels.",
@@ -178,8 +180,8 @@ SENSOR_KINDS = (
         headline="Torque is {late_ms:.3g} ms late: {changes}",
         measured="The torque is {late_ms:.3g} ms late against the motion (at most {limit:.2g} ms "
         "either way), which was not corrected.",
-        meaning="If it is a delay, it moves {changes}; if not, a reflex is in J and B, or torque "
-        "that something but the robot adds.",
+        meaning="If it is a delay, it moves {changes}; if not, a reflex is in J and B, or "
+        "voluntary torque.",
         remedy="Record the perturbation, which tells the two apart, or take a known delay out of "
         "the recording.",
         unit="ms",

@@ -23,9 +23,9 @@ STUDY_KINDS = (
         "difference of the median J of two conditions, in % of the larger, where the test finds it",
         headline="Inertia differs by {value:.2g} %, and no treatment changes it",
         measured="The median J is {first:.4g} kg·m² in {reference} and {second:.4g} in {other}.",
-        meaning="The posture, the contact with the robot, a unit, or torque from elsewhere was "
+        meaning="The posture, the contact with the robot, a unit, or voluntary torque was "
         "different, which changes B and K as well.",
-        remedy="Compare how the arm was fixed, the units, and the torque beyond J, B and K.",
+        remedy="Compare how the arm was fixed, the units, and the voluntary torque.",
         variants={
             "flagged": {
                 "headline": "Inertia differs by {value:.2g} %, and no treatment changes it: "

@@ -11,12 +11,50 @@ from rigidimeter.core.findings.kind import EXAMPLE, Kind
 from rigidimeter.core.findings.kinds import KINDS
 from rigidimeter.core.words import Shown, p_text
 
+WHEN: Mapping[str, str] = {
+    "instrument": "When the recorded perturbation is used as the instrument",
+    "small_bias": "When the bias by the loop is small",
+    "in_interval": "When the intervals include the bias",
+    "first_order": "When the intervals include the bias to the first order only",
+    "negligible": "When the effect is negligible",
+    "within": "When the effect is less than half the intervals",
+    "unknown": "When the bias cannot be computed",
+    "not_known": "When the controller is not known",
+    "at_rest": "When the joint did not move",
+    "chance": "When it may be due to chance",
+    "noise": "When not all of the intervals lie below zero",
+    "reaction": "When all of the intervals lie below zero",
+    "with_term": "When a missing term was found as well",
+    "of_settings": "When the drive is that of the settings",
+    "unknown_drive": "When the drive is not known",
+    "friction": "When the drive may have friction",
+    "of_drive": "When it may be friction of the drive",
+    "as_sampled": "When the torque is used as it was sampled",
+    "several": "When several terms are missing",
+    "reflex": "When the term is a reflex",
+    "coupling": "When the coupling is compliant",
+    "shown": "When the recording shows the controller",
+    "per_degree": "When the settings seem to be per degree",
+    "per_degree_twice": "When the settings seem to be multiplied by 57.3",
+    "left_out": "When that part is left out",
+    "followed": "When the drive was identified",
+    "velocity": "When the velocity fits worse",
+    "angle": "When the angle fits worse",
+    "flagged": "When the epochs of one condition have a finding",
+    "degrees": "When degrees may have been read as radians",
+    "hides": "When no difference is found",
+    "held": "When the interval holds a difference worth finding",
+    "values": "When there are too few values for any test",
+    "together": "When all epochs of a condition have it together",
+}
+"""When a variant of the words is used."""
+
 NO_CHANGE = 0.05
 """In %: less is shown as 0."""
 
 
 class Words(NamedTuple):
-    """Headline (at most 15 words), details (at most 60) and remedy (one sentence)."""
+    """Headline (at most 15 words), details (at most 60) and remedy (one sentence, or empty)."""
 
     headline: str
     details: str
@@ -46,12 +84,14 @@ def words_of(name: str, facts: Mapping[str, Any]) -> Words:
 
 
 def explained(kind: Kind) -> list[tuple[str, Words]]:
-    """Return the words of a kind with its example, for each variant by its name."""
+    """Return the words of a kind with its example, usual ones first, and when each are used."""
     shown = {**EXAMPLE, **kind.example, "unit": kind.unit}
-    return [
-        (variant, words_of(kind.name, {**shown, "variant": variant}))
-        for variant in ("", *kind.variants)
-    ]
+    found = []
+    for variant in ("", *kind.variants):
+        when = WHEN.get(variant, f"When it is {variant}") if variant else "For example"
+        facts = {**shown, **kind.examples.get(variant, {}), "variant": variant}
+        found.append((when, words_of(kind.name, facts)))
+    return found
 
 
 def _shown(facts: Mapping[str, Any]) -> dict[str, Any]:

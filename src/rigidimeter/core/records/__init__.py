@@ -7,6 +7,7 @@ from rigidimeter.core.records.analysis_record import (
     Analysis,
     FindingGroup,
     grouped,
+    notes_text,
 )
 from rigidimeter.core.records.epochs import (
     CHANNEL_UNITS,

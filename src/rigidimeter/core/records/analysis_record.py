@@ -68,6 +68,20 @@ NOT_STATED = "may include limb weight (set diagnostics.axis)"
 """That about an unknown axis, in half a line of a screen."""
 
 
+def notes_text(names: Iterable[str]) -> str:
+    """Return how many notes change nothing, as one line.
+
+    Examples
+    --------
+    >>> notes_text(["tremor"]), notes_text(["coherence", "tremor"])
+    ('1 note, which does not affect J, B, K', '2 notes, none affects J, B, K')
+    """
+    count = len(set(names))
+    return f"{plural(count, 'note')}, " + (
+        "which does not affect J, B, K" if count == 1 else "none affects J, B, K"
+    )
+
+
 class FindingGroup(NamedTuple):
     """What one check found, with one level, in one or more epochs.
 
@@ -381,10 +395,15 @@ class Analysis:
         if len(self.fits) > _MAX_SHOWN:
             parts.append(f"<p>The first {_MAX_SHOWN} of {len(self.fits)} epochs.</p>")
         if self.findings:
+            told = [group for group in self.findings if not group.finding.harmless]
             rows = [
                 [one.level, one.name, one.headline, where, one.details, one.remedy]
-                for one, _, where in self.findings
+                for one, _, where in told
             ]
+            if quiet := [g.finding.name for g in self.findings if g.finding.harmless]:
+                rows.append(
+                    ["note", "", notes_text(quiet), "", ", ".join(dict.fromkeys(quiet)), ""]
+                )
             heading = ["level", "finding", "", "epochs", "details", "remedy"]
             parts.append("<p>What the checks found:</p>")
             parts.append(html_table(heading, rows))

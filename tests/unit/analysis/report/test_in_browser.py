@@ -130,7 +130,7 @@ def test_the_print_has_rig_settings_and_provenance_and_names_what_is_not_in_it(
     page = on_a_desk
     page.emulate_media(media="print")
     chapters = [one for one in page.locator("h2").all_inner_texts() if one]
-    assert {"What was done", "Was the rig right", "Were the epochs good", "Provenance"} <= set(
+    assert {"What was done", "Rig checks", "Epoch quality", "Provenance"} <= set(
         one.strip("?") for one in chapters
     )
     for shown in ("#design table:has-text('Estimation')", "#provenance table"):

@@ -262,7 +262,7 @@ def test_findings_are_told_once_a_kind(make_study, make_analysis, tmp_path: Path
     text = " ".join(page_of(made, tmp_path).text.split())
     lines = [
         "exclude frozen torque_nm repeats one value for 20 s; epoch 1",
-        "caution voluntary_torque Torque beyond J, B, K is 49 % of the torque's variance; ",
+        "caution voluntary_torque 49 % of the torque variance is not explained by J, B and K; ",
         "note varying varying: 20, limit 15; all epochs together",
     ]
     places = [text.index(line) for line in lines]
@@ -270,7 +270,7 @@ def test_findings_are_told_once_a_kind(make_study, make_analysis, tmp_path: Path
     with (tmp_path / "tables" / "findings.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 34
-    assert rows[1]["headline"] == "Torque beyond J, B, K is 21 % of the torque's variance"
+    assert rows[1]["headline"] == "21 % of the torque variance is not explained by J, B and K"
 
 
 def test_no_findings_say_so(make_study, make_analysis) -> None:

@@ -34,7 +34,7 @@ LINE_METHODS = {
 
 _INTERVALS_TEXT = (
     "Intervals are made from the power of the residual at each frequency, torque that "
-    "something but the robot adds included"
+    "is not from the robot included"
 )
 
 _POOLED_TEXT = (

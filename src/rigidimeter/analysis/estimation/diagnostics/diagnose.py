@@ -119,7 +119,7 @@ def checked(
     serious = [finding for finding in findings if finding.level == "exclude"]
     outcome = fit.outcome
     if serious and outcome.included:
-        outcome = Outcome("excluded", f"{serious[0].headline}. {serious[0].remedy}".rstrip("."))
+        outcome = Outcome("excluded", f"{serious[0].headline}. {serious[0].remedy}".rstrip(". "))
     return in_half_intervals(replace(fit, outcome=outcome, findings=(*fit.findings, *findings)))
 
 

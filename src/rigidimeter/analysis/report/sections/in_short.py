@@ -21,7 +21,7 @@ from rigidimeter.analysis.report.points import day_groups, day_rows, draw_days, 
 from rigidimeter.analysis.report.style import drawn
 from rigidimeter.analysis.study import StudyResult, result_table, traffic_light
 from rigidimeter.core.findings import Finding
-from rigidimeter.core.records import Fit
+from rigidimeter.core.records import FindingGroup, Fit, notes_text
 from rigidimeter.core.words import (
     Column,
     Kind,
@@ -38,7 +38,10 @@ DAYS_WIDTH = 9.6
 UNFOLDING = Markup(
     '<details class="finding">\n<summary><span class="outcome is-{level}">{level}</span> '
     "<strong>{name}</strong> {headline}; {where}</summary>\n"
-    "<p>{details}</p>\n<p>{remedy}</p>\n</details>"
+    "<p>{details}</p>\n{todo}</details>"
+)
+QUIET = Markup(
+    '<details class="finding">\n<summary><span class="outcome is-note">note</span> {}</summary>\n'
 )
 
 _STIMULATION: tuple[tuple[str, str, Kind], ...] = (
@@ -109,8 +112,12 @@ def _findings(result: StudyResult) -> Iterator[Block]:
         )
     else:
         yield paragraph("The checks found nothing." if n_fitted else "No epoch was fitted.")
-    for one, _, where in result.findings:
-        yield UNFOLDING.format(level=one.level, name=one.name, where=where, **one.words._asdict())
+    shown = [group for group in result.findings if not group.finding.harmless]
+    yield from map(_unfolding, shown)
+    if quiet := [group for group in result.findings if group.finding.harmless]:
+        inner = Markup("\n").join(map(_unfolding, quiet))
+        text = notes_text(group.finding.name for group in quiet)
+        yield QUIET.format(text) + inner + Markup("\n</details>")
     kinds = [
         {
             "check": one.name,
@@ -137,6 +144,13 @@ def _findings(result: StudyResult) -> Iterator[Block]:
         for fit, finding in _of_fits(result)
     ]
     yield Table("findings", "Findings, epoch by epoch", (), rows)
+
+
+def _unfolding(group: FindingGroup) -> Markup:
+    one, _, where = group
+    todo = Markup("<p>{}</p>\n").format(one.remedy) if one.remedy else ""
+    shown = {"level": one.level, "name": one.name, "headline": one.headline, "where": where}
+    return UNFOLDING.format(**shown, details=one.details, todo=todo)
 
 
 def _of_fits(result: StudyResult) -> list[tuple[Fit, Finding]]:

@@ -53,8 +53,8 @@ def _torque(result: StudyResult) -> Iterator[Block]:
     if method_of(result.analysis.method).uses_perturbation:
         text += (
             " The estimate ignores torque that does not follow the perturbation. What the model "
-            "leaves here is noise and torque that something but the robot adds, so a low VAF does "
-            "not mean a poor fit."
+            "leaves here is noise and torque not from the robot, so a low VAF does not "
+            "mean a poor fit."
         )
     yield paragraph(text)
     below: Look = {"sharex": True, "height_ratios": TORQUE_HEIGHTS}
@@ -144,7 +144,7 @@ def _unexplained(result: StudyResult) -> Iterator[Block]:
         return
     text = Markup(
         "The torque of each epoch that J, B and K do not explain, "
-        '<span class="formula">J θ″ + B θ′ + K θ − M</span>: what something but the robot adds, '
+        '<span class="formula">J θ″ + B θ′ + K θ − M</span>: torque not from the robot, '
         "sensor noise, and whatever the model lacks. Voluntary movement is below 4 Hz; a tremor is "
         "a peak."
     )
