@@ -15,6 +15,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 import venv
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -133,10 +134,13 @@ def main() -> int:
             *([*words, "--help"] for words, _ in every),
         ]
         lines += [words for _, command in every for words in examples(command)]
-        print("status  command: first line", flush=True)
+        print("status  s      command: first line", flush=True)
         for words in lines:
+            began_s = time.monotonic()
             ran = run(program, words, tried)
-            print(f"{ran.status:6}  {shlex.join(words)}: {ran.first_line}", flush=True)
+            took_s = time.monotonic() - began_s
+            shown = f"{shlex.join(words)}: {ran.first_line}"
+            print(f"{ran.status:6}  {took_s:5.0f}  {shown}", flush=True)
             if ran.failed:
                 failed.append(ran)
     for ran in failed:

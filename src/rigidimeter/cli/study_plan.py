@@ -92,9 +92,9 @@ def plan_days(
 
     \b
     For example:
-      rigidimeter study plan study --subjects S01 --days 9 --days-of DBS=4
-      rigidimeter study plan study
-      rigidimeter run --next study
+      rigidimeter study plan winter --subjects S01 --days 9 --days-of DBS=4
+      rigidimeter study plan winter
+      rigidimeter run --next winter
     """
     from rigidimeter.core.settings import load_settings
     from rigidimeter.core.study_files import PlanToml, is_study, read_plan, write_plan
@@ -164,9 +164,9 @@ def stimulation(
 
     \b
     For example:
-      rigidimeter study stimulation study
-      rigidimeter study stimulation study on --by nurse
-      rigidimeter study stimulation study "off since 10:42"
+      rigidimeter study stimulation winter
+      rigidimeter study stimulation winter "off since 10:42"
+      rigidimeter study stimulation winter on --by nurse
     """
     from rigidimeter.core.study_files import add_change, parse_change
 
@@ -200,8 +200,8 @@ def rehearse_plan(
 
     \b
     For example:
-      rigidimeter study rehearse study
-      rigidimeter compare study
+      rigidimeter study rehearse winter
+      rigidimeter compare winter
     """
     from rigidimeter.virtual import rehearse
 

@@ -49,7 +49,10 @@ def test_examples_can_be_run_after_make_demo():
     assert len(lines) > 40
     options = "--out", "--rig-out", "--json", "--write-mapping"
     written = {path for words in lines for name, path in pairwise(words) if name in options}
-    others = written | {"drive.eds", "tcp://host:8786", "study"}  # of the drive; the study made
+    others = written | {
+        "drive.eds",
+        "tcp://host:8786",
+    }  # what comes with a drive, and a cluster's address
     for words in lines:
         size = 2 if words[0] == "study" else 1
         command = COMMANDS[tuple(words[:size])]
