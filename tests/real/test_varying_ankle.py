@@ -58,4 +58,4 @@ def test_an_ankle_whose_stiffness_follows_a_movement_varies_with_its_phase(share
     epochs, _ = read_recording(shared_data / "ankle" / "z_df2.npz", OPTIONS)
     for found in varying([moved(epoch, 0.5) for epoch in epochs]):
         assert found.keys() == {"varying_with_phase"}
-        assert "K goes from" in found["varying_with_phase"]
+        assert "K changes from" in found["varying_with_phase"]

@@ -99,7 +99,8 @@ FIT_KINDS = (
         "band (at least {limit:g}); the rest is torque not from the robot (voluntary, "
         "friction), noise, or a joint that is not linear.",
         meaning="That may bias J, B and K.",
-        remedy="Perturb more strongly, pool epochs, or repeat with the subject relaxed.",
+        remedy="Perturb more strongly, pool epochs, or repeat while only the robot moves the "
+        "joint.",
         unit="1",
         setting="min_coherence",
         variants=OF_SUBJECT,

@@ -24,8 +24,8 @@ JOINT_KINDS = (
         measured="Torque not explained by J, B and K, which the loop turns into motion, moves "
         "{changes}, {value:.2g} % of half their intervals at most (at most {limit:g} %).",
         meaning="Least squares attributes it to the joint, and the intervals do not include that.",
-        remedy="Use --method iv with the recorded perturbation, or repeat with the subject "
-        "relaxed.",
+        remedy="Use --method iv with the recorded perturbation, or repeat while only the robot "
+        "moves the joint.",
         setting="max_loop_bias_percent",
         variants={
             "unknown": {
@@ -105,7 +105,7 @@ JOINT_KINDS = (
         "{value:.0f} % of the seconds (at most {limit:g} %), first at "
         "{first_s:.1f} s: the joint was not at rest.",
         meaning="Least squares attributes part of such torque to the joint.",
-        remedy="Repeat with the subject relaxed, or leave these seconds out.",
+        remedy="Repeat while only the robot moves the joint, or leave these seconds out.",
         setting="max_active_percent",
         variants=OF_SUBJECT,
         example={"value": 44.0, "limit": 20.0},

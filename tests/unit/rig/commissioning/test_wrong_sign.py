@@ -137,7 +137,10 @@ def test_a_sign_in_order_is_never_found_and_one_that_turns_is_found_after_it() -
 
 def test_what_protects_is_said_with_the_noise_that_was_measured() -> None:
     words = sign_words(chosen(), ())
-    assert f"own (SD): OFF {hiding_torque_nm(chosen(), 'OFF'):.2g} N·m. Above that, and in" in words
+    assert (
+        f"stays below (SD): OFF {hiding_torque_nm(chosen(), 'OFF'):.2g} N·m. Above that, and in"
+        in words
+    )
     assert "an imposed sinusoid, the daily check alone protects: repeat `rigidimeter ch" in words
     noisy = sign_words(chosen(), [below(NOISE, 0.5, "N·m", 0.1, "")])
     assert "OFF perhaps none at all" in noisy
