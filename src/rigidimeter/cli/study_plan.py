@@ -242,7 +242,7 @@ def days_of_design(path: Path) -> tuple[int, int]:
     if not isinstance(document, dict) or document.get("schema") != DESIGN_SCHEMA:
         raise UserError(f"{path}: is not the JSON of rigidimeter design --json")
     found = [one.get("planned") or {} for one in document.get("detection", [])]
-    days = [one["days_needed_primary"] for one in found if one.get("days_needed_primary")]
+    days = [one["days_needed"] for one in found if one.get("days_needed")]
     if not days:
         raise UserError(
             f"{path}: names no days; run design with --detect and a protocol that has epochs of "

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from rigidimeter.cli.design import design
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings, load_settings
+from rigidimeter.core.study_files import read_plan
 from rigidimeter.planning import DESIGN_SCHEMA, multisine_nm, prbs_nm, sinusoid
 from rigidimeter.virtual import write_virtual_study
 
@@ -296,3 +297,25 @@ def test_a_study_of_one_day_cannot_say_how_days_differ(tmp_path: Path) -> None:
 def test_a_folder_that_is_no_study_is_named(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"--from .*: is no study folder: it has no study\.toml"):
         run("--detect", "stiffness=20%", "--from", str(tmp_path))
+
+
+def test_a_plan_of_days_is_drawn_from_the_days_that_a_design_asks_for(
+    tmp_path: Path, rigidimeter
+) -> None:
+    numbers, study = tmp_path / "design.json", tmp_path / "study"
+    settings = "examples/settings/study.toml"
+    run("--settings", settings, "--detect", "stiffness=20%", "--json", str(numbers))
+    needed = json.loads(numbers.read_text())["detection"][0]["planned"]
+    ran = rigidimeter("study", "plan", study, "--subjects", "S01", "--from-design", numbers)
+    assert ran.status == 0, ran.err
+    plan = read_plan(study)
+    assert plan is not None
+    assert plan.about.days == needed["days_needed"]
+    block = load_settings(study / "protocols/OFF.toml").protocol.blocks[0]
+    assert (block.task, block.epochs) == ("prbs", max(needed["epochs_a_day"]))
+    run("--json", str(numbers))
+    refused = rigidimeter(
+        "study", "plan", tmp_path / "b", "--subjects", "S", "--from-design", numbers
+    )
+    assert refused.status == 1
+    assert "names no days; run design with --detect" in " ".join(refused.err.split())

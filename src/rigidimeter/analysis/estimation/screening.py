@@ -47,7 +47,8 @@ def before_fit(epoch: Epoch, settings: EstimationSettings) -> str:
         )
     start = max(float(channel.time_s[0]) for channel in (torque, *motion))
     stop = min(float(channel.time_s[-1]) for channel in (torque, *motion))
-    if stop - start < settings.min_epoch_s * (1 - 1e-3):
+    # The last sample of an epoch begins one interval before its end.
+    if stop - start + 1 / slowest.rate_hz < settings.min_epoch_s * (1 - 1e-3):
         spans_s = [float(channel.time_s[-1] - channel.time_s[0]) for channel in (torque, *motion)]
         short = min(spans_s) - (stop - start) < 0.1 and max(spans_s) < settings.min_epoch_s
         length = "this part is {:.3g} s long" if short else "torque and motion overlap for {:.3g} s"

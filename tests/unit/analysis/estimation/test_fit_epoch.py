@@ -40,6 +40,16 @@ def test_an_exact_recording_of_angle_and_torque_gives_the_joint_back():
     assert fit.vaf_percent > 99.99
 
 
+def test_an_epoch_of_the_least_length_is_fitted_whatever_the_sampling_rate():
+    """Its last sample begins one interval before its end; half a second less is too short."""
+    for rate_hz in (125.0, 1000.0):
+        assert fit_epoch(
+            moving_epoch(rate_hz=rate_hz, duration_s=5.0), "bandlimited", SETTINGS
+        ).outcome.included
+    short = fit_epoch(moving_epoch(duration_s=4.5), "bandlimited", SETTINGS)
+    assert "is 4.5 s long; at least 5 s are needed" in short.outcome.reason
+
+
 def test_filtering_the_position_alone_is_what_biases_the_published_stiffness():
     published = fit_epoch(moving_epoch(), "published", SETTINGS)
     alike = fit_epoch(moving_epoch(), "bandlimited", SETTINGS)
