@@ -42,7 +42,15 @@ from rigidimeter.rig.commissioning import (
     require_daily_check,
 )
 from rigidimeter.rig.console import SessionPlan, new_folder, next_steps, resume_command
-from rigidimeter.rig.devices import STOP_LOW, MotionRange, RigFile, load_rig, range_of
+from rigidimeter.rig.devices import (
+    STOP_LOW,
+    MotionRange,
+    RigFile,
+    load_rig,
+    open_emg,
+    range_of,
+    require_emg,
+)
 from rigidimeter.rig.guard import DriveModel
 
 Console = Callable[[SessionMemory], object]
@@ -232,7 +240,19 @@ def run_planned(
     console: Console,
     operator_seen_ns: Callable[[], int] | None = None,
 ) -> Ended:
-    """Run a session that was checked, to its end."""
+    """Run a session that was checked, to its end.
+
+    Raises
+    ------
+    UserError
+        If EMG on a rig is to be that of the virtual subject.
+    """
+    virtual_emg = planned.settings.emg.source in ("none", "virtual")
+    if rig is not None and planned.settings.emg.source == "virtual":
+        raise UserError(
+            'emg.source = "virtual" is the EMG of the virtual subject; on a rig it must be "lsl" '
+            'or "daq", or the table [emg] be left out'
+        )
     home_rad = planned.continues.get("origin_rad") if rig is not None else None
     range_rad = planned.motion_range.range_rad if planned.motion_range is not None else None
     recording = RecordingPlan(
@@ -259,6 +279,7 @@ def run_planned(
         realtime=realtime,
         console=console,
         operator_seen_ns=operator_seen_ns,
+        open_emg=None if virtual_emg else open_emg,
     )
 
 
@@ -319,13 +340,14 @@ def conclude(ended: Ended, out: Path, rig: Path | None, *, nwb: bool) -> None:
 
 
 def require_packages(settings: Settings) -> None:
-    """Refuse settings that need a package which is not installed, before anything starts.
+    """Refuse settings that need a package or a source of EMG that is not there, before it starts.
 
     Raises
     ------
     UserError
-        With the command that installs it.
+        With what would be right.
     """
+    require_emg(settings.emg)
     needs = (
         ("lsl", settings.sharing.lsl, "pylsl", "lsl"),
         ("nwb_at_close", settings.sharing.nwb_at_close, "pynwb", "nwb"),

@@ -46,6 +46,7 @@ from rigidimeter.model.linear_loop import (
     voluntary_motion_sd,
 )
 from rigidimeter.model.loop_poles import spectral_radius
+from rigidimeter.model.muscle_activity import EMG_BAND_HZ, VirtualEmg, VirtualMuscles
 from rigidimeter.model.recursion import (
     STATE_SIZE,
     online_design,
@@ -74,6 +75,7 @@ from rigidimeter.model.subject_torque import (
     BLOCK_TICKS,
     SubjectTorque,
     draw_joint,
+    one_by_one,
     rig_streams,
     subject_density,
 )

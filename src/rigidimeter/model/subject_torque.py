@@ -12,6 +12,7 @@ which integrates over −f_s/2 to f_s/2 to the variance:
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -68,11 +69,19 @@ def draw_joint(subject: SubjectSettings, rng: np.random.Generator) -> JointDynam
     )
 
 
+def one_by_one(block: Callable[[int], NDArray[np.float64]]) -> Iterator[float]:
+    """Yield numbers one by one from blocks of `BLOCK_TICKS` drawn in advance."""
+    while True:
+        yield from block(BLOCK_TICKS).tolist()
+
+
 @lru_cache(maxsize=32)
-def _band(subject: SubjectSettings, rate_hz: float) -> tuple[NDArray[np.float64], float]:
-    """Return the band-pass as sections, and the energy of its impulse response."""
-    low_hz = subject.voluntary_low_hz
-    high_hz = min(subject.voluntary_high_hz, _HIGHEST_OF_RATE * rate_hz)
+def noise_band(low_hz: float, high_hz: float, rate_hz: float) -> tuple[NDArray[np.float64], float]:
+    """Return a band-pass as sections, and the energy of its impulse response.
+
+    White noise of unit variance leaves it with that variance.
+    """
+    high_hz = min(high_hz, _HIGHEST_OF_RATE * rate_hz)
     sos = scipy.signal.butter(2, [low_hz, high_hz], "bandpass", fs=rate_hz, output="sos")
     impulse = np.zeros(int(10.0 * rate_hz / low_hz))
     impulse[0] = 1.0
@@ -95,7 +104,7 @@ def subject_density(
     frequency = np.asarray(frequency_hz, dtype=np.float64)
     density = np.zeros(frequency.shape)
     if subject.voluntary_sd_nm > 0.0:
-        sos, energy = _band(subject, tick_rate_hz)
+        sos, energy = noise_band(subject.voluntary_low_hz, subject.voluntary_high_hz, tick_rate_hz)
         power = np.abs(scipy.signal.sosfreqz(sos, frequency, fs=tick_rate_hz)[1]) ** 2
         density += subject.voluntary_sd_nm**2 * power / (energy * tick_rate_hz)
     if subject.tremor_amplitude_nm > 0.0:
@@ -127,7 +136,8 @@ class SubjectTorque:
         self._rng = rng
         # A relaxed subject needs no filter, and loading `scipy.signal` for it takes a second.
         if subject.voluntary_sd_nm > 0.0:
-            self._sos, energy = _band(subject, rate_hz)
+            band_hz = subject.voluntary_low_hz, subject.voluntary_high_hz
+            self._sos, energy = noise_band(*band_hz, rate_hz)
             self._memory = np.zeros((self._sos.shape[0], 2))
             # White noise of unit variance leaves it with the energy of its impulse response.
             self._gain = subject.voluntary_sd_nm / math.sqrt(energy)

@@ -13,8 +13,9 @@ import numpy as np
 
 from rigidimeter.analysis.reading import Recording, read
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.session import PlannedEpoch, SessionWriter
-from rigidimeter.core.settings import Settings, settings_from
+from rigidimeter.core.session import EmgLog, PlannedEpoch, SessionWriter, read_session_files
+from rigidimeter.core.settings import Settings, SubjectSettings, settings_from
+from rigidimeter.model import VirtualMuscles
 from rigidimeter.planning import plan
 from rigidimeter.rig.acquisition import DeadlineClock, SessionResult, SimulatedClock, run_session
 from rigidimeter.rig.devices import SimulatedRig
@@ -113,7 +114,7 @@ def run_virtual_session(
     def new_joint(planned: PlannedEpoch) -> dict[str, Any]:
         return {"true_joint": asdict(rig.new_epoch(settings.subject[planned.condition]))}
 
-    return run_session(
+    result = run_session(
         protocol,
         settings,
         rig,
@@ -122,3 +123,21 @@ def run_virtual_session(
         before_epoch=new_joint,
         progress=progress,
     )
+    if settings.emg.channels:
+        _write_emg(folder, settings, first, writer.session_id)
+    return result
+
+
+def _write_emg(folder: Path, settings: Settings, first: SubjectSettings, session_id: str) -> None:
+    """Write the EMG of the virtual subject beside the samples of a session."""
+    files = read_session_files(folder, ("tick", "epoch"))
+    started = (e for e in files.log.events if e.get("event") == "epoch_started")
+    conditions = {event["epoch"]: event["condition"] for event in started}
+    tick, epoch = files.samples.columns["tick"], files.samples.columns["epoch"]
+    emg_v = VirtualMuscles(settings, first).take(tick, epoch, conditions)
+    log = EmgLog(folder, settings.emg.channels, settings.emg.rate_hz, session_id)
+    time_s = np.arange(len(emg_v)) / settings.emg.rate_hz
+    batch = round(settings.emg.rate_hz)
+    for k in range(0, time_s.size, batch):
+        log.append(time_s[k : k + batch], 0.0, emg_v[k : k + batch])
+    log.close()

@@ -22,12 +22,13 @@ from rigidimeter.analysis.study.results import Condition
 from rigidimeter.analysis.study.sessions import Session
 from rigidimeter.analysis.study.study_analysis import StudyRead
 from rigidimeter.core.files import plain_values
-from rigidimeter.core.records import CHANNEL_UNITS, Analysis, Delay, Epoch, Fit, Score
+from rigidimeter.core.records import CHANNEL_UNITS, EMG_CHANNELS, Analysis, Delay, Epoch, Fit, Score
 from rigidimeter.core.session import (
     NO_CODE,
     SAMPLE_UNITS,
     codes_of,
     is_session,
+    read_emg,
     read_manifest,
     read_session_files,
     session_settings,
@@ -59,7 +60,7 @@ _STREAM_OF = {
     "velocity_rad_s": "velocity",
     "velocity_command_rad_s": "control",
     "perturbation_nm": "perturbation",
-    "emg_v": "emg",
+    **dict.fromkeys(EMG_CHANNELS, "emg"),
 }
 _TELLS_CONDITION = ("true_joint",)
 EXPORT_SCHEMA = "rigidimeter.export/1"
@@ -232,6 +233,9 @@ def _exported(
     if is_session(path):
         files = read_session_files(path)
         streams = _recorded_streams(files.samples.columns)
+        emg = read_emg(path)
+        if emg is not None:
+            streams = (*streams, Stream("emg", emg.time_s, emg.emg_v))
         manifest = files.manifest
         kept = ("session_id", "created_utc", "versions", "seeds")
         recorded = {key: manifest[key] for key in kept if key in manifest}
@@ -278,9 +282,11 @@ def _event(event: Mapping[str, Any], described: Described) -> dict[str, Any]:
 
 
 def _epoch(epoch: Epoch) -> dict[str, Any]:
-    # What all channels have: a reading that the first tick found is older than the epoch.
-    begins = max(channel.time_s[0] for channel in epoch.channels.values())
-    ends = min(channel.time_s[-1] for channel in epoch.channels.values())
+    # What all channels have: a reading that the first tick found is older than the epoch. EMG may
+    # break off where torque and motion go on.
+    channels = [one for name, one in epoch.channels.items() if name not in EMG_CHANNELS]
+    begins = max(channel.time_s[0] for channel in channels)
+    ends = min(channel.time_s[-1] for channel in channels)
     return {
         "label": epoch.label,
         "task": epoch.task,

@@ -31,6 +31,7 @@ from rigidimeter.analysis.export.exported_sessions import ExportedSession
 from rigidimeter.analysis.export.names import ABOUT_SUBJECT, label, subject_label
 from rigidimeter.analysis.reading.formats.clocked_table import ROUNDING_S, Stream
 from rigidimeter.core.files import json_text
+from rigidimeter.core.records import EMG_CHANNELS
 
 if TYPE_CHECKING:
     from pynwb import NWBFile, TimeSeries
@@ -57,7 +58,12 @@ _SERIES: Mapping[str, tuple[str, str, str, str]] = {
     "lateness_s": (
         "acquisition", "ControlLoopLateness", "s", "How late each tick of the loop was.",
     ),
-    "emg_v": ("acquisition", "EMG", "V", "Raw electromyogram of one muscle."),
+    **{
+        name: (
+            "acquisition", f"EMG{k}" if k > 1 else "EMG", "V", "Raw electromyogram of one muscle.",
+        )
+        for k, name in enumerate(EMG_CHANNELS, start=1)
+    },
     "perturbation_nm": (
         "stimulus", "TorquePerturbation", "N·m", "Torque that the perturbation commanded.",
     ),

@@ -28,7 +28,7 @@ from rigidimeter.analysis.study.session_checks import (
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import RECORDING_BYTES, noted_digests, open_regular
 from rigidimeter.core.records import Epoch, Notice
-from rigidimeter.core.session import EVENTS, MANIFEST, SAMPLES, is_session, read_events
+from rigidimeter.core.session import EMG, EVENTS, MANIFEST, SAMPLES, is_session, read_events
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.study_files import StudyFolder, TableRow, is_outside
 
@@ -218,7 +218,8 @@ def _files_of_samples(path: Path, *, from_session: bool) -> list[Path]:
     Of a folder, such as a BIDS data set, that is its largest file.
     """
     if from_session:
-        return [path / name for name in (MANIFEST, SAMPLES, EVENTS) if (path / name).is_file()]
+        names = (MANIFEST, SAMPLES, EVENTS, EMG)
+        return [path / name for name in names if (path / name).is_file()]
     files = sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path]
     return sorted(files, key=lambda file: file.stat().st_size)[-1:]
 

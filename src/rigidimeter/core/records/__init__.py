@@ -11,6 +11,7 @@ from rigidimeter.core.records.analysis_record import (
 )
 from rigidimeter.core.records.epochs import (
     CHANNEL_UNITS,
+    EMG_CHANNELS,
     LATE_TICK,
     LOST_SAMPLES,
     Axis,

@@ -17,13 +17,16 @@ Axis = Literal["unknown", "vertical", "horizontal"]
 
 OutcomeKind = Literal["included", "excluded", "failed"]
 
+EMG_CHANNELS = ("emg_v", *(f"emg_{muscle}_v" for muscle in range(2, 9)))
+"""Raw EMG: one muscle each."""
+
 CHANNEL_UNITS: Mapping[str, str] = {
     "torque_nm": "N·m",
     "angle_rad": "rad",
     "velocity_rad_s": "rad/s",
     "velocity_command_rad_s": "rad/s",
     "perturbation_nm": "N·m",
-    "emg_v": "V",
+    **dict.fromkeys(EMG_CHANNELS, "V"),
 }
 """The channels an epoch may hold, and their units."""
 

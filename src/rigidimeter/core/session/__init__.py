@@ -1,5 +1,6 @@
 """The folder of a session: planned, written, read, recovered, and continued."""
 
+from rigidimeter.core.session.emg_log import EMG, EmgLog, read_emg
 from rigidimeter.core.session.epochs import (
     epoch_extents,
     epoch_of_samples,

@@ -22,11 +22,13 @@ from rigidimeter.core.records import (
     Outcome,
     Ticks,
 )
+from rigidimeter.core.session.emg_log import EMG, StoredEmg, read_emg
 from rigidimeter.core.session.folder import (
     EVENTS,
     MANIFEST,
     SAMPLES,
     SessionFiles,
+    check_session,
     read_manifest,
     read_session_files,
 )
@@ -77,6 +79,8 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
                 f"`rigidimeter recover {folder}` closes it",
             )
         )
+    emg, found = _emg(folder, manifest, settings)
+    notices += found
     ended = {event["epoch"]: event for event in events if event.get("event") == "epoch_ended"}
     first, last = epoch_extents(samples["epoch"])
     epochs = []
@@ -117,7 +121,12 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
         epoch = epoch_of_samples(
             str(folder), settings, samples, rows, event, closed, virtual=virtual
         )
-        epochs.append(replace(epoch, left_out=left_out))
+        muscles = emg.between(*samples["time_s"][rows][[0, -1]]) if emg else ()
+        if emg and not muscles:
+            text = f"{folder}, epoch {event['label']}: no EMG was recorded"
+            notices.append(Notice("warning", text))
+        channels = {**epoch.channels, **{channel.name: channel for channel in muscles}}
+        epochs.append(replace(epoch, left_out=left_out, channels=channels))
     notices += [
         Notice("error", f"{folder}/{EVENTS}: does not say what epoch {number} of the samples was")
         for number in first
@@ -128,6 +137,25 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
         text = f"{folder}/{SAMPLES}: its end is damaged or missing, but no sample of an epoch is"
         notices.append(Notice("warning", text))
     return epochs, notices
+
+
+def _emg(
+    folder: Path, manifest: Mapping[str, Any], settings: Settings
+) -> tuple[StoredEmg | None, list[Notice]]:
+    """Return the EMG of a session; what is wrong with it leaves torque and motion as they are."""
+    if not settings.emg.channels:
+        return None, []
+    try:
+        emg = read_emg(folder)
+        if emg is None:
+            return None, [Notice("warning", f"{folder}: no EMG was recorded, there is no {EMG}")]
+        check_session(folder, manifest, {EMG: emg.session_ids})
+    except UserError as error:
+        return None, [Notice("error", str(error))]
+    if not emg.damaged:
+        return emg, []
+    text = f"{folder}/{EMG}: {emg.damaged} stretches are damaged and left out"
+    return emg, [Notice("error", text)]
 
 
 def _damage(folder: Path, files: SessionFiles) -> list[Notice]:

@@ -15,6 +15,7 @@ from typing import BinaryIO
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session.arrow_stream import END_OF_STREAM
+from rigidimeter.core.session.emg_log import EMG, read_emg
 from rigidimeter.core.session.event_log import append_event
 from rigidimeter.core.session.folder import (
     EVENTS,
@@ -100,6 +101,13 @@ def close_files(folder: Path, reason: str, *, force: bool) -> Recovery:
     # A file without even a schema, cut to nothing by an earlier recovery, needs no end.
     stream_ended = samples.stream.closed or (folder / SAMPLES).stat().st_size == 0
     damaged = tuple(f"{SAMPLES}: {lost}" for lost in samples.lost)
+    emg = None
+    try:
+        emg = read_emg(folder)
+    except UserError as error:  # torque and motion are closed all the same
+        damaged += (str(error),)
+    if emg and emg.damaged:
+        damaged += (f"{EMG}: {emg.damaged} stretches",)
     damaged += tuple(f"{EVENTS}: line {number}" for number in log.damaged)
     if files.ended and stream_ended and not log.torn:
         return Recovery(True, n, last_time_s, (), 0, (), damaged)
@@ -111,6 +119,10 @@ def close_files(folder: Path, reason: str, *, force: bool) -> Recovery:
         stop = samples.stream.stop
         end = END_OF_STREAM if stop else b""  # without a schema there is no stream to end
         torn_bytes, name = _cut(folder / SAMPLES, stop, end)
+        moved += name
+    if emg and not emg.closed:
+        bytes_moved, name = _cut(folder / EMG, emg.stop, END_OF_STREAM)
+        torn_bytes += bytes_moved
         moved += name
     if log.torn:
         moved += _cut(events_path, events_path.read_bytes().rfind(b"\n") + 1, b"")[1]
@@ -139,7 +151,7 @@ def _refuse_links(folder: Path) -> None:
         raise UserError(
             f"{folder}: is a link to {os.path.realpath(folder)}; recover that folder itself"
         )
-    for name in (MANIFEST, SAMPLES, EVENTS):
+    for name in (MANIFEST, SAMPLES, EVENTS, EMG):
         path = folder / name
         if path.is_symlink():
             raise UserError(

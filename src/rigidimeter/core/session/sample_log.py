@@ -125,6 +125,8 @@ class SampleLog:
         A stream without its end that is continued; empty for a new one.
     first_batch : int
         The number of the first batch that is written here.
+    schema : pa.Schema
+        Of the columns, where they are not those of the loop's samples.
     """
 
     def __init__(
@@ -135,24 +137,27 @@ class SampleLog:
         *,
         before: bytes = b"",
         first_batch: int = 0,
+        schema: pa.Schema = SAMPLE_SCHEMA,
     ) -> None:
         self._file: BinaryIO = path.open("xb", buffering=0)
         # Threads cost more than they gain on a batch of a few kilobytes.
         options = pa.ipc.IpcWriteOptions(compression="lz4", use_threads=False)
         # Arrow does not look at how much of its bytes a file took, so it writes to memory.
         self._message = io.BytesIO()
-        self._writer = pa.ipc.new_stream(self._message, SAMPLE_SCHEMA, options=options)
+        self._schema, self._covered = schema, columns_text(schema)
+        self._dtypes = [np.dtype(str(kind)) for kind in schema.types]
+        self._writer = pa.ipc.new_stream(self._message, schema, options=options)
         self._rows: list[Sample] = []
         self._batch = max(1, int(BATCH_S * tick_rate_hz))
         self._session_id = session_id
         self._number = first_batch
         # Arrow writes the schema with the first batch; here it must not be lost with one.
-        self._writer.write_batch(_batch(np.empty(0, dtype) for dtype in DTYPES))
+        self._writer.write_batch(_batch(schema, (np.empty(0, dtype) for dtype in self._dtypes)))
         self._message.seek(0)
         self._message.truncate()
-        schema = SAMPLE_SCHEMA.with_metadata(_facts(session_id)).serialize().to_pybytes()
+        header = schema.with_metadata(_facts(session_id)).serialize().to_pybytes()
         try:
-            append_line(self._file, before or with_checksum(schema))
+            append_line(self._file, before or with_checksum(header))
         except OSError:
             self._file.close()
             raise
@@ -173,7 +178,8 @@ class SampleLog:
         """
         self.flush()
         self._put(
-            np.ascontiguousarray(columns[name], dtype) for name, dtype in sample_dtypes().items()
+            np.ascontiguousarray(columns[name], dtype)
+            for name, dtype in zip(self._schema.names, self._dtypes, strict=True)
         )
 
     def flush(self) -> None:
@@ -183,7 +189,7 @@ class SampleLog:
         n = len(self._rows)
         self._put(
             np.fromiter(column, dtype, n)
-            for column, dtype in zip(zip(*self._rows, strict=True), DTYPES, strict=True)
+            for column, dtype in zip(zip(*self._rows, strict=True), self._dtypes, strict=True)
         )
         self._rows.clear()
 
@@ -202,11 +208,11 @@ class SampleLog:
     def _put(self, columns: Iterable[NDArray[Any]]) -> None:
         """Write a batch as Arrow makes it, with its checksum."""
         facts = _facts(self._session_id, batch=self._number)
-        self._writer.write_batch(_batch(columns), custom_metadata=facts)
+        self._writer.write_batch(_batch(self._schema, columns), custom_metadata=facts)
         message = self._message.getvalue()
         self._message.seek(0)
         self._message.truncate()
-        append_line(self._file, with_checksum(message, _COLUMNS))
+        append_line(self._file, with_checksum(message, self._covered))
         self._number += 1
 
 
@@ -214,18 +220,15 @@ def _facts(session_id: str, **facts: int) -> dict[str, str]:
     return {KEY: json.dumps({"checksum": ZEROS, "session_id": session_id, **facts})}
 
 
-def _batch(columns: Iterable[NDArray[Any]]) -> pa.RecordBatch:
+def _batch(schema: pa.Schema, columns: Iterable[NDArray[Any]]) -> pa.RecordBatch:
     """Return the columns of a batch; `pa.array` would load pandas, half a second of a processor."""
     arrays = [
         pa.Array.from_buffers(kind, len(column), [None, pa.py_buffer(column)])
-        for kind, column in zip(SAMPLE_SCHEMA.types, columns, strict=True)
+        for kind, column in zip(schema.types, columns, strict=True)
     ]
-    return pa.RecordBatch.from_arrays(arrays, schema=SAMPLE_SCHEMA)
+    return pa.RecordBatch.from_arrays(arrays, schema=schema)
 
 
 def columns_text(schema: pa.Schema) -> bytes:
     """Return names and types, which each batch's checksum covers: they decide what it means."""
     return ",".join(f"{field.name}:{field.type}" for field in schema).encode()
-
-
-_COLUMNS = columns_text(SAMPLE_SCHEMA)

@@ -121,7 +121,7 @@ def scan_samples(
     stream = scan_stream(content, first, columns_text(schema))
     names = _recorded(schema, {"tick", *wanted}, source)
     fields = [schema.get_field_index(name) for name in names]
-    stream, lengths, tables = _decode(content, header, stream, fields)
+    stream, lengths, tables = decode_batches(content, header, stream, fields)
     columns = _to_columns(tables, names, wanted, source)
     rows = np.concatenate(([0], np.cumsum(lengths, dtype=int)))
     facts = [message.facts for message in (stream.schema, *stream.batches) if message]
@@ -161,7 +161,7 @@ def _recorded(schema: pa.Schema, wanted: Collection[str], source: Path) -> list[
     return [name for name in names if name in wanted]
 
 
-def _decode(
+def decode_batches(
     content: bytes, header: bytes, stream: ArrowStream, fields: list[int]
 ) -> tuple[ArrowStream, list[int], list[pa.Table]]:
     """Return these fields of the batches, and how long each is; those Arrow refuses become gaps."""

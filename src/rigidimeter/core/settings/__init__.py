@@ -1,5 +1,6 @@
 """Validated settings: TOML with the unit in every key."""
 
+from rigidimeter.core.settings.emg_settings import LEAST_RATE_HZ, EmgSettings
 from rigidimeter.core.settings.estimation_settings import (
     FEWEST_LINES,
     USABLE_FRACTION_OF_RATE,

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Self
+from typing import Any, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from rigidimeter.core.settings.emg_settings import EmgSettings
 from rigidimeter.core.settings.estimation_settings import (
     DiagnosticsSettings,
     EstimationSettings,
@@ -132,12 +133,21 @@ class Settings(Section):
     online: OnlineSettings = OnlineSettings()
     commissioning: CommissioningSettings = CommissioningSettings()
     sharing: SharingSettings = SharingSettings()
+    emg: EmgSettings = EmgSettings()
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         for sentence in _does_not_fit(self):
             raise ValueError(sentence)
         return self
+
+    @model_serializer(mode="wrap")
+    def _without_emg(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out EMG where none is recorded: a session without it is as it always was."""
+        values = dict(dump(self))
+        if self.emg.source == "none":
+            values.pop("emg", None)
+        return values
 
 
 def _does_not_fit(settings: Settings) -> Iterator[str]:

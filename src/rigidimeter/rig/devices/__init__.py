@@ -82,6 +82,7 @@ from rigidimeter.rig.devices.cia402.state_words import (
     velocity_torque_of,
 )
 from rigidimeter.rig.devices.composed import ComposedRig, Home
+from rigidimeter.rig.devices.emg_sources import DaqEmg, open_emg, require_emg
 from rigidimeter.rig.devices.enable_line import SerialEnableLine
 from rigidimeter.rig.devices.motion_range import (
     LEAST_DEG,

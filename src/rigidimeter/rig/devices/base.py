@@ -19,6 +19,9 @@ from dataclasses import dataclass, field
 from math import nan
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rigidimeter.core.errors import UserError
 from rigidimeter.rig.guard import Cause
 
@@ -233,3 +236,30 @@ class Rig(Protocol):
 
     def close(self) -> None:
         """Remove the power and close the connections. Safe at any time and when repeated."""
+
+
+class EmgSamples(NamedTuple):
+    """What came since the last call.
+
+    Attributes
+    ----------
+    source_time_s : array, shape (n,)
+        On the source's clock.
+    monotonic_offset_s : float
+        To be added for CLOCK_MONOTONIC.
+    emg_v : array, shape (n, muscles)
+    """
+
+    source_time_s: NDArray[np.float64]
+    monotonic_offset_s: float
+    emg_v: NDArray[np.float64]
+
+
+class EmgSource(Protocol):
+    """A source of EMG, which is read in a process of its own: its calls may wait."""
+
+    def read(self) -> EmgSamples:
+        """Return the samples since the last call, none if there are none."""
+
+    def close(self) -> None:
+        """Let go of it."""

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigidimeter.core.settings import RigSettings, SubjectSettings
 from rigidimeter.core.units import rad_from_deg
 from rigidimeter.model import (
-    BLOCK_TICKS,
     SAME_TIME_S,
     DriveSideState,
     DriveState,
@@ -27,6 +25,7 @@ from rigidimeter.model import (
     drive_side_step,
     drive_step,
     moment,
+    one_by_one,
     quantised,
     reported_torque_nm,
     rig_streams,
@@ -69,7 +68,7 @@ class SimulatedRig:
             rad_from_deg(m.angle_resolution_deg),
             rad_from_deg(m.velocity_resolution_deg_s),
         )
-        self._noise = _flow(lambda n: t.noise_sd_nm * streams.noise.standard_normal(n))
+        self._noise = one_by_one(lambda n: t.noise_sd_nm * streams.noise.standard_normal(n))
         self._torque_times = sample_times_s(
             t.rate_hz, t.latency_s, t.jitter_s, streams.torque_jitter
         )
@@ -95,7 +94,7 @@ class SimulatedRig:
 
     def _set_subject(self, subject: SubjectSettings) -> None:
         self._subject = subject
-        self._voluntary = _flow(
+        self._voluntary = one_by_one(
             SubjectTorque(subject, self._settings.tick_rate_hz, self._subject_rng.spawn(1)[0]).block
         )
         self.joint = draw_joint(subject, self._joint_rng)
@@ -277,9 +276,3 @@ class _Sensor(NamedTuple):
     stamp_latency_s: float
     resolution: float
     velocity_resolution: float = 0.0
-
-
-def _flow(block: Callable[[int], NDArray[np.float64]]) -> Iterator[float]:
-    """Yield numbers one by one from blocks drawn in advance."""
-    while True:
-        yield from block(BLOCK_TICKS).tolist()

@@ -4,6 +4,7 @@
     loop       the rig, the control loop, nothing else. It stops the rig when the console is silent.
     recorder   from the rings into the session folder. It ends when the session is closed.
     estimator  J, B and K for the operator's eyes. The session goes on without it.
+    emg        EMG from its source into a file beside the samples, where settings ask. The same.
     lsl        what is recorded, as streams for other programs, where settings ask for it. The same.
 
 They share two rings and a page of status, and nothing that could make one wait for another. A
@@ -22,12 +23,14 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import EVENTS, read_events
+from rigidimeter.core.settings import EmgSettings
 from rigidimeter.rig.acquisition.processes.end_signals import held_back, signals_are_orders
 from rigidimeter.rig.acquisition.processes.loop_process import LoopTarget, Realtime, loop_main
 from rigidimeter.rig.acquisition.processes.recorder import Patience, RecordingPlan
@@ -37,6 +40,7 @@ from rigidimeter.rig.acquisition.processes.session_memory import SessionMemory
 from rigidimeter.rig.acquisition.processes.shared_status import SharedStatus
 from rigidimeter.rig.acquisition.processes.status_values import Flag, ProcessCondition, Role
 from rigidimeter.rig.acquisition.processes.watchdog import WatchedProcess
+from rigidimeter.rig.devices.base import EmgSource
 
 RING_S = 60.0
 """For how long the recorder may write nothing before samples are lost."""
@@ -84,6 +88,7 @@ def supervise(
     console: Callable[[SessionMemory], object] = lambda _: None,
     operator_seen_ns: Callable[[], int] | None = None,
     ring_s: float = RING_S,
+    open_emg: Callable[[EmgSettings], EmgSource] | None = None,
 ) -> Ended:
     """Run a session in processes of its own and return how it ended.
 
@@ -106,6 +111,9 @@ def supervise(
         Now, as long as this process lives, if not given.
     ring_s : float
         How much the rings hold.
+    open_emg : callable, optional
+        Connects to the source of EMG where settings name one, in a process of its own; without it
+        EMG is that of the virtual subject.
 
     Raises
     ------
@@ -142,6 +150,12 @@ def supervise(
             if recording.settings.sharing.lsl:
                 sending = (recording.settings, shared.names, patience.stopping_s, me)
                 streamer = start("lsl", _streamer_main, *sending)
+            muscles, emg_remarks = None, None
+            if recording.settings.emg.channels:
+                emg_remarks, theirs = context.Pipe(duplex=False)
+                emg = (recording.settings, open_emg, shared.names, patience.stopping_s, me, theirs)
+                muscles = start("emg", _emg_main, *emg)
+                theirs.close()
             follow = _Follower(shared, console, operator_seen_ns or time.monotonic_ns)
             remarks = _see_through(loop, recorder, status, patience, follow)
             recorder_watch = WatchedProcess(recorder.pid or 0)
@@ -149,8 +163,10 @@ def supervise(
                 remarks += complete(shared, recording, recorder_watch, patience, follow)
             finally:
                 recorder_watch.close()
-            for process in filter(None, (estimator, streamer)):
+            for process in filter(None, (estimator, streamer, muscles)):
                 _end(process, 2.0)
+            if emg_remarks is not None:
+                remarks += _said_of_emg(emg_remarks)
             folder = status.folder() or recording.folder
             outcome, reason, recovered = _outcome(folder)
             if shared.samples.refused:
@@ -278,6 +294,22 @@ def _end(process: BaseProcess, wait_s: float) -> None:
     if process.is_alive():
         process.kill()
         process.join(2.0)
+
+
+def _said_of_emg(remarks: Connection) -> list[str]:
+    """Return what the process of the EMG left to say."""
+    with remarks:
+        try:
+            return list(remarks.recv()) if remarks.poll() else []
+        except EOFError:
+            return ["EMG ended before the session did: its process was ended"]
+
+
+def _emg_main(*arguments: Any) -> None:
+    """Record EMG; what it needs is loaded in its own process alone."""
+    from rigidimeter.rig.acquisition.processes.emg_process import emg_main
+
+    emg_main(*arguments)
 
 
 def _estimator_main(*arguments: Any) -> None:

@@ -49,7 +49,7 @@ class VoltageReader(Protocol):
         """Start sampling; return the model of the card."""
 
     def read(self) -> NDArray[np.float64]:
-        """Return the voltages since the last call, without waiting, shape (samples, 6)."""
+        """Return the voltages since the last call, without waiting, shape (samples, inputs)."""
 
     def stop(self) -> None:
         """Stop sampling; safe when repeated."""
@@ -121,7 +121,12 @@ class AtiAnalogue:
     def connect(self) -> None:
         """Load the card's driver; nothing is sampled yet."""
         if self._reader is None:
-            self._reader = NiReader(self._settings) if self._given is None else self._given
+            s = self._settings
+            self._reader = (
+                NiReader(s.channels, 6, s.rate_hz, s.terminal, s.range_v)
+                if self._given is None
+                else self._given
+            )
 
     def configure(self) -> DeviceFacts:
         """Read the calibration and start sampling.
@@ -233,10 +238,18 @@ class NiReader:
 
     Parameters
     ----------
-    settings : AtiAnalogueSettings
+    channels : str
+        The card's inputs, such as ``Dev1/ai0:5``.
+    inputs : int
+        How many they are.
+    rate_hz : float
+    terminal : {"differential", "single-ended"}
+    range_v : float
     """
 
-    def __init__(self, settings: AtiAnalogueSettings) -> None:
+    def __init__(
+        self, channels: str, inputs: int, rate_hz: float, terminal: str, range_v: float
+    ) -> None:
         try:
             import nidaqmx
         except ImportError as error:
@@ -244,31 +257,32 @@ class NiReader:
                 "voltages of an NI card need nidaqmx: pip install 'rigidimeter[nidaq]'"
             ) from error
         self._nidaqmx: Any = nidaqmx
-        self._settings = settings
+        self._channels, self._inputs, self._rate_hz = channels, inputs, rate_hz
+        self._terminal, self._range_v = terminal, range_v
         self._task: Any = None
 
     def start(self) -> str:
-        """Start a continuous task of six channels."""
-        s, ni = self._settings, self._nidaqmx
+        """Start a continuous task of all inputs."""
+        ni = self._nidaqmx
 
         def begin() -> str:
             constants = ni.constants
             self._task = ni.Task()
             channels = self._task.ai_channels.add_ai_voltage_chan(
-                s.channels,
+                self._channels,
                 terminal_config=constants.TerminalConfiguration.DIFF
-                if s.terminal == "differential"
+                if self._terminal == "differential"
                 else constants.TerminalConfiguration.RSE,
-                min_val=-s.range_v,
-                max_val=s.range_v,
+                min_val=-self._range_v,
+                max_val=self._range_v,
             )
             found = len(channels.channel_names)
-            if found != 6:
-                raise ReaderError(f"{s.channels} is {found} channels; six gauges need 6")
+            if found != self._inputs:
+                raise ReaderError(f"{self._channels} is {found} inputs; {self._inputs} are needed")
             self._task.timing.cfg_samp_clk_timing(
-                s.rate_hz,
+                self._rate_hz,
                 sample_mode=constants.AcquisitionType.CONTINUOUS,
-                samps_per_chan=round(BUFFER_S * s.rate_hz),
+                samps_per_chan=round(BUFFER_S * self._rate_hz),
             )
             self._task.start()
             return str(self._task.devices[0].product_type)
@@ -281,9 +295,9 @@ class NiReader:
         def take() -> NDArray[np.float64]:
             ready = self._task.in_stream.avail_samp_per_chan
             if ready == 0:
-                return np.empty((0, 6))
+                return np.empty((0, self._inputs))
             columns = self._task.read(number_of_samples_per_channel=ready, timeout=0.0)
-            return np.asarray(columns, dtype=np.float64).reshape(6, ready).T
+            return np.asarray(columns, dtype=np.float64).reshape(self._inputs, ready).T
 
         return np.asarray(self._tried(take))
 

@@ -1,0 +1,205 @@
+"""The process of the EMG: from its source into a file of its own beside the samples.
+
+It waits for source and disk, and nothing waits for it: not the loop, not the recorder. Where the
+source gives nothing or breaks off, EMG is missing and nothing else; what is missing is named when
+the session has ended, and when it is read.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import numpy as np
+
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.session import EMG, EmgLog, read_manifest
+from rigidimeter.core.settings import EmgSettings, Settings
+from rigidimeter.model import VirtualMuscles
+from rigidimeter.rig.acquisition.processes.end_signals import leave_to_the_others
+from rigidimeter.rig.acquisition.processes.ring import SampleReader
+from rigidimeter.rig.acquisition.processes.session_memory import SessionMemory
+from rigidimeter.rig.acquisition.processes.status_values import Role
+from rigidimeter.rig.devices.base import EmgSamples, EmgSource
+
+POLL_S = 0.05
+NICENESS = 5
+STALLED_S = 0.5
+"""EMG that is missing for longer is named."""
+WAITING_S = 60.0
+"""So much EMG waits for a disk that takes nothing."""
+SYNC_S = 1.0
+
+
+class _Events:
+    """What the process needs of the events: when the clock began, and which epoch is what."""
+
+    def __init__(self, shared: SessionMemory) -> None:
+        self._ring, self._next = shared.events, 0
+        self.origin_s: float | None = None
+        self.conditions: dict[int, str] = {}
+
+    def follow(self) -> None:
+        """Take the events since the last call, those that are still in the ring."""
+        written = self._ring.written
+        for number in range(max(self._next, written - self._ring.capacity // 2), written):
+            facts = self._ring.get(number).facts
+            if facts.get("event") == "clock_started":
+                self.origin_s = float(facts["monotonic_s"])
+            elif facts.get("event") == "epoch_started":
+                self.conditions[int(facts["epoch"])] = str(facts["condition"])
+        self._next = written
+
+
+class _Virtual:
+    """The EMG of the virtual subject: that of the ticks in the ring."""
+
+    def __init__(self, settings: Settings, shared: SessionMemory, events: _Events) -> None:
+        first = settings.subject[settings.protocol.blocks[0].condition]
+        self._muscles = VirtualMuscles(settings, first.relaxed)
+        self._reader, self._events = SampleReader(shared.samples), events
+        self._rate_hz, self._count = settings.emg.rate_hz, 0
+
+    def read(self) -> EmgSamples:
+        rows, _ = self._reader.read()
+        self._events.follow()  # an epoch's beginning is written before its first tick
+        emg_v = self._muscles.take(rows["tick"], rows["epoch"], self._events.conditions)
+        source_s = (self._count + np.arange(len(emg_v))) / self._rate_hz
+        self._count += len(emg_v)
+        return EmgSamples(source_s, self._events.origin_s or 0.0, emg_v)
+
+    def close(self) -> None:
+        """Do nothing: there is no connection."""
+
+
+class _Written:
+    """The file, and what waits for it; a disk that refuses is tried again."""
+
+    def __init__(self, settings: Settings, folder: Path) -> None:
+        emg = settings.emg
+        session_id = str(read_manifest(folder).get("session_id", ""))
+        self._log = EmgLog(folder, emg.channels, emg.rate_hz, session_id)
+        self._waiting: deque[EmgSamples] = deque()
+        self._most = WAITING_S * emg.rate_hz
+        self._synced_s = time.monotonic()
+        self.lost = 0
+
+    def append(self, samples: EmgSamples) -> None:
+        self._waiting.append(samples)
+        while sum(len(each.emg_v) for each in self._waiting) > self._most:
+            self.lost += len(self._waiting.popleft().emg_v)
+        with suppress(OSError):
+            while self._waiting:
+                self._log.append(*self._waiting[0])
+                self._waiting.popleft()
+            if time.monotonic() - self._synced_s > SYNC_S:
+                self._synced_s = time.monotonic()
+                os.fsync(self._log.fileno())
+
+    def close(self) -> None:
+        self.lost += sum(len(each.emg_v) for each in self._waiting)
+        with suppress(OSError):
+            self._log.close()
+
+
+OpenEmg = Callable[[EmgSettings], EmgSource]
+"""Connects to a source. It must be picklable: a function of a module."""
+
+
+def emg_main(
+    settings: Settings,
+    open_emg: OpenEmg | None,
+    names: tuple[str, str, str],
+    lost_s: float,
+    console_pid: int,
+    remarks: Connection,
+) -> None:
+    """Record EMG until the session has ended; the target of its process.
+
+    Parameters
+    ----------
+    settings : Settings
+    open_emg : callable or None
+        None for the virtual subject's.
+    names : tuple of str
+        Of the sample ring, the event ring and the shared status.
+    lost_s : float
+        Recorder and loop both silent for so long have ended.
+    console_pid : int
+        The process that started this one.
+    remarks : Connection
+        Takes a list of sentences at the end: what is missing.
+    """
+    leave_to_the_others()
+    os.nice(NICENESS)
+    shared = SessionMemory.attach_or_end(names)
+    found: list[str] = []
+    try:
+        found = _record(settings, open_emg, shared, lost_s, console_pid)
+    except (UserError, OSError) as error:
+        found = [f"EMG was not recorded: {error}"]
+    finally:
+        with suppress(OSError):
+            remarks.send(found)
+        shared.leave()
+
+
+def _record(
+    settings: Settings,
+    open_emg: OpenEmg | None,
+    shared: SessionMemory,
+    lost_s: float,
+    console_pid: int,
+) -> list[str]:
+    """Record; return what is missing, as sentences."""
+    status, events = shared.status, _Events(shared)
+    source = open_emg(settings.emg) if open_emg else _Virtual(settings, shared, events)
+    folder = status.folder()
+    if folder is None:
+        raise UserError("the session has no folder")
+    written = _Written(settings, folder)
+    missing: list[str] = []
+    over, last_s, now_s = False, 0.0, 0.0
+    try:
+        while not over:
+            over = os.getppid() != console_pid or status.ended(Role.LOOP, lost_s)
+            events.follow()
+            source_s, offset_s, emg_v = source.read()
+            if events.origin_s is not None:
+                now_s = time.monotonic() - events.origin_s
+                time_s = source_s + (offset_s - events.origin_s)
+                since = time_s >= 0.0  # the session's clock began
+                if since.any():
+                    first_s = float(time_s[since][0])
+                    missing += _gap(last_s, first_s)
+                    last_s = float(time_s[-1])
+                written.append(
+                    EmgSamples(source_s[since], offset_s - events.origin_s, emg_v[since])
+                )
+            if not over:
+                time.sleep(POLL_S)
+    except (UserError, OSError) as error:
+        missing.append(f"EMG ended at {last_s:.1f} s: {error}")
+    else:
+        missing += _gap(last_s, now_s)
+    finally:
+        source.close()
+        written.close()
+    if written.lost:
+        missing.append(f"{written.lost} samples of EMG found no room on the disk")
+    if status.folder() != folder:
+        missing.append(f"EMG is in {folder / EMG}, not with the samples; copy it to them")
+    return missing
+
+
+def _gap(last_s: float, next_s: float) -> list[str]:
+    """Return a sentence where EMG was missing."""
+    if not next_s - last_s > STALLED_S or math.isinf(next_s):
+        return []
+    return [f"EMG is missing from {last_s:.1f} to {next_s:.1f} s"]
