@@ -17,8 +17,12 @@ import pytest
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import SessionWriter, read_emg
 from rigidimeter.core.settings import EmgSettings, Settings, parse_settings
-from rigidimeter.rig.acquisition.processes import ProcessCondition, Role, SessionMemory
-from rigidimeter.rig.acquisition.processes.emg_process import emg_main
+from rigidimeter.rig.acquisition.processes import (
+    ProcessCondition,
+    Role,
+    SessionMemory,
+    emg_main,
+)
 from rigidimeter.rig.devices import DaqEmg, ReaderError, open_emg, require_emg
 
 CONFIG = """\

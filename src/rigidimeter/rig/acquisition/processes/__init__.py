@@ -1,5 +1,6 @@
 """The processes around the loop, the memory they share, and what they ask of the machine."""
 
+from rigidimeter.rig.acquisition.processes.emg_process import emg_main
 from rigidimeter.rig.acquisition.processes.end_signals import (
     HELD_BACK,
     held_back,
