@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 OUT ?= demo-study
 
-.PHONY: install demo test check bench bench-loop hazards mutation golden fuzz clean
+.PHONY: install demo test check bench bench-loop hazards mutation golden fuzz docs-pictures clean
 
 install: $(STAMP)
 
@@ -57,6 +57,10 @@ mutation: install
 # Look at the difference of tests/golden/answers.txt before you commit it.
 golden: install
 	$(BIN)/python -m tests.golden
+
+# Also the output that the tutorials show; it needs Chromium. Look at them before you commit them.
+docs-pictures: install
+	$(BIN)/python -m tests.docs.pictures
 
 SEED ?= 1
 CASES ?= 4000

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ STARTS_S = 90.0
 
 
 class Console:
-    """A running `rigidimeter console`.
+    """A running `rigidimeter console`; `words` in place of its other arguments, run in `folder`.
 
     Attributes
     ----------
@@ -34,15 +34,21 @@ class Console:
     """
 
     def __init__(
-        self, folder: Path, *options: str, protocol: str = "", stdin: int = subprocess.DEVNULL
+        self,
+        folder: Path,
+        *options: str,
+        protocol: str = "",
+        stdin: int = subprocess.DEVNULL,
+        words: Sequence[str] = (),
     ) -> None:
         self.place, self.sessions = folder, folder / "sessions"
-        arguments = [sys.executable, "-m", "rigidimeter", "console"]
+        arguments = [sys.executable, "-m", "rigidimeter", "console", "--port", "0"]
         if protocol:
             (folder / "protocol.toml").write_text(protocol)
             arguments.append(str(folder / "protocol.toml"))
         self.process = subprocess.Popen(
-            [*arguments, "--out", str(self.sessions), "--port", "0", *options],
+            [*arguments, *(words or ("--out", str(self.sessions), *options))],
+            cwd=folder if words else None,
             stdin=stdin,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

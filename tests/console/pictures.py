@@ -1,12 +1,10 @@
-"""Pictures of an operator's day for its tutorial: `python -m tests.console.pictures FOLDER`.
+"""Pictures of an operator's day for its tutorial, made by `python -m tests.docs.pictures`.
 
 The day runs on the virtual rig in real time and takes about three minutes.
 """
 
 from __future__ import annotations
 
-import sys
-import tempfile
 from pathlib import Path
 
 from PIL import Image
@@ -24,6 +22,7 @@ from tests.console.operator_day import (
     rate,
     study_report,
 )
+from tests.docs.pictures import ON_PAGE, seen
 
 PROTOCOL = """
 prbs.duration_s = 8.0
@@ -48,8 +47,8 @@ SEEN_MS = 6000
 """After that time in an epoch J, B and K are shown."""
 
 
-def take(page: Page, folder: Path, name: str, height: int = HEIGHT) -> None:
-    """Take a picture of what is seen without scrolling."""
+def take(page: Page, folder: Path, name: str, height: int = HEIGHT) -> list[str]:
+    """Take a picture of what is seen without scrolling; return the words of buttons and labels."""
     page.set_viewport_size({"width": WIDTH, "height": height})
     page.wait_for_timeout(400)
     path = folder / f"{name}.png"
@@ -57,6 +56,7 @@ def take(page: Page, folder: Path, name: str, height: int = HEIGHT) -> None:
     with Image.open(path) as taken:
         small = taken.convert("RGB").quantize(COLOURS, Image.Quantize.FASTOCTREE)
     small.save(path, optimize=True)
+    return seen(page, ON_PAGE)
 
 
 def run_rest(desk: Console, page: Page, name: str, button: str, until: str) -> None:
@@ -82,8 +82,9 @@ def run_rest(desk: Console, page: Page, name: str, button: str, until: str) -> N
     raise RuntimeError("the machine is too busy for these pictures")
 
 
-def pictures(folder: Path, sessions: Path) -> None:
-    """Run the day and take its pictures."""
+def pictures(folder: Path, sessions: Path) -> dict[str, list[str]]:
+    """Run the day and take its pictures; return the words of each."""
+    words: dict[str, list[str]] = {}
     desk = Console(sessions, protocol=PROTOCOL)
     with open_browser() as opened:
         page = open_page(opened, desk)
@@ -92,11 +93,11 @@ def pictures(folder: Path, sessions: Path) -> None:
                            "stim_ma": "2,5", "stim_width": "60"}.items():  # fmt: skip
             fill(page, key, value)
         page.wait_for_timeout(1000)
-        take(page, folder, "form", FORM_HEIGHT)
+        words["form"] = take(page, folder, "form", FORM_HEIGHT)
         start(page, operator="Kim")
         in_epoch(page, "1 of 6")
         page.wait_for_timeout(SEEN_MS)
-        take(page, folder, "epoch")
+        words["epoch"] = take(page, folder, "epoch")
         rate(page, 1, "2")
         in_epoch(page, "2 of 6")
         page.keyboard.press("Escape")
@@ -104,7 +105,7 @@ def pictures(folder: Path, sessions: Path) -> None:
         first = desk.folder()
         session = opened_session(page, first.name)
         session.get_by_role("button", name="Estimate").hover()
-        take(page, folder, "stopped")
+        words["stopped"] = take(page, folder, "stopped")
         third = "document.getElementById('epoch').textContent === '3 of 6'"
         run_rest(desk, page, first.name, "Run what is left: 5", f"{RUNS} && {third}")
         second = desk.folder()
@@ -112,7 +113,7 @@ def pictures(folder: Path, sessions: Path) -> None:
         page.close()
         desk = Console(sessions, protocol=PROTOCOL)
         page = open_page(opened, desk)
-        take(page, folder, "restarted")
+        words["restarted"] = take(page, folder, "restarted")
         opened_session(page, second.name).get_by_role("button", name="Recover").click()
         page.get_by_text("is closed: ").wait_for()
         run_rest(desk, page, second.name, "Run what is left: 4", SUCCESS)
@@ -121,15 +122,9 @@ def pictures(folder: Path, sessions: Path) -> None:
         session.get_by_role("button", name="Leave out").first.click()
         page.locator("input[data-field=reason]").fill("coughed")
         page.locator("input[data-field=by]").fill("Kim")
-        take(page, folder, "leave-out", LIST_HEIGHT)
+        words["leave-out"] = take(page, folder, "leave-out", LIST_HEIGHT)
         page.get_by_role("dialog").get_by_role("button", name="Leave out").click()
         run_rest(desk, page, first.name, "Repeat", SUCCESS)
-        take(study_report(page), folder, "report", REPORT_HEIGHT)
+        words["report"] = take(study_report(page), folder, "report", REPORT_HEIGHT)
     desk.close()
-
-
-if __name__ == "__main__":
-    out = Path(sys.argv[1])
-    out.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix="operator-day-") as name:
-        pictures(out, Path(name))
+    return words

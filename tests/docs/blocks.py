@@ -1,0 +1,181 @@
+"""Runs the shell blocks of documents in order, and compares or rewrites the output that they show.
+
+    python -m tests.docs.blocks            compare
+    python -m tests.docs.blocks --write    rewrite what differs
+
+Each document has a folder of its own. In it the blocks ``sh`` are run, and those in a comment,
+``<!-- sh``, which a reader does not see; ``toml NAME`` is written as a file. A block
+``text output`` shows what the commands since the last one printed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from tests.console.opened import Console
+from tests.docs.markdown import ROOT
+
+from rigidimeter.cli.main import main
+
+TUTORIALS = ROOT / "docs" / "tutorials"
+RUN = (TUTORIALS / "first-study.md", TUTORIALS / "operator-day.md")
+
+_BLOCK = re.compile(r"^(?:```|<!-- (?=sh))([^\n]*)\n(.*?)^(?:```|-->)$", re.DOTALL | re.M)
+_NUMBER = re.compile(r"(?<![\w-])[+−-]?\d+(?:[.,]\d+)?(?![\w.]\d)")
+_VARIES = (
+    (re.compile(r"(?<=Done in )\d+(?= s)"), "…"),
+    (re.compile(r"\d{4}-\d\d-\d\d|\d\d:\d\d(:\d\d)?"), "…"),
+)
+_LAST_PLACES = 5.0
+_SHARE = 0.3
+
+
+class Shown(NamedTuple):
+    """A block of output: where its text lies in the document, the text, and what was printed."""
+
+    path: Path
+    begin: int
+    text: str
+    printed: str
+
+    @property
+    def where(self) -> str:
+        """The document and its first line."""
+        return f"{self.path.relative_to(ROOT)}: {self.text.partition(chr(10))[0].strip()}"
+
+
+def run(path: Path, folder: Path) -> Iterator[Shown]:
+    """Run the blocks of a document in a folder; yield each block of output.
+
+    Raises
+    ------
+    RuntimeError
+        If a command ends with another status than 0.
+    """
+    printed = ""
+    for block in _BLOCK.finditer(path.read_text("utf-8")):
+        kind, _, more = block[1].partition(" ")
+        if kind == "sh":
+            printed += "".join(_command(line, folder) for line in lines_of(block[2]))
+        elif kind == "toml" and more:
+            (folder / more).write_text(block[2], "utf-8")
+        elif block[1] == "text output":
+            yield Shown(
+                path, block.start(2), block[2], printed.replace(f"{folder.resolve()}", "...")
+            )
+            printed = ""
+
+
+def lines_of(text: str) -> list[str]:
+    """Return the commands of a block."""
+    return [line for line in text.replace("\\\n", " ").splitlines() if line.strip()]
+
+
+def _command(line: str, folder: Path) -> str:
+    words = shlex.split(line, comments=True)
+    if words[:2] == ["rigidimeter", "console"]:  # it runs until it is stopped
+        Console(folder, words=words[2:]).close()
+        return ""
+    if words[0] == "rigidimeter":
+        return _main(words, folder)
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join((f"{ROOT / 'src'}", f"{ROOT}")),
+        "PATH": os.pathsep.join((f"{Path(sys.executable).parent}", os.environ["PATH"])),
+    }
+    ran = subprocess.run(
+        line, shell=True, cwd=folder, capture_output=True, text=True, check=False, timeout=120,
+        env=environment,
+    )  # fmt: skip
+    if ran.returncode:
+        raise RuntimeError(f"{line}: {ran.stderr}")
+    return ran.stdout
+
+
+def _main(words: list[str], folder: Path) -> str:
+    """Run a command in this process and return what it printed."""
+    out, said, status = io.StringIO(), io.StringIO(), 0
+    before, sys.argv = sys.argv, words
+    try:
+        with (
+            contextlib.chdir(folder),
+            contextlib.redirect_stdout(out),
+            contextlib.redirect_stderr(said),
+        ):
+            main()
+    except SystemExit as stop:
+        status = int(stop.code or 0)
+    finally:
+        sys.argv = before
+    if status:
+        raise RuntimeError(f"{shlex.join(words)}: {said.getvalue()}")
+    return out.getvalue()
+
+
+def differs(shown: str, printed: str) -> str:
+    """Return in what the words differ, or a number by more than another machine explains."""
+    one, other = _words(shown), _words(printed)
+    for a, b in zip(one, other, strict=False):
+        if not _alike(a, b):
+            at = one.index(a)
+            return f"{' '.join(one[max(at - 5, 0) : at + 5])!r}: {a} is printed as {b}"
+    return "" if len(one) == len(other) else f"{len(other)} words are printed, {len(one)} shown"
+
+
+def _words(text: str) -> list[str]:
+    for pattern, name in _VARIES:
+        text = pattern.sub(name, text)
+    return text.split()
+
+
+def _alike(one: str, other: str) -> bool:
+    if _NUMBER.sub("#", one) != _NUMBER.sub("#", other):
+        return False
+    return all(map(_close, _NUMBER.findall(one), _NUMBER.findall(other)))
+
+
+def _close(one: str, other: str) -> bool:
+    a, b = (float(text.replace("−", "-").replace(",", ".")) for text in (one, other))
+    place = 10.0 ** -len(one.replace(",", ".").partition(".")[2])
+    return abs(a - b) <= max(_LAST_PLACES * place, _SHARE * abs(a))
+
+
+def write(shown: list[Shown]) -> int:
+    """Write what was printed into one document; return how many blocks differed."""
+    path, changed = shown[0].path, 0
+    text = path.read_text("utf-8")
+    for one in reversed(shown):
+        if _words(one.text) != _words(one.printed):
+            changed += 1
+            new = one.printed.strip("\n") + "\n"
+            text = text[: one.begin] + new + text[one.begin + len(one.text) :]
+    path.write_text(text, "utf-8")
+    return changed
+
+
+def _all(*, rewrite: bool) -> int:
+    status = 0
+    for path in RUN:
+        with tempfile.TemporaryDirectory(prefix="blocks-") as name:
+            shown = list(run(path, Path(name)))
+        if rewrite and shown:
+            print(f"{path.relative_to(ROOT)}: {write(shown)} of {len(shown)} blocks rewritten")
+        for one in () if rewrite else shown:
+            if why := differs(one.text, one.printed):
+                print(f"{one.where}: {why}")
+                status = 1
+    return status
+
+
+if __name__ == "__main__":
+    raise SystemExit(_all(rewrite="--write" in sys.argv[1:]))
