@@ -47,7 +47,8 @@ def test_the_demo_writes_what_examples_of_help_name(ran) -> None:
     ("shown", "printed", "why"),
     [
         ("K 1.77 lower\nDone in 19 s", "K  1.79 lower Done in 278 s", ""),
-        ("K −13.1 % (+0.5)", "K −13.9 % (−0.0)", "(+0.5) is printed as (−0.0)"),
+        ("K −13.1 % (+0.5) ± 0.011", "K −13.9 % (0.0) ± 0.025", ""),
+        ("K −13.1 %", "K −33.9 %", "−13.1 is printed as −33.9"),
         ("K 1.77 lower", "K 1.77 higher", "lower is printed as higher"),
         ("K 1.77 N·m", "K 2.77 N·m", "1.77 is printed as 2.77"),
         ("K 1.77", "K 1.77 N·m", "3 words are printed, 2 shown"),
