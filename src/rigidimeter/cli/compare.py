@@ -102,7 +102,7 @@ def compare(
         try:
             _write(study.result, *outputs, str(folder))
             show(comparison_blocks(study.result, full=full))
-            _say_changes(study.result, folder, kept=not study.not_kept)
+            _say_changes(study.result, folder, kept=group is None and not study.not_kept)
         finally:
             status = study.say()
         raise typer.Exit(status)

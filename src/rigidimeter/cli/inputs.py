@@ -175,6 +175,8 @@ def analyse_study_folder(
 ) -> Analysed:
     """Read and analyse a study folder, and keep the analysis in it.
 
+    That of one group is not kept: what changed since the last one would be the other groups.
+
     Raises
     ------
     UserError
@@ -185,7 +187,7 @@ def analyse_study_folder(
         result = analyse_study(read, seed=seed, resamples=resamples, progress=meter.advance)
     changes, not_kept = [], ""
     try:
-        changes = keep(read, result)
+        changes = keep(read, result) if group is None else []
     except UserError as error:
         not_kept = str(error)
     # It comes from the tables and the sessions that count.

@@ -26,9 +26,9 @@ from rigidimeter.analysis.study.rating_table import (
 )
 from rigidimeter.analysis.study.ratings_found import RatingsFound, fit_ratings, with_days
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import TextTable
+from rigidimeter.core.files import TextTable, lines_text
 from rigidimeter.core.records import Notice
-from rigidimeter.core.study_files import StudyFolder
+from rigidimeter.core.study_files import StudyFolder, TableRow
 
 _ONE_DAY = (
     "each condition was rated on one day, so how much days differ is unknown, and the contrast is "
@@ -73,6 +73,7 @@ def _rows(read: StudyFolder, names: Naming) -> tuple[list[Rating], list[Notice]]
     days = {(row["subject"], row["day"]) for row in read.sessions}
     rows: list[Rating] = []
     notices: list[Notice] = []
+    unrecorded: list[TableRow] = []
     for row in read.ratings:
         condition = names.named(row["condition"])
         try:
@@ -96,11 +97,16 @@ def _rows(read: StudyFolder, names: Naming) -> tuple[list[Rating], list[Notice]]
                 Rating(row.line, condition, score, row["examiner"], row["subject"], row["day"])
             )
             if (row["subject"], row["day"]) not in days:
-                text = (
-                    f"{row.where}: there is no session of subject {row['subject']} on day "
-                    f"{row['day']}; the rating is used all the same"
-                )
-                notices.append(Notice("warning", text))
+                unrecorded.append(row)
+    if unrecorded:
+        first = unrecorded[0]
+        are = "the rating is" if len(unrecorded) == 1 else f"these {len(unrecorded)} ratings are"
+        text = (
+            f"{first.source}, {lines_text([row.line for row in unrecorded])}: there is no session "
+            f"of subject {first['subject']} on day {first['day']}"
+            f"{' and others' if len(unrecorded) > 1 else ''}; {are} used all the same"
+        )
+        notices.append(Notice("warning", text))
     return rows, notices
 
 

@@ -309,3 +309,20 @@ def test_a_third_condition_is_compared_with_the_first_and_p_is_adjusted_for_all(
     page = (tmp_path / "page/report.html").read_text()
     assert "LOW against OFF" in page
     assert "DBS against OFF" in page
+
+
+def test_ratings_without_a_session_are_one_message_and_a_group_is_not_stored(
+    study: Path, rigidimeter
+) -> None:
+    with (study / "ratings.csv").open("a") as file:
+        file.writelines(f"M1,{day},OFF,A,2.0\n" for day in (8, 9))
+    ran = rigidimeter("compare", study, "--resamples", "0")
+    (line,) = [one for one in ran.err.splitlines() if "there is no session of subject" in one]
+    assert "M1 on day 8 and others; these 2 ratings are used all the same" in line
+    before = (study / "analysis" / "comparison.json").read_bytes()
+    table = study / "sessions.csv"
+    head, *rows = table.read_text().splitlines()
+    table.write_text("\n".join([f"{head},group", *(f"{row},patients" for row in rows)]) + "\n")
+    ran = rigidimeter("compare", study, "--resamples", "0", "--group", "patients")
+    assert "group patients" in ran.out
+    assert (study / "analysis" / "comparison.json").read_bytes() == before
