@@ -123,6 +123,7 @@ def _facts(result: StudyResult) -> dict[str, Any]:
         "offsets": series([f"each {OFFSETS.get(name, name)}" for name in estimated]),
         "by_epochs": any(c.test is not None for c in result.comparisons),
         "by_days": tested,
+        "primary": _primary(result),
         "day_tests": day_tests,
         "all_paired": all(words.startswith("paired") for words in day_tests),
         "day_medians": any(not math.isnan(one.p_days) for one in tested),
@@ -211,6 +212,13 @@ def day_tests_in_words(result: StudyResult) -> list[str]:
     return [
         c.days.test for c in result.comparisons if c.days and c.days.test and c.measure != RATING
     ]
+
+
+def _primary(result: StudyResult) -> str:
+    """Return the primary measures, where others were compared beside them; else empty."""
+    names = [c.measure for c in result.comparisons if c.days and not math.isnan(c.days.p)]
+    primary = [one.short for one in names if result.primary.role(one) == "primary"]
+    return series(primary) if len(primary) < len(names) else ""
 
 
 def method_of(name: str) -> Method:

@@ -33,6 +33,10 @@ def test_methods_hold_the_facts_of_the_study(study: StudyResult) -> None:
     for name in ("Werning", "Young", "Gilson", "Kenward", "Hodges", "Efron", "Holm"):
         assert sum(name in reference for reference in prose.references) >= 1
     assert "Newcombe" not in text
+    assert (
+        "(Holm 1979): B and K were primary, other measures secondary and adjusted apart, and J was "
+        "not adjusted, since it checks the instrument."
+    ) in text
 
 
 def test_methods_state_the_torque_that_was_commanded_to_the_epochs_that_count(
