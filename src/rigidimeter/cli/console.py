@@ -43,6 +43,17 @@ def require_page() -> None:
         )
 
 
+def require_full_waits(clock_speed: float, *, virtual: bool) -> None:
+    """Refuse a faster clock of the waits where a person is waiting.
+
+    Raises
+    ------
+    UserError
+    """
+    if clock_speed != 1.0 and not virtual:
+        raise UserError("--clock-speed: is for the virtual rig; a person has to wait the full time")
+
+
 def console(
     protocol: Path | None = argument(
         "[PROTOCOL.toml]", "Settings that the form begins with.", None
@@ -53,10 +64,19 @@ def console(
     port: int = PORT,
     token_file: Path | None = TOKEN_FILE,
     no_token: bool = NO_TOKEN,
+    clock_speed: float = PAGE.option(
+        "--clock-speed X",
+        "With a plan on the virtual rig: waits pass so many times faster. Recorded.",
+        1.0,
+        min=1.0,
+        max=100000.0,
+    ),
     priority: int = PRIORITY,
     cpu: int | None = CPU,
 ) -> None:
     """Run sessions from a page in a browser: plan, run, look, repeat.
+
+    Where --out is a study with a plan, the page offers the session that is due, after its wait.
 
     The page's heartbeat is a dead-man's switch: a page that is closed, frozen or cut off stops the
     arm. The printed link holds a token, without which nobody looks or acts. SPACE and e in this
@@ -78,5 +98,8 @@ def console(
         echo(line, err=True)
     settings = load_settings(protocol)
     name = protocol.name if protocol is not None else "the defaults"
-    place = Place(out.absolute(), settings, name, rig, settings_path=protocol)
+    require_full_waits(clock_speed, virtual=rig is None)
+    place = Place(
+        out.absolute(), settings, name, rig, settings_path=protocol, clock_speed=clock_speed
+    )
     serve_page(place, Realtime(priority=priority, cpu=cpu), address)

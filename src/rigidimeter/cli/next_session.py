@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from rigidimeter.cli.console import require_full_waits
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.plan_text import due_of, due_words, plan_of, subject_of, wait_words
 from rigidimeter.cli.planned_session import PlannedSession, new_session
 from rigidimeter.cli.progress import Meter
 from rigidimeter.core.errors import UserError
@@ -16,12 +16,15 @@ from rigidimeter.core.study_files import (
     DueBlock,
     StudyPlan,
     add_change,
+    begun_session,
+    due_words,
     extend_study,
-    named_block,
+    next_block,
+    next_words,
     parse_change,
-    recorded_blocks,
-    session_facts,
-    session_settings_of,
+    plan_of,
+    subject_of,
+    wait_words,
 )
 
 _TICK_S = 0.5
@@ -82,8 +85,7 @@ class NextSession:
     def planned(self) -> PlannedSession:
         """Return the session as it is to be run now, with its place in the plan."""
         said = self.said
-        settings = session_settings_of(self.plan, self.due)
-        about = session_facts(
+        begun = begun_session(
             self.plan,
             self.due,
             datetime.now(UTC),
@@ -92,7 +94,7 @@ class NextSession:
             speed=said.speed,
             reason=said.begin_anyway,
         )
-        return new_session(settings, about, self.plan.folder / self.due.block.protocol)
+        return new_session(begun.settings, begun.about, begun.source)
 
     def wait(self) -> None:
         """Count down to the end of the wait.
@@ -132,8 +134,7 @@ def next_session(study: Path, said: SaidOfSession, *, virtual: bool) -> NextSess
         If the study has no plan or nothing is left of it, the subject or session is not in it, or
         the clock is speeded up where a person is waiting.
     """
-    if said.speed != 1.0 and not virtual:
-        raise UserError("--clock-speed: is for the virtual rig; a person has to wait the full time")
+    require_full_waits(said.speed, virtual=virtual)
     plan = plan_of(study)
     subject = subject_of(plan, said.subject)
     if said.stimulation:
@@ -141,7 +142,7 @@ def next_session(study: Path, said: SaidOfSession, *, virtual: bool) -> NextSess
     if said.block:
         found = _named(plan, subject, said.block)
     else:
-        due = due_of(plan, subject)
+        due = next_block(plan, subject)
         if due is None:
             raise UserError(
                 f"{study}: all sessions of {subject} are recorded; name one with --block DAY/ORDER "
@@ -156,8 +157,7 @@ def added(session: NextSession) -> None:
     """Add the recorded session to the study, and say what is left of the plan."""
     for line in extend_study(session.plan.folder, [session.folder]):
         echo(line)
-    due = due_of(session.plan, session.due.block.subject)
-    echo(due_words(session.plan, due) if due else "All sessions of the plan are recorded.")
+    echo(next_words(session.plan, session.due.block.subject))
 
 
 def refuse_with_next(
@@ -214,7 +214,7 @@ def _named(plan: StudyPlan, subject: str, text: str) -> DueBlock:
     day, _, order = text.rpartition("/")
     found = None
     if order.isdigit():
-        found = named_block(plan, recorded_blocks(plan.folder), (subject, day, int(order)))
+        found = next_block(plan, subject, (day, int(order)))
     if found is None:
         raise UserError(
             f"--block {text}: the plan of {subject} has no such session; write its day and its "

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.planned_session import (
@@ -20,8 +21,9 @@ from rigidimeter.cli.planned_session import (
     write_nwb_beside,
 )
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.session import count_epochs, rest_of
+from rigidimeter.core.session import codes_of, count_epochs, in_codes, rest_of
 from rigidimeter.core.settings import changed_settings
+from rigidimeter.core.study_files import next_words, plan_of
 from rigidimeter.rig.acquisition.processes import Ended, Realtime, SessionMemory
 from rigidimeter.rig.console import StopKeys, stop_keys
 from rigidimeter.rig.console.page import (
@@ -133,10 +135,12 @@ def lead_session(
     `listen` is called often.
     """
     folder, rig = state.place.root / request.folder, state.place.rig
+    codes: dict[str, str] = codes_of(request.about)
     try:
         planned = checked_rig(_planned(state, request), rig)
         require_packages(planned.settings)
         planned = planned.blinded() if planned.about.get("blinded") else planned
+        codes = codes_of(planned.about)
         look = state.console(planned.shown(virtual=rig is None), folder)
 
         def follow(shared: SessionMemory) -> None:
@@ -150,8 +154,9 @@ def lead_session(
         good, of = count_epochs(ended.folder)
         left = len(rest_of(ended.folder).epochs)
     except UserError as error:
-        state.over(folder, "not run", tuple(map(in_buttons, error.lines)))
-        for line in error.lines:
+        lines = [in_codes(line, codes) for line in error.lines]
+        state.over(folder, "not run", tuple(map(in_buttons, lines)))
+        for line in lines:
             echo(line, err=True)
         return None
     sentences = [f"{good} of {of} epochs completed; session in {ended.folder}."]
@@ -161,10 +166,21 @@ def lead_session(
     if planned.settings.sharing.nwb_at_close:
         sentences.append(write_nwb_beside(ended.folder))
     sentences += [*ended.remarks, *extended(state.place)]
+    if state.place.planned:
+        sentences.append(_next_words(state.place.root, planned.about))
+    sentences = [in_codes(sentence, codes) for sentence in sentences]
     echo(" ".join(sentences))
     sentences.append(next_buttons(closed=bool(ended.outcome), good=good, left=left))
     state.over(ended.folder, ended.outcome or "no outcome", tuple(map(in_buttons, sentences)))
     return ended
+
+
+def _next_words(study: Path, about: Mapping[str, Any]) -> str:
+    """Return which session of the subject is due now."""
+    try:
+        return f"Next: {next_words(plan_of(study), str(about.get('subject', '')))}"
+    except UserError as error:
+        return str(error)
 
 
 def _planned(state: ServerState, request: StartRequest) -> PlannedSession:
@@ -174,7 +190,8 @@ def _planned(state: ServerState, request: StartRequest) -> PlannedSession:
         folder = state.place.root / request.resume
         planned = rest_of_session(folder, virtual=virtual, epoch=request.epoch, left=request.left)
     else:
-        planned = new_session(request.settings, request.about, state.place.settings_path)
+        source = request.source or state.place.settings_path
+        planned = new_session(request.settings, request.about, source)
     lost_s = min(SILENT_S, planned.settings.loop.console_lost_s)
     settings = changed_settings(planned.settings, {"loop": {"console_lost_s": lost_s}})
     return replace(planned, settings=settings)

@@ -88,7 +88,8 @@ class PlannedSession:
     def shown(self, *, virtual: bool) -> SessionPlan:
         """Return the plan as consoles take it, with the codes of a blinded session."""
         codes = codes_of(self.about)
-        return SessionPlan(self.settings, self.protocol.epochs, self.done, codes, virtual)
+        raters = tuple(self.about.get("plan", {}).get("raters", "").split())
+        return SessionPlan(self.settings, self.protocol.epochs, self.done, codes, virtual, raters)
 
     @property
     def motion_range(self) -> MotionRange | None:

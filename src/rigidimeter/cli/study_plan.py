@@ -13,14 +13,7 @@ import typer
 from rigidimeter.cli.help_pages import OPTIONS, READ, HelpCommand, argument
 from rigidimeter.cli.options import STUDY_SEED
 from rigidimeter.cli.output import echo
-from rigidimeter.cli.plan_text import (
-    due_of,
-    plan_of,
-    show_plan,
-    show_switches,
-    subject_of,
-    wait_words,
-)
+from rigidimeter.cli.plan_text import show_plan, show_switches
 from rigidimeter.cli.progress import Meter
 from rigidimeter.core.errors import UserError
 
@@ -111,6 +104,7 @@ def plan_days(
     if design is not None:
         days, prbs_epochs = days_of_design(design)
     given = () if order in ("balanced", "drawn") else tuple(_names(order, "--order"))
+    codes = _codes(names, seed) if blinded else {}
     spec = StudyDays(
         subjects=tuple(_names(subjects, "--subjects")),
         conditions=tuple(names),
@@ -126,7 +120,7 @@ def plan_days(
             name for name, n in (("prbs", prbs_epochs), ("sinusoid", sinusoid_epochs)) if n
         ),
         raters=tuple(_names(raters, "--raters")) if raters else (),
-        blinded=blinded,
+        codes=codes,
     )
     about = PlanToml(
         subjects=list(spec.subjects),
@@ -138,10 +132,10 @@ def plan_days(
         wait_after_on_min=wait_on_min,
         wait_after_off_min=wait_off_min,
         raters=list(spec.raters),
-        codes=_codes(names, seed) if blinded else {},
+        codes=codes,
     )
     protocols = {
-        f"protocols/{name}.toml": _protocol(base, name, prbs_epochs, sinusoid_epochs)
+        spec.protocol_of(name): _protocol(base, name, prbs_epochs, sinusoid_epochs)
         for name in names
     }
     blocks = draw_days(spec, seed)
@@ -168,7 +162,14 @@ def stimulation(
       rigidimeter study stimulation winter "off since 10:42"
       rigidimeter study stimulation winter on --by nurse
     """
-    from rigidimeter.core.study_files import add_change, parse_change
+    from rigidimeter.core.study_files import (
+        add_change,
+        next_block,
+        parse_change,
+        plan_of,
+        subject_of,
+        wait_words,
+    )
 
     plan = plan_of(folder)
     subject = subject_of(plan, subject)
@@ -179,7 +180,7 @@ def stimulation(
     add_change(folder, change)
     local = change.changed_utc.astimezone()
     echo(f"{subject}: stimulation {change.stimulation} since {local:%H:%M}")
-    due = due_of(plan, subject)
+    due = next_block(plan, subject)
     if due is not None:
         echo(wait_words(due, datetime.now(UTC)))
 
@@ -203,6 +204,7 @@ def rehearse_plan(
       rigidimeter study rehearse winter
       rigidimeter compare winter
     """
+    from rigidimeter.core.study_files import plan_of
     from rigidimeter.virtual import rehearse
 
     plan = plan_of(folder)

@@ -57,7 +57,8 @@ class StudyDays:
     wait_after_on_min, wait_after_off_min : float
     task : str
     raters : tuple of str
-    blinded : bool
+    codes : mapping of str to str
+        What stands for each condition where examiners are blinded; empty where they are not.
     """
 
     subjects: tuple[str, ...]
@@ -72,7 +73,7 @@ class StudyDays:
     wait_after_off_min: float = 60.0
     task: str = "prbs sinusoid"
     raters: tuple[str, ...] = ()
-    blinded: bool = False
+    codes: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, count in self.days_of.items():
@@ -93,6 +94,10 @@ class StudyDays:
                 f"{self.sessions_a_day} sessions a day of {len(self.conditions)} conditions: at "
                 f"most {_MOST_SESSIONS} sessions a day can be planned"
             )
+
+    def protocol_of(self, condition: str) -> str:
+        """Return the settings file of a condition, whose name tells a blinded examiner nothing."""
+        return f"protocols/{self.codes.get(condition, condition)}.toml"
 
 
 def evenly(count: int, days: int) -> tuple[int, ...]:
@@ -182,12 +187,11 @@ def _blocks(subject: str, day: str, order: Sequence[str], plan: StudyDays) -> li
         on = name in plan.stimulated
         changed = not before or (before in plan.stimulated) != on
         wait = plan.wait_after_on_min if on else plan.wait_after_off_min
-        if plan.blinded:
+        if plan.codes:
             changed, wait = True, max(plan.wait_after_on_min, plan.wait_after_off_min)
-        protocol = f"protocols/{name}.toml"
         found.append(
             PlannedBlock(
-                subject, day, k, name, plan.task, protocol,
+                subject, day, k, name, plan.task, plan.protocol_of(name),
                 wait if changed and plan.stimulated else 0.0, " ".join(plan.raters),
             )
         )  # fmt: skip

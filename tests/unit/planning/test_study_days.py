@@ -64,7 +64,7 @@ def test_waits_follow_the_changes_of_the_stimulation() -> None:
 
 
 def test_a_blinded_plan_gives_no_condition_away_by_its_wait() -> None:
-    plan = StudyDays(("A",), ("OFF", "DBS"), 8, ("DBS",), sessions_a_day=3, blinded=True)
+    plan = StudyDays(("A",), ("OFF", "DBS"), 8, ("DBS",), sessions_a_day=3, codes={"OFF": "B"})
     assert {block.wait_min for block in draw_days(plan, 1)} == {60.0}
 
 

@@ -34,6 +34,7 @@ from rigidimeter.core.session.plan import (
     codes_of,
     count_epochs,
     drawn_codes,
+    in_codes,
     require_all,
     rest_of,
 )

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import collections
 import random
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -105,6 +106,20 @@ def codes_of(about: Mapping[str, Any]) -> dict[str, str]:
     """Return the codes that a manifest's `about` holds; empty where nobody was blinded."""
     codes = about.get("codes")
     return {str(name): str(code) for name, code in codes.items()} if codes else {}
+
+
+def in_codes(text: str, codes: Mapping[str, str]) -> str:
+    """Return a sentence with the codes of conditions in place of their names.
+
+    Examples
+    --------
+    >>> in_codes("protocols/OFF.toml: has epochs of DBS", {"OFF": "code-B", "DBS": "code-A"})
+    'protocols/code-B.toml: has epochs of code-A'
+    """
+    if not codes:
+        return text
+    names = "|".join(re.escape(name) for name in sorted(codes, key=len, reverse=True))
+    return re.sub(rf"(?<!\w)({names})(?!\w)", lambda found: codes[found[1]], text)
 
 
 @dataclass(frozen=True)

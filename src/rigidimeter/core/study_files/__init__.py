@@ -24,6 +24,18 @@ from rigidimeter.core.study_files.exclusions import (
 )
 from rigidimeter.core.study_files.extended_folder import extend_study, write_new_study
 from rigidimeter.core.study_files.folder import StudyFolder, TableRow, is_study, read_study_folder
+from rigidimeter.core.study_files.next_session import (
+    PLAN_COLUMNS,
+    BegunSession,
+    begun_session,
+    due_words,
+    next_block,
+    next_words,
+    plan_of,
+    plan_rows,
+    subject_of,
+    wait_words,
+)
 from rigidimeter.core.study_files.plan_progress import (
     DueBlock,
     RecordedBlock,

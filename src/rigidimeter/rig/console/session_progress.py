@@ -30,6 +30,8 @@ class SessionPlan:
         What the operator reads in place of a condition's name; empty where nobody is blinded.
     virtual : bool
         Whether the rig is the virtual one.
+    raters : tuple of str
+        Who is to rate, where a plan names them.
     """
 
     settings: Settings
@@ -37,6 +39,7 @@ class SessionPlan:
     done_before: int = 0
     codes: Mapping[str, str] = field(default_factory=dict)
     virtual: bool = False
+    raters: tuple[str, ...] = ()
 
     @property
     def total(self) -> int:

@@ -7,6 +7,7 @@ date.
 from __future__ import annotations
 
 import json
+import os
 import tempfile
 import time
 from collections.abc import Callable
@@ -25,6 +26,7 @@ from rigidimeter.rig.console.page.session_row import Acts, SessionRow
 from rigidimeter.rig.console.page.sessions_found import (
     OF_STUDY,
     PAGE,
+    SESSIONS,
     FoundEpoch,
     FoundSession,
     exclude,
@@ -107,8 +109,9 @@ class AfterView:
         if finished is not None and finished.number != self._shown and not self._state.busy:
             self._shown = finished.number
             self._update()
-            if finished.folder.name in self._rows:
-                self._rows[finished.folder.name].frame.open()
+            name = os.path.relpath(finished.folder, self._root)
+            if name in self._rows:
+                self._rows[name].frame.open()
 
     def _update(self) -> None:
         """Bring the list up to date; the rows that are in it stay, with what is unfolded."""
@@ -158,7 +161,10 @@ class AfterView:
             self._run(session.name, left=left)
 
     def _run(self, session: str, **what: Any) -> None:
-        folder = f"{session.rpartition('-')[0] or session}-{time.strftime('%H%M%S')}"
+        # The name of a planned session ends with its number, that of any other with its time.
+        planned = session.startswith(f"{SESSIONS}/")
+        stem = session if planned else session.rpartition("-")[0] or session
+        folder = f"{stem}-{time.strftime('%H%M%S')}"
         self._state.ask(StartRequest(folder, resume=session, **what))
 
     def _leave_out(self, session: FoundSession, epoch: FoundEpoch) -> None:

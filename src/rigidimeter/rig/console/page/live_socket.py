@@ -101,7 +101,11 @@ class _Attached:
         self.stopped = self._alarms.stopped
         full = self.memory.status.condition(Role.RECORDER) is ProcessCondition.TROUBLE
         state = session_state(facts, progress)
-        return state | {"number": self.running.number, "save": full}
+        return state | {
+            "number": self.running.number,
+            "save": full,
+            "raters": list(self.running.plan.raters),
+        }
 
     def post_notes(self) -> None:
         while self.notes and self.memory.status.post_note(self.notes[0]) is not None:

@@ -29,6 +29,7 @@ from rigidimeter.rig.console.page.before_view import BeforeView
 from rigidimeter.rig.console.page.jobs import Jobs
 from rigidimeter.rig.console.page.live_socket import LiveSockets
 from rigidimeter.rig.console.page.page_token import require_token
+from rigidimeter.rig.console.page.plan_view import PlanView
 from rigidimeter.rig.console.page.server_state import ServerState
 from rigidimeter.rig.console.page.sessions_found import POLICY, report_file
 
@@ -202,7 +203,7 @@ def show_page(state: ServerState, jobs: Jobs, secret: str) -> None:
     ui.html(_during(), sanitize=False).classes("rig")
     with ui.element("section").classes("view").props("id=view-before"):
         unfinished = ui.label("").classes("problem").props('role="status"')
-        BeforeView(state, jobs, in_control)
+        (PlanView if state.place.planned else BeforeView)(state, jobs, in_control)
     with ui.element("section").classes("view").props("id=view-after"):
         AfterView(state, jobs, in_control, unfinished)
 

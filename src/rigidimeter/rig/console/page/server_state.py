@@ -26,6 +26,7 @@ from typing import Any
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings
+from rigidimeter.core.study_files import PLAN_TABLE
 from rigidimeter.rig.acquisition.processes import Flag, SessionMemory
 from rigidimeter.rig.console import SessionPlan
 
@@ -143,6 +144,8 @@ class StartRequest:
         Of that session, the one epoch to be run again; None for all that are left.
     left : tuple of int
         The planned epochs that are left, by number; empty for those that this session lacks.
+    source : Path or None
+        The file of the settings, where it is not that of the form.
     """
 
     folder: str
@@ -151,6 +154,7 @@ class StartRequest:
     resume: str = ""
     epoch: int | None = None
     left: tuple[int, ...] = ()
+    source: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -175,7 +179,10 @@ class FinishedSession:
 
 @dataclass(frozen=True)
 class Place:
-    """Where this console works: rig, folder of its sessions, settings that a form begins with."""
+    """Where this console works: rig, folder of its sessions, settings that a form begins with.
+
+    `clock_speed` is that of the clock of planned waits: above 1 in rehearsals alone.
+    """
 
     root: Path
     settings: Settings
@@ -183,6 +190,12 @@ class Place:
     rig: Path | None = None
     one_session: str = ""
     settings_path: Path | None = None
+    clock_speed: float = 1.0
+
+    @property
+    def planned(self) -> bool:
+        """Whether its sessions are those of a plan."""
+        return not self.one_session and (self.root / PLAN_TABLE).exists()
 
     @property
     def protocols(self) -> Path:

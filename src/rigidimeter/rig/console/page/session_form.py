@@ -208,7 +208,7 @@ def read_form(form: Mapping[str, str], base: Settings) -> EnteredSession:
         "blinded": form.get(BLINDED) == YES,
     }
     if any(form.get(one.key, "").strip() for one in RANGE):
-        about["range"] = read("range_low", _range, form, about["subject"], errors)
+        about["range"] = read("range_low", read_range, form, about["subject"], errors)
     stimulation: dict[str, Any] = {}
     for one in STIMULATION:
         text = form.get(one.key, "").strip()
@@ -271,7 +271,7 @@ def _numbers(text: str, what: str) -> list[float]:
     return [parse_number(part, what) for part in parts]
 
 
-def _range(
+def read_range(
     low: str, form: Mapping[str, str], subject: str | None, errors: dict[str, str]
 ) -> dict[str, Any] | None:
     """Return the range of motion that was entered; what is wrong with its other fields is said."""

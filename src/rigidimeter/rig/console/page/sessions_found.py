@@ -22,6 +22,7 @@ from rigidimeter.core.session import (
     EVENTS,
     NO_CODE,
     codes_of,
+    in_codes,
     is_session,
     locked,
     read_events,
@@ -34,12 +35,15 @@ from rigidimeter.core.study_files import (
     excluded_epochs,
     extend_study,
     include_epoch,
+    read_plan,
     read_study_toml,
 )
 from rigidimeter.rig.console.page.form_values import parse_line, parse_name
 from rigidimeter.rig.console.page.server_state import Place
 
 MAX_SESSIONS = 200
+SESSIONS = "sessions"
+"""Below the console's folder: where those of a plan lie."""
 NEVER_S = 1e9
 """When an epoch ended that nobody ended: later than any."""
 
@@ -70,7 +74,7 @@ class FoundEpoch:
 
 @dataclass(frozen=True)
 class FoundSession:
-    """A session folder; `outcome` is empty where the session was not closed.
+    """A session folder, by its path; `outcome` is empty where the session was not closed.
 
     `left` are the numbers of the planned epochs that neither it nor a session that continues it
     ran, or will run.
@@ -116,8 +120,7 @@ class FoundSession:
 
 def found_sessions(root: Path) -> tuple[list[FoundSession], list[str]]:
     """Return the sessions of a folder, newest first, and a sentence for each that is not read."""
-    folders = [path for path in root.iterdir() if path.is_dir() and is_session(path)]
-    folders = sorted(folders, key=lambda path: path.stat().st_mtime, reverse=True)
+    folders = sorted(_folders(root), key=lambda path: path.stat().st_mtime, reverse=True)
     problems: list[str] = []
     try:
         excluded = excluded_epochs(root)
@@ -126,10 +129,20 @@ def found_sessions(root: Path) -> tuple[list[FoundSession], list[str]]:
     found = []
     for folder in folders[:MAX_SESSIONS]:
         try:
-            found.append(_session(folder, excluded))
+            found.append(_session(root, folder, excluded))
         except (UserError, OSError, KeyError, TypeError) as error:
-            problems.append(f"{folder.name}: {error}")
+            problems.append(f"{_name(root, folder)}: {error}")
     return [_with_left(one, root, found) for one in found], problems
+
+
+def _folders(root: Path) -> list[Path]:
+    """Return the session folders of a console's folder, and of its folder `sessions`."""
+    places = [place for place in (root, root / SESSIONS) if place.is_dir()]
+    return [path for place in places for path in place.iterdir() if is_session(path)]
+
+
+def _name(root: Path, folder: Path) -> str:
+    return folder.relative_to(root).as_posix()
 
 
 def _with_left(one: FoundSession, root: Path, found: Sequence[FoundSession]) -> FoundSession:
@@ -157,7 +170,7 @@ def exclude(root: Path, session: str, epoch: str, reason: str, by: str) -> None:
     UserError
         If there is no such epoch, it is left out already, or reason or name is missing.
     """
-    found = _session(root / parse_name(session, "session"), {})
+    found = _session(root, _folder(root, session), {})
     reason, by = _asked(reason, by)
     if epoch not in {one.label for one in found.epochs}:
         raise UserError(f"{session} has no epoch {epoch}")
@@ -172,14 +185,21 @@ def include(root: Path, session: str, epoch: str, reason: str, by: str) -> None:
     UserError
         If it is not left out, or reason or name is missing.
     """
-    include_epoch(root, parse_name(session, "session"), epoch, *_asked(reason, by))
+    include_epoch(root, _name(root, _folder(root, session)), epoch, *_asked(reason, by))
+
+
+def _folder(root: Path, session: str) -> Path:
+    """Return the folder of a session, which lies in no other place than the list's."""
+    name = session.removeprefix(f"{SESSIONS}/")
+    parse_name(name, "session")
+    return root / session
 
 
 def _asked(reason: str, by: str) -> tuple[str, str]:
     return parse_line(reason, "reason"), parse_line(by, "name", 40)
 
 
-def _session(folder: Path, excluded: dict[tuple[str, str], str]) -> FoundSession:
+def _session(root: Path, folder: Path, excluded: dict[tuple[str, str], str]) -> FoundSession:
     manifest = read_manifest(folder)
     about = manifest.get("about", {})
     path = folder / EVENTS
@@ -194,7 +214,7 @@ def _session(folder: Path, excluded: dict[tuple[str, str], str]) -> FoundSession
             recording = True
     plan = manifest["protocol"]
     return FoundSession(
-        folder.name,
+        _name(root, folder),
         manifest["created_utc"],
         str(about.get("subject", "")),
         manifest["virtual"],
@@ -202,7 +222,7 @@ def _session(folder: Path, excluded: dict[tuple[str, str], str]) -> FoundSession
         end.get("reason", "still being recorded" if recording else "it was interrupted"),
         len(plan),
         recording,
-        tuple(_epochs(folder.name, events, excluded, about)),
+        tuple(_epochs(_name(root, folder), events, excluded, about)),
         manifest.get("session_id", ""),
         manifest.get("continues", {}).get("session_id", ""),
         tuple(entry["number"] for entry in plan),
@@ -248,9 +268,12 @@ def extended(place: Place) -> list[str]:
     if place.one_session:
         return []
     try:
-        return extend_study(place.root, known=list(place.settings.subject))
+        plan = read_plan(place.root)
+        known = None if plan is not None else list(place.settings.subject)
+        found = extend_study(place.root, known=known)
     except (UserError, OSError) as error:
         return [f"not in the study: {error}"]
+    return found if plan is None else [in_codes(line, plan.about.codes) for line in found]
 
 
 def off_scale(place: Place, score: float) -> str:
@@ -272,7 +295,7 @@ def off_scale(place: Place, score: float) -> str:
 
 def report_folder(session: str = "") -> str:
     """Return the name of the folder in which a session's report lies, or that of the study."""
-    return f"{session}{_FOR_SESSION}" if session else OF_STUDY
+    return f"{session.replace('/', '-')}{_FOR_SESSION}" if session else OF_STUDY
 
 
 def report_link(folder: str) -> str:

@@ -106,6 +106,9 @@
       row.children[1].firstChild.style.width = `${Math.min(100, 100 * part)}%`;
       write(row.lastChild, `${sign} ${text}`);
     });
+    const raters = session.raters || [];
+    fill($("raters"), raters, () => document.createElement("option"), (row, name) => { row.value = name; });
+    $("examiner").placeholder = raters.length ? `planned: ${raters.join(", ")}` : "examiner";
     rated = session.rate;
     show("rated", rated === null ? "no epoch yet" : `epoch ${rated.place}`);
   }

@@ -1,0 +1,190 @@
+"""The session of a plan that is next, in words and as it is begun: for the terminal and the page.
+
+No sentence here names a condition to an examiner who is blinded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.session import in_codes
+from rigidimeter.core.settings import Settings
+from rigidimeter.core.study_files.day_plan import StudyPlan, read_plan
+from rigidimeter.core.study_files.plan_progress import (
+    DueBlock,
+    due_block,
+    named_block,
+    recorded_blocks,
+    session_facts,
+    session_settings_of,
+)
+
+PLAN_COLUMNS = ("day", "order", "condition", "task", "wait, min", "raters", "")
+
+
+@dataclass(frozen=True)
+class BegunSession:
+    """A session of a plan as it is to be run now.
+
+    Attributes
+    ----------
+    folder : Path
+        New; its name does not give the condition away.
+    settings : Settings
+    about : mapping
+        Of the manifest, with the place in the plan.
+    source : Path
+        The file of the settings.
+    """
+
+    folder: Path
+    settings: Settings
+    about: Mapping[str, Any]
+    source: Path
+
+
+def plan_of(folder: Path) -> StudyPlan:
+    """Return the plan of a study folder.
+
+    Raises
+    ------
+    UserError
+        If it has none, or it cannot be read.
+    """
+    plan = read_plan(folder)
+    if plan is None:
+        raise UserError(
+            f"{folder}: has no plan; draw one with rigidimeter study plan {folder} --subjects CODE"
+        )
+    return plan
+
+
+def subject_of(plan: StudyPlan, subject: str) -> str:
+    """Return the subject that was named, or the only one of the plan.
+
+    Raises
+    ------
+    UserError
+        If it is not in the plan, or the plan has several and none was named.
+    """
+    known = plan.about.subjects
+    if not subject and len(known) == 1:
+        return known[0]
+    if subject not in known:
+        what = f"--subject {subject}: is not in the plan" if subject else "name a --subject"
+        raise UserError(f"{what}; the plan has {', '.join(known)}")
+    return subject
+
+
+def next_block(
+    plan: StudyPlan, subject: str, named: tuple[str, int] | None = None
+) -> DueBlock | None:
+    """Return the session of a subject that is due, or the one of this day and number.
+
+    Parameters
+    ----------
+    plan : StudyPlan
+    subject : str
+    named : (str, int), optional
+        One that was recorded before is run as a further part.
+
+    Returns
+    -------
+    DueBlock or None
+        None if all were recorded, or the plan has no session of that name.
+    """
+    recorded = recorded_blocks(plan.folder)
+    if named is None:
+        return due_block(plan, recorded, subject)
+    return named_block(plan, recorded, (subject, *named))
+
+
+def begun_session(
+    plan: StudyPlan,
+    due: DueBlock,
+    now: datetime,
+    *,
+    operator: str = "",
+    note: str = "",
+    speed: float = 1.0,
+    reason: str = "",
+) -> BegunSession:
+    """Return a session of the plan as it is to be run now.
+
+    Parameters
+    ----------
+    plan : StudyPlan
+    due : DueBlock
+    now : datetime
+    operator, note : str
+    speed : float
+        Of the clock of the waits.
+    reason : str
+        Why the wait is cut short; empty where it is not.
+
+    Raises
+    ------
+    UserError
+        If its settings file cannot be read, or has epochs of another condition.
+    """
+    try:
+        settings = session_settings_of(plan, due)
+    except UserError as error:
+        raise UserError(*(in_codes(line, plan.about.codes) for line in error.lines)) from None
+    about = session_facts(plan, due, now, operator=operator, note=note, speed=speed, reason=reason)
+    return BegunSession(plan.folder / due.folder, settings, about, plan.folder / due.block.protocol)
+
+
+def plan_rows(plan: StudyPlan, subject: str) -> list[tuple[str, ...]]:
+    """Return the sessions of a subject as cells of a table, in the order of `PLAN_COLUMNS`."""
+    done = {one.key for one in recorded_blocks(plan.folder)}
+    return [
+        (
+            block.day,
+            str(block.order),
+            plan.shown(block.condition),
+            block.task,
+            f"{block.wait_min:g}",
+            block.raters,
+            "recorded" if block.key in done else "",
+        )
+        for block in plan.blocks
+        if block.subject == subject
+    ]
+
+
+def due_words(plan: StudyPlan, due: DueBlock) -> str:
+    """Return which session is due, with the code of its condition where examiners are blinded."""
+    block, (number, of) = due.block, due.place
+    part = f", part {due.part}" if due.part > 1 else ""
+    raters = f", rated by {', '.join(block.raters.split())}" if block.raters else ""
+    return (
+        f"Session {number} of {of} of {block.subject}: day {block.day}, number {block.order}, "
+        f"{plan.shown(block.condition)}{part}{raters}"
+    )
+
+
+def next_words(plan: StudyPlan, subject: str) -> str:
+    """Return which session of a subject is due now, or that all of the plan are recorded."""
+    due = next_block(plan, subject)
+    return due_words(plan, due) if due else "All sessions of the plan are recorded."
+
+
+def wait_words(due: DueBlock, now: datetime, speed: float = 1.0) -> str:
+    """Return how long to wait, without the state of the stimulation and since when it is on."""
+    left = due.left_min(now, speed)
+    if left is None and due.change is not None and due.change.stimulation != due.stimulation:
+        return "The wait has not begun: the stimulation is not yet as this session needs it"
+    if left is None:
+        return (
+            f"The wait of {due.block.wait_min:g} min has not begun: the stimulation was not set "
+            "for this session, or nobody wrote down when"
+        )
+    if left > 0.0:
+        return f"Wait {left:.0f} min more, of {due.block.wait_min:g} min"
+    return "No wait is left"

@@ -1,0 +1,172 @@
+"""The session of a plan on the page, without a browser: what it shows, and what a start asks."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+from nicegui import Client, ui
+from nicegui.page import page
+from tests.small_study import tiny
+
+from rigidimeter.core.files import toml_text
+from rigidimeter.core.settings import Settings, dump_settings
+from rigidimeter.core.study_files import add_change, parse_change
+from rigidimeter.rig.console.page import Jobs, Place, PlanView, ServerState, StartRequest
+
+NAMES = ("Zebra", "Quagga")
+
+
+class Steps(Jobs):
+    """Nothing has to be done before a session."""
+
+    def rig_steps(self, *_):
+        return ()
+
+
+class Page:
+    """The view of one page of a study folder."""
+
+    def __init__(self, client: Client, study: Path, speed: float = 1.0) -> None:
+        self.client, self.asked = client, []
+        self.state = ServerState(Place(study, Settings(), "", clock_speed=speed))
+        self.state.ask = self.asked.append
+        with client:
+            PlanView(self.state, Steps(), lambda: True)
+
+    def named(self, mark: str):
+        (one,) = (e for e in self.client.elements.values() if mark in getattr(e, "_markers", ()))
+        return one
+
+    def field(self, key: str):
+        return next(
+            e
+            for e in self.client.elements.values()
+            if isinstance(e, ui.input) and e.props.get("data-field") == key
+        )
+
+    def click(self, mark: str) -> None:
+        with self.client:
+            for one in self.named(mark)._event_listeners.values():
+                one.handler(None)
+
+    def tick(self) -> None:
+        (timer,) = (e for e in self.client.elements.values() if isinstance(e, ui.timer))
+        with self.client:
+            timer.callback()
+
+    def words(self) -> str:
+        """Return all that the page holds, shown or not: text, properties and choices."""
+        return " ".join(
+            f"{getattr(e, 'text', '')} {getattr(e, 'content', '')} {e.props}"
+            for e in self.client.elements.values()
+        )
+
+
+@pytest.fixture
+def study(tmp_path, rigidimeter):
+    def made(*options: str) -> Path:
+        shared = tmp_path / "shared.toml"
+        shared.write_text(toml_text(dump_settings(tiny("OFF", 1, epochs=1))))
+        ran = rigidimeter(
+            "study", "plan", tmp_path / "study", "--subjects", "S01", "--days", "2", "--conditions",
+            ",".join(NAMES), "--order", "Quagga,Zebra", "--prbs-epochs", "1", "--sinusoid-epochs",
+            "0", "--raters", "A,B", "--settings", shared, *options,
+        )  # fmt: skip
+        assert ran.status == 0, ran.err
+        return tmp_path / "study"
+
+    return made
+
+
+@pytest.fixture
+def client():
+    with Client(page("/plan")) as client:
+        yield client
+    client.delete()
+
+
+def test_the_due_session_waits_from_the_change_that_was_entered(client, study):
+    shown = Page(client, study())
+    assert shown.named("due").text == (
+        "Session 1 of 4 of S01: day 1, number 1, Quagga, rated by A, B"
+    )
+    assert "has not begun" in shown.named("wait").text
+    assert not shown.named("start").enabled
+    shown.field("stimulation").value = "on"
+    shown.click("enter-change")
+    assert "Wait 15 min more, of 15 min" in shown.named("wait").text
+    assert shown.named("countdown").text.startswith(("15:00", "14:5"))
+    shown.field("stimulation").value = "on since 25:00"
+    shown.click("enter-change")
+    assert shown.field("stimulation").value == "on since 25:00"  # it is refused with its reason
+    shown.click("start")
+    assert shown.asked == []
+
+
+def test_a_start_has_everything_from_the_plan(client, study):
+    folder = study()
+    shown = Page(client, folder, speed=60000.0)
+    shown.field("stimulation").value = "on"
+    shown.click("enter-change")
+    shown.tick()
+    shown.field("operator").value = "Kim"
+    while shown.named("wait").text != "No wait is left":  # at most 15 ms of this clock
+        shown.tick()
+    shown.click("start")
+    (request,) = shown.asked
+    assert isinstance(request, StartRequest)
+    assert request.folder == "sessions/S01-day-1-1"
+    assert request.source == folder / "protocols/Quagga.toml"
+    assert request.settings.protocol.blocks[0].condition == "Quagga"
+    about = request.about
+    assert (about["subject"], about["operator"], about["day"]) == ("S01", "Kim", "1")
+    place = about["plan"]
+    assert (place["clock_speed"], place["wait_cut_short"]) == (60000.0, "")
+    assert place["since_change_min"] >= 15.0
+
+
+def test_a_wait_is_cut_short_with_a_reason_alone_and_another_session_can_be_chosen(client, study):
+    shown = Page(client, study())
+    shown.field("operator").value = "Kim"
+    shown.click("anyway")
+    assert shown.asked == []
+    shown.named("session").value = "2/1"
+    assert "Session 3 of 4 of S01: day 2, number 1" in shown.named("due").text
+    shown.field("begin_anyway").value = "the subject must leave"
+    shown.click("anyway")
+    (request,) = shown.asked
+    assert request.folder == "sessions/S01-day-2-1"
+    assert request.about["plan"]["wait_cut_short"] == "the subject must leave"
+    assert request.about["plan"]["since_change_min"] is None
+
+
+def test_a_blinded_page_names_no_condition_and_takes_no_change(client, study):
+    folder = study("--blinded")
+    assert not any(name in path.name for path in folder.rglob("*") for name in NAMES)
+    shown = Page(client, folder)
+    code = shown.named("due").text.split(", ")[2]
+    assert code.startswith("code-")
+    assert not shown.named("enter-change").parent_slot.parent.visible
+    assert "rigidimeter study stimulation" in shown.named("switched").text
+    add_change(folder, parse_change("on", "S01", datetime.now(UTC)))  # in another program
+    shown.tick()
+    assert "Wait 60 min more" in shown.named("wait").text
+    protocol = folder / f"protocols/{code}.toml"
+    wrong = protocol.read_text().replace('condition = "Quagga"', 'condition = "Zebra"')
+    assert not any(name in shown.words() for name in NAMES)
+    protocol.write_text(wrong)
+    (folder / "plan.csv").touch()
+    shown.tick()
+    assert "names condition 'code-" in shown.named("refused").text
+    assert not any(name in shown.words() for name in NAMES)
+
+
+def test_a_damaged_plan_is_an_error_on_the_page(client, study):
+    folder = study()
+    table = folder / "plan.csv"
+    table.write_text(table.read_text().replace("S01,1,1,Quagga", "S01,1,1,Okapi"))
+    shown = Page(client, folder)
+    assert "condition Okapi is not one of those in plan.toml" in shown.named("refused").text
+    assert not shown.named("start").enabled
