@@ -31,6 +31,18 @@ def test_lateness_of_the_loop():
     assert "missed ticks / of cyclictest" in lines[-2]
 
 
+def test_ticks_beside_emg():
+    """A stream of two channels, or one that stalls, costs no tick: the EMG is not in the loop."""
+    pytest.importorskip("pylsl", reason="pip install 'rigidimeter[lsl]'")
+    rows = printed_by("emg", "--seconds", 3, "--runs", 1, "--priority", 0).splitlines()[2:]
+    found = {row.split("|")[1].strip(): row.split("|")[2:-1] for row in rows}
+    assert int(found["without EMG"][4]) == 0
+    ran, *_, emg, gaps = found["two channels at 2 kHz"]
+    assert int(ran) > 1000
+    assert int(emg) > 2000
+    assert int(gaps) == 0
+
+
 @pytest.mark.usefixtures("browser")
 def test_stops_from_the_page():
     assert "| click |" in printed_by("console", "--clicks", 1, "--freezes", 1)

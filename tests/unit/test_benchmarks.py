@@ -46,7 +46,7 @@ SMALLEST = {
 }
 """Arguments by module, a line for each run."""
 
-REAL_TIME = {"loop", "console", "page"}
+REAL_TIME = {"loop", "console", "page", "emg"}
 """Those that keep real time or need a browser: `tests.faults.test_realtime_benchmarks`."""
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import rigidimeter as rm
+from rigidimeter.analysis.export import sessions_of_recording
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import EMG, EmgLog, read_session_files, recover
 from rigidimeter.core.settings import Settings, dump_settings, parse_settings
@@ -52,6 +53,14 @@ def test_epochs_have_the_emg_of_each_muscle(folder: Path):
     about = json.loads((folder / "manifest.json").read_text())["settings"]["emg"]
     assert about["muscles"] == ["biceps", "triceps"]
     assert about["placement"] == TABLES["emg"]["placement"]
+
+
+def test_it_is_exported_with_the_session(folder: Path):
+    (session,) = sessions_of_recording(rm.read(folder), None)
+    (emg,) = [stream for stream in session.streams if stream.name == "emg"]
+    assert list(emg.columns) == ["emg_v", "emg_2_v"]
+    assert session.about["units"]["emg_2_v"] == "V"
+    assert session.about["settings"]["emg"]["muscles"] == ["biceps", "triceps"]
 
 
 def test_a_session_without_emg_is_as_before(tmp_path: Path):

@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.session import SessionWriter, read_emg
+from rigidimeter.core.session import Sample, SessionWriter, read_emg
 from rigidimeter.core.settings import EmgSettings, Settings, parse_settings
+from rigidimeter.model import VirtualMuscles
 from rigidimeter.rig.acquisition.processes import (
     ProcessCondition,
     Role,
@@ -77,7 +78,11 @@ def with_emg(**emg: object) -> Settings:
 
 
 def recorded(
-    settings: Settings, folder: Path, for_s: float, opened: Any = open_emg
+    settings: Settings,
+    folder: Path,
+    for_s: float,
+    opened: Any = open_emg,
+    session: Callable[[SessionMemory], None] = lambda _: None,
 ) -> tuple[float, list[str]]:
     """Run the EMG's process beside a session that lasts so long; return its origin and remarks."""
     shared = SessionMemory.create(1000.0, 10.0)
@@ -92,9 +97,10 @@ def recorded(
         process = context.Process(target=emg_main, args=arguments)
         process.start()
         theirs.close()
-        time.sleep(0.3)
+        assert ours.recv() == []  # connected
         origin_s = time.monotonic()
         shared.events.push(0, {"event": "clock_started", "monotonic_s": origin_s})
+        session(shared)
         until_s = time.monotonic() + 60.0
         while time.monotonic() < until_s and process.is_alive():
             emg = read_emg(folder)
@@ -129,7 +135,8 @@ def test_what_a_stream_sends_is_recorded_on_the_clock_of_the_session(amplifier, 
     assert np.diff(emg.time_s)[at_gap[0]] == pytest.approx(1.5, abs=0.2)
     assert any("EMG is missing from" in remark for remark in remarks)
     now_s = time.monotonic() - origin_s
-    assert 0.0 <= emg.time_s[0] < emg.time_s[-1] < now_s
+    assert 0.0 <= emg.time_s[0] < 0.2
+    assert emg.time_s[-1] < now_s
     assert now_s - emg.time_s[-1] < 20.0
 
 
@@ -179,3 +186,35 @@ def test_a_card_that_fails_is_named_and_what_it_gave_is_kept(tmp_path: Path):
     assert remarks[-1].startswith("EMG ended at")
     assert remarks[-1].endswith("the buffer ran over")
     assert read_emg(tmp_path / "session").closed
+
+
+def test_the_virtual_subject_has_the_emg_of_its_ticks(tmp_path: Path):
+    """Read from the ring as the ticks come, it is what the same ticks give at once."""
+    settings = with_emg(source="virtual")
+    subject = {"OFF": {"voluntary_sd_nm": 0.3}, "DBS": {"tremor_amplitude_nm": 0.2}}
+    settings = parse_settings({"emg": settings.emg.model_dump(), "subject": subject})
+    tick = np.delete(np.arange(3000), slice(700, 720))  # ticks that the loop missed
+    epoch = np.select([tick < 500, tick < 1500, tick < 2000], [-1, 1, -1], 2)
+    rows = [
+        Sample(int(k), k / 1000.0, 0.0, int(n), *[0.0] * 9, 0)
+        for k, n in zip(tick, epoch, strict=True)
+    ]
+
+    conditions = {1: "OFF", 2: "DBS"}
+
+    def session(shared: SessionMemory) -> None:
+        for k, row in enumerate(rows):
+            if k and row.epoch > 0 and rows[k - 1].epoch != row.epoch:
+                facts = {"epoch": row.epoch, "condition": conditions[row.epoch]}
+                shared.events.push(k, {"event": "epoch_started", **facts})
+            assert shared.samples.push(row)
+            if k % 400 == 0:
+                time.sleep(0.08)
+
+    _, remarks = recorded(settings, tmp_path / "session", 1.4, None, session)
+    emg = read_emg(tmp_path / "session")
+    before = settings.subject["OFF"].relaxed
+    truth = VirtualMuscles(settings, before).take(tick, epoch, conditions)
+    np.testing.assert_allclose(np.column_stack([*emg.emg_v.values()]), truth, atol=1e-15)
+    np.testing.assert_allclose(emg.time_s, np.arange(len(truth)) / 2000.0, atol=1e-9)
+    assert remarks == []

@@ -82,7 +82,7 @@ class _Written:
     """The file, and what waits for it; a disk that refuses is tried again."""
 
     def __init__(self, settings: Settings, folder: Path) -> None:
-        emg = settings.emg
+        self.folder, emg = folder, settings.emg
         session_id = str(read_manifest(folder).get("session_id", ""))
         self._log = EmgLog(folder, emg.channels, emg.rate_hz, session_id)
         self._waiting: deque[EmgSamples] = deque()
@@ -134,14 +134,19 @@ def emg_main(
     console_pid : int
         The process that started this one.
     remarks : Connection
-        Takes a list of sentences at the end: what is missing.
+        Takes an empty list once the source is connected, and one of sentences at the end: what is
+        missing.
     """
     leave_to_the_others()
     os.nice(NICENESS)
     shared = SessionMemory.attach_or_end(names)
     found: list[str] = []
     try:
-        found = _record(settings, open_emg, shared, lost_s, console_pid)
+        events = _Events(shared)
+        source = open_emg(settings.emg) if open_emg else _Virtual(settings, shared, events)
+        written = _Written(settings, _folder(shared))
+        remarks.send([])
+        found = _record(source, written, events, shared, lost_s, console_pid)
     except (UserError, OSError) as error:
         found = [f"EMG was not recorded: {error}"]
     finally:
@@ -150,29 +155,33 @@ def emg_main(
         shared.leave()
 
 
+def _folder(shared: SessionMemory) -> Path:
+    folder = shared.status.folder()
+    if folder is None:
+        raise UserError("the session has no folder")
+    return folder
+
+
 def _record(
-    settings: Settings,
-    open_emg: OpenEmg | None,
+    source: EmgSource,
+    written: _Written,
+    events: _Events,
     shared: SessionMemory,
     lost_s: float,
     console_pid: int,
 ) -> list[str]:
     """Record; return what is missing, as sentences."""
-    status, events = shared.status, _Events(shared)
-    source = open_emg(settings.emg) if open_emg else _Virtual(settings, shared, events)
-    folder = status.folder()
-    if folder is None:
-        raise UserError("the session has no folder")
-    written = _Written(settings, folder)
+    status = shared.status
     missing: list[str] = []
-    over, last_s, now_s = False, 0.0, 0.0
+    over, last_s = False, 0.0
     try:
         while not over:
-            over = os.getppid() != console_pid or status.ended(Role.LOOP, lost_s)
+            # A loop that was killed did not say that it ended; the recorder does.
+            ended = any(status.ended(role, lost_s) for role in (Role.LOOP, Role.RECORDER))
+            over = ended or os.getppid() != console_pid
             events.follow()
             source_s, offset_s, emg_v = source.read()
             if events.origin_s is not None:
-                now_s = time.monotonic() - events.origin_s
                 time_s = source_s + (offset_s - events.origin_s)
                 since = time_s >= 0.0  # the session's clock began
                 if since.any():
@@ -187,14 +196,15 @@ def _record(
     except (UserError, OSError) as error:
         missing.append(f"EMG ended at {last_s:.1f} s: {error}")
     else:
-        missing += _gap(last_s, now_s)
+        loop = status.loop()
+        missing += _gap(last_s, loop.time_s if loop is not None else 0.0)
     finally:
         source.close()
         written.close()
     if written.lost:
         missing.append(f"{written.lost} samples of EMG found no room on the disk")
-    if status.folder() != folder:
-        missing.append(f"EMG is in {folder / EMG}, not with the samples; copy it to them")
+    if status.folder() != written.folder:
+        missing.append(f"EMG is in {written.folder / EMG}, not with the samples; copy it to them")
     return missing
 
 

@@ -45,6 +45,8 @@ from rigidimeter.rig.devices.base import EmgSource
 RING_S = 60.0
 """For how long the recorder may write nothing before samples are lost."""
 POLL_S = 0.05
+EMG_S = 30.0
+"""For how long a source of EMG is waited for before the session."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,7 @@ def supervise(
     Raises
     ------
     UserError
-        If the session folder cannot be made.
+        If the session folder cannot be made, or the source of EMG does not answer.
     """
     realtime, patience = realtime or Realtime(), patience or Patience()
     context = multiprocessing.get_context("spawn")
@@ -138,6 +140,14 @@ def supervise(
         try:
             me = os.getpid()
             recorder = start("recorder", recorder_main, recording, shared.names, patience, me)
+            muscles, emg_remarks = None, None
+            if recording.settings.emg.channels:
+                _await_recorder(recorder, status)
+                emg_remarks, theirs = context.Pipe(duplex=False)
+                emg = (recording.settings, open_emg, shared.names, patience.stopping_s, me, theirs)
+                muscles = start("emg", _emg_main, *emg)
+                theirs.close()
+                _await_emg(emg_remarks, status)
             loop = start("loop", loop_main, target, recording, shared.names, realtime, patience, me)
             _await_recorder(recorder, status)
             rig = recording.settings.rig
@@ -150,12 +160,6 @@ def supervise(
             if recording.settings.sharing.lsl:
                 sending = (recording.settings, shared.names, patience.stopping_s, me)
                 streamer = start("lsl", _streamer_main, *sending)
-            muscles, emg_remarks = None, None
-            if recording.settings.emg.channels:
-                emg_remarks, theirs = context.Pipe(duplex=False)
-                emg = (recording.settings, open_emg, shared.names, patience.stopping_s, me, theirs)
-                muscles = start("emg", _emg_main, *emg)
-                theirs.close()
             follow = _Follower(shared, console, operator_seen_ns or time.monotonic_ns)
             remarks = _see_through(loop, recorder, status, patience, follow)
             recorder_watch = WatchedProcess(recorder.pid or 0)
@@ -296,11 +300,23 @@ def _end(process: BaseProcess, wait_s: float) -> None:
         process.join(2.0)
 
 
+def _await_emg(remarks: Connection, status: SharedStatus) -> None:
+    """Wait until the source of EMG is connected: nothing moves before."""
+    until_s = time.monotonic() + EMG_S
+    while not remarks.poll(POLL_S):
+        status.beat(Role.CONSOLE)
+        if time.monotonic() > until_s:
+            raise UserError(f"the source of EMG did not answer within {EMG_S:g} s")
+    refusal = remarks.recv()
+    if refusal:
+        raise UserError(*refusal)
+
+
 def _said_of_emg(remarks: Connection) -> list[str]:
     """Return what the process of the EMG left to say."""
     with remarks:
         try:
-            return list(remarks.recv()) if remarks.poll() else []
+            return list(remarks.recv())
         except EOFError:
             return ["EMG ended before the session did: its process was ended"]
 
