@@ -22,7 +22,12 @@ from rigidimeter.core.study_files.exclusions import (
     include_epoch,
     row_path,
 )
-from rigidimeter.core.study_files.extended_folder import extend_study, write_new_study
+from rigidimeter.core.study_files.extended_folder import (
+    extend_study,
+    rate_session,
+    raters_of,
+    write_new_study,
+)
 from rigidimeter.core.study_files.folder import StudyFolder, TableRow, is_study, read_study_folder
 from rigidimeter.core.study_files.next_session import (
     PLAN_COLUMNS,

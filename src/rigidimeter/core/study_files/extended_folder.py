@@ -139,6 +139,56 @@ def extend_study(
     return said
 
 
+def raters_of(study: Path, path: str) -> dict[str, str]:
+    """Return the score that each examiner gave a session or its epochs; several with blanks.
+
+    Raises
+    ------
+    UserError
+        If the table of ratings cannot be read.
+    """
+    scores: dict[str, list[str]] = {}
+    for row in table_rows(table_path(study, "ratings"), "ratings"):
+        if row.get("note", "").partition(", epoch ")[0] == path:
+            scores.setdefault(row["examiner"], []).append(row["score"])
+    return {examiner: " ".join(given) for examiner, given in scores.items()}
+
+
+def rate_session(study: Path, path: str, examiner: str, score: float) -> None:
+    """Write the score that an examiner gave a recorded session into the ratings of its study.
+
+    Parameters
+    ----------
+    study : Path
+    path : str
+        Of the session folder, below that of the study.
+    examiner : str
+    score : float
+
+    Raises
+    ------
+    UserError
+        If this examiner rated it before, it has epochs of several conditions or none, or the table
+        cannot be written.
+    """
+    events, _ = read_events(study / path / EVENTS)
+    session = recorded_session(path, read_manifest(study / path), events)
+    if len(session.conditions) != 1:
+        raise UserError(f"{path}: has not one condition, so its epochs are rated one by one")
+    if examiner in raters_of(study, path):
+        table = table_path(study, "ratings")
+        raise UserError(f"{path}: {examiner} rated it before; correct {table} if that is wrong")
+    row = {
+        "subject": session.subject,
+        "day": session.day,
+        "condition": session.conditions[0],
+        "examiner": examiner,
+        "score": f"{score:g}",
+        "note": path,
+    }
+    add_rows(table_path(study, "ratings"), "ratings", [row])
+
+
 def _found(study: Path) -> list[Path]:
     """Return the session folders of a study folder, the oldest first."""
     if not study.is_dir():

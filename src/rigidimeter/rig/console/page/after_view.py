@@ -33,6 +33,8 @@ from rigidimeter.rig.console.page.sessions_found import (
     extended,
     found_sessions,
     include,
+    rate,
+    rated_words,
     report_file,
     report_folder,
     report_link,
@@ -78,6 +80,7 @@ class AfterView:
             repeat=self._repeat,
             leave_out=self._leave_out,
             include=self._include,
+            rate=self._rate,
         )
         several = not state.place.one_session
         ui.label(f"Sessions in {self._root}").classes("text-lg")
@@ -132,7 +135,11 @@ class AfterView:
                 with self._list:
                     self._rows[session.name] = SessionRow(self._acts, session)
             row = self._rows[session.name]
-            row.show(session, reported=self._reported(report_folder(session.name)))
+            row.show(
+                session,
+                reported=self._reported(report_folder(session.name)),
+                rated=rated_words(self._root, session),
+            )
             if self._list.default_slot.children[at] is not row.frame:
                 row.frame.move(self._list, at)
 
@@ -179,6 +186,32 @@ class AfterView:
             f"{epoch.excluded}. The study keeps a record of both."
         )
         self._ask_reason(words, "Include again", include, session, epoch)
+
+    def _rate(self, session: FoundSession) -> None:
+        """Rate a session of a plan, by one of its raters."""
+        with self._dialogs, ui.dialog() as dialog, ui.card():
+            ui.label(f"Rating of {session.name}.")
+            by = ui.select(list(session.raters), label="Examiner", value=session.raters[0])
+            by.classes("entry").mark("rater")
+            score = ui.input("Score").props("maxlength=8 data-field=rating")
+
+            def confirm() -> None:
+                if not self._may_act():
+                    return
+                try:
+                    warning = rate(self._state.place, session.name, by.value, score.value or "")
+                except UserError as error:
+                    ui.notify(str(error))
+                    return
+                if warning:
+                    ui.notify(warning)
+                dialog.close()
+                self._update()
+
+            with ui.row():
+                ui.button("Cancel", on_click=dialog.close)
+                ui.button("Save", on_click=confirm)
+        dialog.open()
 
     def _ask_reason(
         self,

@@ -29,6 +29,7 @@ class Acts:
     repeat: Callable[[FoundSession, FoundEpoch], Any]
     leave_out: Callable[[FoundSession, FoundEpoch], Any]
     include: Callable[[FoundSession, FoundEpoch], Any]
+    rate: Callable[[FoundSession], Any]
 
 
 class SessionRow:
@@ -53,18 +54,20 @@ class SessionRow:
         self.frame = ui.expansion().classes("w-full session")
         with self.frame:
             self._reason = ui.label()
+            self._rated = ui.label()
             with ui.row():
                 self._recover = self._button("Recover", acts.recover)
                 self._rest = self._button("", acts.run_rest)
                 self._button("Estimate", acts.estimate)
                 self._button("Report", acts.report)
+                self._rate = self._button("Rate", acts.rate)
                 target = report_link(report_folder(session.name))
                 self._link = ui.link("Open its report", target, new_tab=True)
 
     def _button(self, words: str, act: Callable[[FoundSession], Any]) -> ui.button:
         return ui.button(words, on_click=lambda: act(self.session))
 
-    def show(self, session: FoundSession, *, reported: bool) -> None:
+    def show(self, session: FoundSession, *, reported: bool, rated: str = "") -> None:
         """Show what is known of the session now."""
         self.session = session
         how = session.outcome or session.reason
@@ -73,6 +76,8 @@ class SessionRow:
         self._recover.set_visibility(not session.outcome and not session.recording)
         _show(self._rest, f"Run what is left: {len(session.left)}" if session.left else "")
         self._link.set_visibility(reported)
+        _show(self._rated, rated)
+        self._rate.set_visibility(bool(rated))
         for epoch in session.epochs:
             if epoch.label not in self._epochs:
                 with self.frame:

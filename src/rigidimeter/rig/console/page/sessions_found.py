@@ -35,10 +35,12 @@ from rigidimeter.core.study_files import (
     excluded_epochs,
     extend_study,
     include_epoch,
+    rate_session,
+    raters_of,
     read_plan,
     read_study_toml,
 )
-from rigidimeter.rig.console.page.form_values import parse_line, parse_name
+from rigidimeter.rig.console.page.form_values import parse_line, parse_name, parse_number
 from rigidimeter.rig.console.page.server_state import Place
 
 MAX_SESSIONS = 200
@@ -76,8 +78,8 @@ class FoundEpoch:
 class FoundSession:
     """A session folder, by its path; `outcome` is empty where the session was not closed.
 
-    `left` are the numbers of the planned epochs that neither it nor a session that continues it
-    ran, or will run.
+    `raters` are those that a plan names. `left` are the numbers of the planned epochs that neither
+    it nor a session that continues it ran, or will run.
     """
 
     name: str
@@ -94,6 +96,7 @@ class FoundSession:
     plan: tuple[int, ...] = ()
     left: tuple[int, ...] = ()
     blinded: bool = False
+    raters: tuple[str, ...] = ()
 
     @property
     def unfinished(self) -> bool:
@@ -227,6 +230,7 @@ def _session(root: Path, folder: Path, excluded: dict[tuple[str, str], str]) -> 
         manifest.get("continues", {}).get("session_id", ""),
         tuple(entry["number"] for entry in plan),
         blinded=about.get("blinded") is True,
+        raters=tuple(str(about.get("plan", {}).get("raters", "")).split()),
     )
 
 
@@ -274,6 +278,31 @@ def extended(place: Place) -> list[str]:
     except (UserError, OSError) as error:
         return [f"not in the study: {error}"]
     return found if plan is None else [in_codes(line, plan.about.codes) for line in found]
+
+
+def rate(place: Place, session: str, examiner: str, score: str) -> str:
+    """Write a rating of a session into the study; return what is to be said of the score.
+
+    Raises
+    ------
+    UserError
+        If it cannot be read or written, or was given before.
+    """
+    value = parse_number(score, "score")
+    rate_session(place.root, session, examiner, value)
+    return off_scale(place, value)
+
+
+def rated_words(root: Path, session: FoundSession) -> str:
+    """Return who of the planned raters rated a session and who did not."""
+    if not session.raters or not session.outcome:
+        return ""
+    try:
+        scores = raters_of(root, session.name)
+    except UserError as error:
+        return str(error)
+    parts = [f"{one}: {scores.get(one, 'not rated yet')}" for one in session.raters]
+    return f"Ratings: {'; '.join(parts)}"
 
 
 def off_scale(place: Place, score: float) -> str:

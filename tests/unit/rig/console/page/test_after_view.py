@@ -16,8 +16,8 @@ from rigidimeter.rig.console.page import AfterView, CommandResult, Jobs, Place, 
 BEGUN = {"task": "prbs", "condition": "OFF", "time_s": 0.0}
 
 
-def session(root: Path, name: str) -> SessionWriter:
-    writer = SessionWriter(root / name, Settings(), [], {}, virtual=True)
+def session(root: Path, name: str, **about: object) -> SessionWriter:
+    writer = SessionWriter(root / name, Settings(), [], {}, virtual=True, about=about)
     writer.event("epoch_started", epoch=1, label="1", **BEGUN)
     return writer
 
@@ -81,8 +81,9 @@ def test_rows_say_what_is_known_now(client, tmp_path):
     assert list(shown(client, ui.button).values()).count("Repeat") == 2
 
 
-def test_leaving_out_is_cancelled_confirmed_and_taken_back(client, tmp_path):
-    ended(session(tmp_path, "S01-1"))
+@pytest.mark.parametrize("name", ["S01-1", "sessions/S01-day-1-1"])
+def test_leaving_out_is_cancelled_confirmed_and_taken_back(client, tmp_path, name):
+    ended(session(tmp_path, name))
     AfterView(ServerState(Place(tmp_path, Settings(), "")), Jobs(), lambda: True, ui.label())
 
     def click(words: str) -> None:
@@ -117,10 +118,36 @@ def test_leaving_out_is_cancelled_confirmed_and_taken_back(client, tmp_path):
     answer("in the rest", "Lee")
     click("Include again")
     assert not dialogue()
-    assert "by Lee (in the rest): S01-1,1,coughed,Kim" in table.read_text("utf-8")
+    assert f"by Lee (in the rest): {name},1,coughed,Kim" in table.read_text("utf-8")
     assert "left out: coughed" not in " ".join(
         words for words in shown(client, ui.label).values() if words.startswith("epoch 1")
     )
+
+
+def test_the_planned_raters_rate_a_session_after_it(client, tmp_path):
+    name = "sessions/S01-day-1-1"
+    ended(session(tmp_path, name, subject="S01", day="1", plan={"raters": "A B"}))
+    AfterView(ServerState(Place(tmp_path, Settings(), "")), Jobs(), lambda: True, ui.label())
+
+    def click(words: str) -> None:
+        number = max(n for n, text in shown(client, ui.button).items() if text == words)
+        with client:
+            for one in client.elements[number]._event_listeners.values():
+                one.handler(None)
+
+    def score(text: str) -> None:
+        click("Rate")
+        fields = [one for one in client.elements.values() if isinstance(one, ui.input)]
+        [one for one in fields if one.props.get("data-field") == "rating"][-1].value = text
+        click("Save")
+
+    assert "Ratings: A: not rated yet; B: not rated yet" in shown(client, ui.label).values()
+    score("bad")
+    score("1,5")
+    assert "Ratings: A: 1.5; B: not rated yet" in shown(client, ui.label).values()
+    score("2")  # once alone
+    assert f"S01,1,OFF,A,1.5,{name}" in (tmp_path / "ratings.csv").read_text()
+    assert (tmp_path / "ratings.csv").read_text().count(name) == 1
 
 
 def test_a_double_click_runs_a_command_once(client, tmp_path):
