@@ -20,6 +20,7 @@ BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 SMALLEST = {
     "__main__": "--quick",
     "accuracy": "--share 0 --only rates",
+    "active_stretches": "--epochs 1 --only fitted",
     "archive": "--epochs 8",
     "between_samples": "PI",
     "calibration": "0.001",
@@ -57,6 +58,8 @@ def smaller(name: str, module: ModuleType, folder: Path) -> Mapping[str, Any]:
     if name == "late_drive":
         some = {key: module.RECORDED[key] for key in list(module.RECORDED)[:1]}
         return {"EPOCHS": 2, "LIMBS": {"human": (*module.RIGS,)[1:]}, "RECORDED": some}
+    if name == "active_stretches":
+        return {"SUBJECTS": dict([*module.SUBJECTS.items()][:1])}
     if name == "archive":
         return {"apart": module.measured}
     if name in ("drive_torque", "false_alarms"):

@@ -33,7 +33,7 @@ from rigidimeter.core.records import Analysis, Notice
 from rigidimeter.core.settings import load_settings
 from rigidimeter.core.study_files import STUDY_FILE, is_study, read_study_folder
 
-_OF_STUDIES_TOO = ("paths", "method", "band_hz", "controller", "settings")
+_OF_STUDIES_TOO = ("paths", "method", "band_hz", "controller", "keep_active", "settings")
 """Fields of `Recordings` that do not say how to read a single recording."""
 
 

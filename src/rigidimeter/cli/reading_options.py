@@ -116,6 +116,11 @@ class Recordings:
         "command was recorded, and else no loop is assumed. A wrong value makes iv less "
         "precise but does not bias it.",
     )
+    keep_active: bool = ESTIMATE.flag(
+        "--keep-active",
+        "Fit stretches in which the EMG shows an active muscle, too. Default: they are left out.",
+        hidden=True,
+    )
     settings: Path | None = SETTINGS
 
     def read(self) -> Recording:
@@ -216,6 +221,8 @@ class Recordings:
             inertia, damping = self.controller
             values = {"inertia_kg_m2": inertia, "damping_nm_s_rad": damping}
             yield f"--controller {inertia:g} {damping:g}", {"controller": values}
+        if self.keep_active:
+            yield "--keep-active", {"estimation": {"leave_out_active": False}}
 
 
 def plain_recordings(path: Path) -> Recordings:

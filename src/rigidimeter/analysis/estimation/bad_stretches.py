@@ -9,6 +9,7 @@ angle moves as it says.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -49,8 +50,17 @@ def without_bad_stretches(epoch: Epoch, settings: Settings) -> Epoch:
     if not fitted_channels(epoch):
         return epoch
     found = [one for one in bad_stretches(epoch, diagnostics) if levels.of(one.check) == "exclude"]
+    return leaving_out(epoch, found, settings)
+
+
+def leaving_out(epoch: Epoch, found: Sequence[LeftOut], settings: Settings) -> Epoch:
+    """Return a bridged epoch without some stretches too; as it is where too little would be left.
+
+    That is more than `max_left_out_percent` of it, or less than can be fitted.
+    """
     if not found:
         return epoch
+    diagnostics = settings.diagnostics
     without = replace(epoch, left_out=(*epoch.left_out, *sorted(found)))
     trim_s = settings.estimation.trim_s
     (before_s, _), (left_s, _) = used_s(epoch, trim_s), used_s(without, trim_s)

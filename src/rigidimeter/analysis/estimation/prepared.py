@@ -10,11 +10,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
+from rigidimeter.analysis.estimation.active_stretches import activities
 from rigidimeter.analysis.estimation.bad_stretches import without_bad_stretches
 from rigidimeter.analysis.estimation.closedloop.drive_fit import FoundDrive, fit_drive
 from rigidimeter.analysis.estimation.screening import before_fit
 from rigidimeter.analysis.estimation.signals import Signals
-from rigidimeter.core.records import Channel, Epoch, Outcome
+from rigidimeter.core.records import Activity, Channel, Epoch, Outcome
 from rigidimeter.core.settings import EstimationSettings, Settings
 from rigidimeter.model import DriveModel
 
@@ -67,11 +68,17 @@ class PreparedEpoch:
     settings : Settings
     source : Source
         That all epochs of its recording share.
+    activity : Activity or None
+        What the EMG shows; None without EMG.
+    with_active : Epoch or None
+        The epoch with the stretches that are left out for an active muscle; None where none is.
     """
 
     epoch: Epoch
     settings: Settings
     source: Source
+    activity: Activity | None = None
+    with_active: Epoch | None = None
     _made: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
@@ -108,7 +115,8 @@ class PreparedEpoch:
 
     def moved(self, delay_s: float) -> PreparedEpoch:
         """Return the epoch with its torque this much earlier; nothing is made of it yet."""
-        return replace(self, epoch=torque_earlier(self.epoch, delay_s))
+        whole = self.with_active and torque_earlier(self.with_active, delay_s)
+        return replace(self, epoch=torque_earlier(self.epoch, delay_s), with_active=whole)
 
     def closed_as(self, outcome: Outcome) -> PreparedEpoch:
         """Return the epoch with another outcome, and with all that was made of it."""
@@ -127,14 +135,28 @@ def prepare(
     epochs : iterable of Epoch
     settings : Settings
     screen : bool
-        Leave out the stretches in which a sensor did not measure.
+        Leave out the stretches in which a sensor did not measure, or a muscle was active.
     """
-    everything = [without_bad_stretches(e, settings) if screen else e for e in epochs]
+    recorded = list(epochs)
+    if not screen:
+        sources = _sources(recorded, settings)
+        return [PreparedEpoch(epoch, settings, sources[epoch.source]) for epoch in recorded]
+    measured = [without_bad_stretches(epoch, settings) for epoch in recorded]
+    found = activities(recorded, measured, settings)
+    sources = _sources([epoch for epoch, _ in found], settings)
+    return [
+        PreparedEpoch(
+            epoch, settings, sources[epoch.source], activity, whole if epoch is not whole else None
+        )
+        for whole, (epoch, activity) in zip(measured, found, strict=True)
+    ]
+
+
+def _sources(epochs: Iterable[Epoch], settings: Settings) -> dict[str, Source]:
     by_source: dict[str, list[Epoch]] = {}
-    for epoch in everything:
+    for epoch in epochs:
         by_source.setdefault(epoch.source, []).append(epoch)
-    sources = {name: Source(own, settings) for name, own in by_source.items()}
-    return [PreparedEpoch(epoch, settings, sources[epoch.source]) for epoch in everything]
+    return {name: Source(own, settings) for name, own in by_source.items()}
 
 
 def drive_followed(prepared: PreparedEpoch) -> bool:

@@ -31,6 +31,7 @@ from rigidimeter.core.records import (
     Fit,
     Outcome,
     Score,
+    activity_from,
     readonly,
 )
 
@@ -87,7 +88,9 @@ def write_estimates_csv(path: Path, analysis: Analysis) -> None:
     An analysis of sinusoids alone gives the table of scores.
     """
     rows = analysis.rows()
-    write_text(path, csv_text(list(rows[0]) if rows else ["epoch"], rows))
+    # Epochs with EMG have more columns than others.
+    columns = dict.fromkeys(name for row in rows for name in row) or ["epoch"]
+    write_text(path, csv_text(list(columns), rows))
 
 
 def read_estimates(path: Path) -> Analysis:
@@ -148,7 +151,8 @@ def _read_outcome(row: Mapping[str, Any], numbers: Sequence[str]) -> Outcome:
 def _fit_row(fit: Fit) -> dict[str, Any]:
     band = list(fit.band_hz) if all(map(math.isfinite, fit.band_hz)) else None
     findings = [finding.row() for finding in fit.findings]
-    return fit.row() | {"band_hz": band, "findings": findings}
+    activity = {} if fit.activity is None else fit.activity.document()
+    return fit.row() | activity | {"band_hz": band, "findings": findings}
 
 
 def _pooled(fits: Sequence[Fit]) -> dict[str, Any] | None:
@@ -177,6 +181,7 @@ def _fit(row: Mapping[str, Any], method: str) -> Fit:
         n_samples=int(row["n_samples"]),
         band_hz=(float(low), float(high)),
         findings=tuple(finding_from(found) for found in row["findings"]),
+        activity=activity_from(row),
         **numbers,
     )
 

@@ -112,16 +112,48 @@ JOINT_KINDS = (
     ),
     Kind(
         "emg_activity",
-        "share of the time in which the EMG's mean rectified value over `emg_window_s` passes "
-        "`emg_baseline_factor` times its own quietest fifth",
-        headline="The muscle was active in {value:.0f} % of the time",
-        measured="The EMG exceeds {factor:g} times its baseline of {baseline_uv:.3g} µV in "
-        "{value:.0f} % of the time (at most {limit:g} %).",
-        meaning="The muscle was active, so J, B and K are not those of a relaxed joint.",
+        "share of the time in which the 6 Hz envelope of a muscle's EMG passes "
+        "`emg_baseline_factor` times the quietest fifth of the recording; such stretches are left "
+        "out (`estimation.leave_out_active`), except of a muscle that follows the motion, and at "
+        "most `max_left_out_percent` of an epoch",
+        headline="A muscle was active in {value:.0f} % of the time",
+        measured="The EMG of {channel} shows activity in {value:.0f} % of the time (at most "
+        "{limit:g} %); nothing is left out for it.",
+        meaning="J, B and K are not those of a relaxed joint.",
         remedy="Ask the subject to relax and repeat, or leave the active part out.",
         setting="max_emg_active_percent",
-        variants=OF_SUBJECT,
-        example={"value": 38.0, "limit": 20.0},
+        variants={
+            **OF_SUBJECT,
+            "left_out": {
+                "headline": "A muscle was active in {value:.2g} % of the time; that is left out",
+                "measured": "The EMG of {channel} shows activity in {value:.2g} % of the time; "
+                "what is left out is {spans}.",
+                "meaning": "J, B and K are from {used_s:.3g} of {length_s:.3g} s; with these "
+                "stretches they differ by less than their intervals.",
+                "remedy": "",
+            },
+            "moved": {
+                "headline": "Leaving out active stretches moves J, B or K beyond its interval",
+                "measured": "The EMG of {channel} shows activity in {value:.2g} % of the time; "
+                "what is left out is {spans}. {both}.",
+                "meaning": "The estimate is from {used_s:.3g} of {length_s:.3g} s.",
+                "remedy": "Report both; --keep-active fits everything.",
+            },
+            "locked": {
+                "headline": "A muscle was active with the motion in {value:.2g} % of the time",
+                "measured": "The EMG of {channel} shows activity in {value:.2g} % of the time, and "
+                "follows the velocity by more than chance, as a reflex does.",
+                "meaning": "It stays in: what is left out by motion biases B and K. They include "
+                "the reflex.",
+                "remedy": "",
+            },
+        },
+        example={
+            "value": 38.0,
+            "limit": 20.0,
+            "channel": "emg_v and emg_2_v",
+            "both": "B 0.214 with them and 0.137 without",
+        },
     ),
     Kind(
         "tremor",

@@ -3,6 +3,7 @@
 Every name ends in its unit. Arrays are float64 and read-only once inside a record.
 """
 
+from rigidimeter.core.records.activity import ActiveStretch, Activity, activity_from
 from rigidimeter.core.records.analysis_record import (
     Analysis,
     FindingGroup,

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.core.findings import Finding, Three
+from rigidimeter.core.records.activity import Activity
 from rigidimeter.core.records.epochs import Outcome, readonly
 from rigidimeter.core.units import deg_from_rad
 from rigidimeter.core.words import html_table, interval_text, number, one_cell, one_line, with_error
@@ -119,6 +120,8 @@ class Fit:
         Largest less smallest measured angle, of all frequencies, in the part of the epoch that was
         fitted; NaN where the angle was not measured. Of a pooled fit that of the epoch in which it
         is largest.
+    activity : Activity or None
+        What the EMG of its epoch shows; None without EMG.
     """
 
     source: str
@@ -141,6 +144,7 @@ class Fit:
     findings: tuple[Finding, ...] = ()
     angle_rms_rad: float = math.nan
     angle_range_rad: float = math.nan
+    activity: Activity | None = None
 
     inertia_kg_m2 = _Entry("value", 0)
     inertia_kg_m2_se = _Entry("se", 0)
@@ -261,7 +265,8 @@ class Fit:
     def row(self) -> dict[str, Any]:
         """Return the names and numbers of the fit, as files and tables have them."""
         numbers = {name: getattr(self, name) for name in (*FIT_NUMBERS, *AMPLITUDE)}
-        return _named(self) | numbers | {"n_samples": self.n_samples}
+        activity = {} if self.activity is None else self.activity.row()
+        return _named(self) | numbers | {"n_samples": self.n_samples} | activity
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,9 @@ class EstimationSettings(Section):
     `torque_lowpass_hz` is the corner of the low-pass in the torque sensor or its amplifier, a
     Butterworth filter of the given order; 0 where there is none, or none below half the rate. What
     it does to the torque is then done to the motion too.
+
+    With `leave_out_active`, stretches in which the EMG shows an active muscle are left out, unless
+    the muscle follows the motion.
     """
 
     ascending: ClassVar = (
@@ -49,6 +52,7 @@ class EstimationSettings(Section):
     published_highpass_order: int = quantity(2, "1", 1, 6)
     correct_delay: bool = True
     max_delay_s: float = quantity(0.04, "s", 0.001, 0.2)
+    leave_out_active: bool = True
 
 
 class ScoreSettings(Section):
@@ -127,7 +131,7 @@ class DiagnosticsSettings(Section):
     active_torque_nm: float = quantity(0.1, "N·m", 0.0, 100.0, above=True)
     active_share_percent: float = quantity(50.0, "%", 0.0, 1000.0)
     max_active_percent: float = quantity(20.0, "%", 0.0, 100.0)
-    emg_window_s: float = quantity(0.25, "s", 0.01, 10.0)
+    min_burst_s: float = quantity(0.25, "s", 0.01, 10.0)
     emg_baseline_factor: float = quantity(3.0, "1", 1.0, 1000.0, above=True)
     max_emg_active_percent: float = quantity(20.0, "%", 0.0, 100.0)
     max_varying_percent: float = quantity(10.0, "%", 0.0, 1000.0)

@@ -31,6 +31,7 @@ RENAMED: Mapping[str, Mapping[str, str]] = {
         "tremor_share_most_percent": "max_tremor_share_percent",
         "loop_bias_most_percent": "max_loop_bias_percent",
         "active_most_percent": "max_active_percent",
+        "emg_window_s": "min_burst_s",
         "emg_active_most_percent": "max_emg_active_percent",
         "varying_most_percent": "max_varying_percent",
         "saturated_most_percent": "max_saturated_percent",

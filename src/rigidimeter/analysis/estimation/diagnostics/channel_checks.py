@@ -34,7 +34,7 @@ def saturation(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     most, found = settings.max_saturated_percent, _left_out(epoch, "saturation")
     if found:
         value = 100.0 * _seconds(found) / _length_s(epoch)
-        return Look(value, most, True, {"channel": _channels(found), **_rest(epoch, found)})
+        return Look(value, most, True, {"channel": _channels(found), **rest_of(epoch, found)})
     shares = {c.name: 100.0 * share_at_extremes(epoch, c, settings) for c in fitted_channels(epoch)}
     worst = max(shares, key=lambda name: shares[name])
     return at_most(shares[worst], most, channel=worst)
@@ -45,7 +45,7 @@ def frozen(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     most, found = settings.max_frozen_s, _left_out(epoch, "frozen")
     if found:
         value = max(stretch.stop_s - stretch.start_s for stretch in found)
-        return Look(value, most, True, {"channel": _channels(found), **_rest(epoch, found)})
+        return Look(value, most, True, {"channel": _channels(found), **rest_of(epoch, found)})
     longest = {c.name: longest_repetition(epoch, c, settings) for c in fitted_channels(epoch)}
     worst = max(longest, key=lambda name: longest[name][0])
     value, start_s = longest[worst]
@@ -56,7 +56,7 @@ def left_out(epoch: Epoch) -> Look:
     """Return for how long the user left parts of the epoch out, in s."""
     found = _left_out(epoch, "")
     reasons = "; ".join(dict.fromkeys(stretch.reason for stretch in found if stretch.reason))
-    facts = {"reason": reasons or "no reason was given", **_rest(epoch, found)}
+    facts = {"reason": reasons or "no reason was given", **rest_of(epoch, found)}
     return Look(_seconds(found), 0.0, bool(found), facts)
 
 
@@ -69,7 +69,7 @@ def lost_samples(epoch: Epoch, settings: DiagnosticsSettings) -> Look:
     start_s = min(float(torque_s[0]), *(stretch.start_s for stretch in found))
     stop_s = max(float(torque_s[-1]), *(stretch.stop_s for stretch in found))
     value = 100.0 * lost_s / (stop_s - start_s)
-    facts = {"lost_s": lost_s, "reason": found[0].reason, **_rest(epoch, found)}
+    facts = {"lost_s": lost_s, "reason": found[0].reason, **rest_of(epoch, found)}
     return Look(value, most, True, facts)
 
 
@@ -111,7 +111,7 @@ def _length_s(epoch: Epoch) -> float:
     return float(torque.time_s[-1] - torque.time_s[0])
 
 
-def _rest(epoch: Epoch, stretches: Sequence[LeftOut]) -> dict[str, Fact]:
+def rest_of(epoch: Epoch, stretches: Sequence[LeftOut]) -> dict[str, Fact]:
     """Return which parts are left out, and how much of the epoch is used."""
     length_s = _length_s(epoch)
     used_s = length_s - left_out_s(epoch)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
@@ -149,6 +149,15 @@ class Case:
             self._made[make] = make(self)
         found: T = self._made[make]
         return found
+
+    @cached_property
+    def with_active(self) -> Fit | None:
+        """The fit with the stretches that are left out for an active muscle; None if none is."""
+        if self.prepared is None or self.method is None or self.prepared.with_active is None:
+            return None
+        whole = replace(self.prepared, epoch=self.prepared.with_active, with_active=None)
+        (fit,), _ = self.method.fit([whole], None, lambda _: None, False)
+        return fit if fit.n_samples else None
 
     @cached_property
     def voluntary_nm(self) -> Array:

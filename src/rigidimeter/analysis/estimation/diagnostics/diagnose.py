@@ -97,6 +97,7 @@ def checked(
     by_noise : bool
         False where J, B and K are used with others by least squares without weights.
     """
+    fit = replace(fit, activity=prepared.activity)
     if fit.n_samples == 0 or prepared.obstacle:
         return fit  # the fit has said why
     method = method_named(fit.method)

@@ -11,24 +11,29 @@ is seen here is the least of it.
 from __future__ import annotations
 
 import numpy as np
-import scipy
 
+from rigidimeter.analysis.estimation.active_stretches import CHECK
 from rigidimeter.analysis.estimation.bandlimited import zero_phase_band
+from rigidimeter.analysis.estimation.diagnostics.channel_checks import rest_of
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
+    HARMFUL,
+    Case,
     Check,
+    Harmless,
     Look,
     at_most,
     push_effect,
     push_harmless,
 )
+from rigidimeter.analysis.estimation.found import half_widths
 from rigidimeter.analysis.estimation.power_lines import lines_inside, power_lines
 from rigidimeter.analysis.estimation.signals import Array, Signals
-from rigidimeter.core.records import Channel
+from rigidimeter.core.findings import Effect, Fact
+from rigidimeter.core.records import PARAMETERS
 from rigidimeter.core.settings import DiagnosticsSettings
+from rigidimeter.core.words import number
 
 WINDOW_S = 1.0
-BASELINE_QUANTILE = 0.2
-"""The quietest fifth of the envelope is rest: its upper end is the baseline."""
 
 
 def voluntary_torque(voluntary_nm: Array, signals: Signals, settings: DiagnosticsSettings) -> Look:
@@ -79,23 +84,47 @@ def active_movement(voluntary_nm: Array, signals: Signals, settings: Diagnostics
     return at_most(value, settings.max_active_percent, above_nm=above_nm, first_s=first_s)
 
 
-def emg_envelope_v(emg: Channel, window_s: float) -> Array:
-    """Return the moving mean of the rectified EMG, its own mean taken off first, in V."""
-    length = max(round(window_s * emg.rate_hz), 1)
-    rectified = np.abs(emg.values - np.mean(emg.values))
-    return np.asarray(scipy.ndimage.uniform_filter1d(rectified, length, mode="nearest"))
+def emg_activity(case: Case) -> Look | None:
+    """Return in what share of the time a muscle was active, and what was done about it.
 
-
-def emg_activity(emg: Channel, settings: DiagnosticsSettings) -> Look:
-    """Return in what share of the time the EMG stands above its own baseline.
-
-    A muscle that is active from beginning to end has no baseline to stand above.
+    Where active stretches are left out, J, B and K with them are held against those without.
     """
-    envelope = emg_envelope_v(emg, settings.emg_window_s)
-    baseline = float(np.quantile(envelope, BASELINE_QUANTILE))
-    factor, most = settings.emg_baseline_factor, settings.max_emg_active_percent
-    value = 100.0 * float(np.mean(envelope > factor * baseline))
-    return at_most(value, most, factor=factor, baseline_uv=1e6 * baseline)
+    prepared = case.prepared
+    if prepared is None or prepared.activity is None:
+        return None
+    found, most = prepared.activity, case.settings.max_emg_active_percent
+    value = found.active_percent
+    muscles = dict.fromkeys(one.channel for one in found.stretches)
+    facts: dict[str, Fact] = {"channel": " and ".join(muscles)}
+    if prepared.with_active is not None:
+        out = [one for one in case.epoch.left_out if one.check == CHECK]
+        facts |= rest_of(case.epoch, out)
+        with_them = case.with_active
+        if with_them is None:
+            return Look(value, most, True, facts, "left_out")
+        change, half = with_them.value - case.parameters, half_widths(with_them)
+        effect = Effect.of(change, with_them.value, half)
+        moved = np.abs(change) > half
+        if not np.any(moved):
+            return Look(value, most, True, facts, "left_out", effect)
+        facts["both"] = ", ".join(
+            f"{p.symbol} {number(one)} with them and {number(other)} without"
+            for p, one, other, shown in zip(
+                PARAMETERS, with_them.value, case.parameters, moved, strict=True
+            )
+            if shown
+        )
+        return Look(value, most, True, facts, "moved", effect)
+    if any(one.locked for one in found.stretches):
+        return Look(value, most, True, facts, "locked")
+    return at_most(value, most, **facts)
+
+
+def _left_out_or_push(case: Case, look: Look) -> Harmless:
+    """Return that what is left out, or follows the motion, does not bias the estimate."""
+    if look.variant == "moved":
+        return HARMFUL
+    return (look.variant, {}) if look.variant else push_harmless(case, look)
 
 
 MOVEMENT_CHECKS = (
@@ -114,11 +143,10 @@ MOVEMENT_CHECKS = (
         effect=push_effect,
     ),
     Check(
-        "emg_activity",
-        ("emg_v",),
-        lambda c: emg_activity(c.epoch.channels["emg_v"], c.settings),
-        of_fit=False,
-        harmless=push_harmless,
+        CHECK,
+        (),
+        emg_activity,
+        harmless=_left_out_or_push,
         effect=push_effect,
     ),
 )
