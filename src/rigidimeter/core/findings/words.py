@@ -37,6 +37,8 @@ WHEN: Mapping[str, str] = {
     "per_degree": "When the settings seem to be per degree",
     "per_degree_twice": "When the settings seem to be multiplied by 57.3",
     "left_out": "When that part is left out",
+    "moved": "When leaving it out moves J, B or K beyond its interval",
+    "locked": "When the muscle follows the motion",
     "followed": "When the drive was identified",
     "velocity": "When the velocity fits worse",
     "angle": "When the angle fits worse",

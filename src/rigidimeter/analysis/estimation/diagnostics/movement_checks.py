@@ -101,12 +101,12 @@ def emg_activity(case: Case) -> Look | None:
         facts |= rest_of(case.epoch, out)
         with_them = case.with_active
         if with_them is None:
-            return Look(value, most, True, facts, "left_out")
+            return Look(value, most, True, facts)
         change, half = with_them.value - case.parameters, half_widths(with_them)
         effect = Effect.of(change, with_them.value, half)
         moved = np.abs(change) > half
         if not np.any(moved):
-            return Look(value, most, True, facts, "left_out", effect)
+            return Look(value, most, True, facts, effect=effect)
         facts["both"] = ", ".join(
             f"{p.symbol} {number(one)} with them and {number(other)} without"
             for p, one, other, shown in zip(
@@ -115,8 +115,8 @@ def emg_activity(case: Case) -> Look | None:
             if shown
         )
         return Look(value, most, True, facts, "moved", effect)
-    if any(one.locked for one in found.stretches):
-        return Look(value, most, True, facts, "locked")
+    if _locked(case):
+        return Look(value, most, True, facts)
     return at_most(value, most, **facts)
 
 
@@ -124,7 +124,15 @@ def _left_out_or_push(case: Case, look: Look) -> Harmless:
     """Return that what is left out, or follows the motion, does not bias the estimate."""
     if look.variant == "moved":
         return HARMFUL
-    return (look.variant, {}) if look.variant else push_harmless(case, look)
+    if case.prepared is not None and case.prepared.with_active is not None:
+        return "left_out", {}
+    return ("locked", {}) if _locked(case) else push_harmless(case, look)
+
+
+def _locked(case: Case) -> bool:
+    """Return whether a muscle follows the motion."""
+    activity = None if case.prepared is None else case.prepared.activity
+    return activity is not None and any(one.locked for one in activity.stretches)
 
 
 MOVEMENT_CHECKS = (
