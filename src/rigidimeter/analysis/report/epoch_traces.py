@@ -41,14 +41,17 @@ def _trace(trace: EpochTrace, one: Fit | Score, names: dict[str, str]) -> Trace:
         "start": trace.start_s,
         "step": trace.step_s,
         **{name: list(series) for name, series in trace.series.items()},
+        **({"active": trace.active} if trace.active else {}),
     }
 
 
 def shown_words(trace: EpochTrace) -> str:
-    """Return how much of an epoch its traces show; nothing where it is all."""
+    """Return how much of an epoch its traces show, unless it is all, and what is shaded."""
+    active = "Shaded: a muscle was active." if trace.active else ""
     if trace.shown_s >= trace.length_s:
-        return ""
-    return f"The first {number(trace.shown_s, 3)} s of {number(trace.length_s, 3)} s."
+        return active
+    first = f"The first {number(trace.shown_s, 3)} s of {number(trace.length_s, 3)} s."
+    return f"{first} {active}".strip()
 
 
 def _values(fit: Fit) -> Iterator[str]:

@@ -46,6 +46,14 @@
       ticks: { stroke: colour("line") }, font: "11px system-ui, sans-serif" };
     const line = (label, name, width, alpha = "") => ({ label, stroke: colour(name) + alpha, width, points: { show: false },
       value: (_, value) => value == null ? "–" : value.toPrecision(3) });
+    const shade = (plot) => {
+      plot.ctx.fillStyle = colour("line");
+      for (const [start, stop] of epoch.active ?? []) {
+        const [left, right] = [start, stop].map((time) => Math.min(Math.max(plot.valToPos(time, "x", true),
+          plot.bbox.left), plot.bbox.left + plot.bbox.width));
+        plot.ctx.fillRect(left, plot.bbox.top, right - left, plot.bbox.height);
+      }
+    };
     for (const [name, title, height] of PANELS) {
       if (!epoch[name]) continue;
       const values = numbers(epoch[name]);
@@ -60,7 +68,7 @@
         series.push(line(name === "torque" ? "measured" : name, "soft", 1.5));
       }
       plots.push(new uPlot({ title, width: into.clientWidth - 4, height, series,
-        scales: { x: { time: false } }, cursor: { sync: { key: "epoch", setSeries: false } },
+        hooks: { drawClear: [shade] }, scales: { x: { time: false } }, cursor: { sync: { key: "epoch", setSeries: false } },
         axes: [{ ...axis, size: 30 }, { ...axis, size: 60, space: 25 }] }, data, into));
     }
   }

@@ -81,7 +81,10 @@ def _trace(
         return None  # it could not be fitted or scored: the exclusions say why
     if not all(np.isfinite(values).all() and values.size > 1 for values in series.values()):
         return None
-    start_s = float(time_s[0] - min(c.time_s[0] for c in epoch.channels.values() if len(c)))
+    begins_s = min(c.time_s[0] for c in epoch.channels.values() if len(c))
+    start_s = float(time_s[0] - begins_s)
+    activity = one.activity if isinstance(one, Fit) else None
+    bursts = () if activity is None else activity.stretches
     kept, shown_s = thinned(time_s, highest_hz)
     return EpochTrace(
         one.source,
@@ -91,6 +94,7 @@ def _trace(
         shown_s,
         float(time_s[-1] - time_s[0]),
         {name: packed(values[kept]) for name, values in series.items()},
+        tuple((round(b.start_s - begins_s, 3), round(b.stop_s - begins_s, 3)) for b in bursts),
     )
 
 

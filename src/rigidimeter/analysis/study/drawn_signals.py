@@ -98,6 +98,8 @@ class EpochTrace:
         How much is shown, of how much.
     series : mapping of str to (float, str)
         ``torque``, ``angle`` and of a fit ``residual``.
+    active : tuple of (float, float)
+        From when to when a muscle was active, in s from the start of the epoch.
     """
 
     source: str
@@ -107,3 +109,4 @@ class EpochTrace:
     shown_s: float
     length_s: float
     series: Mapping[str, tuple[float, str]]
+    active: tuple[tuple[float, float], ...] = ()

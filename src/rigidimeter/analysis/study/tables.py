@@ -194,7 +194,9 @@ def _estimates(result: StudyResult) -> Iterator[dict[str, Any]]:
     whose = _whose(result)
     estimates = estimates_document(result.analysis)
     fixed = estimates["fixed_inertia"]["epochs"]
-    for one, two in zip(estimates["epochs"], fixed, strict=True):
+    for fit, one, two in zip(result.analysis.fits, estimates["epochs"], fixed, strict=True):
+        if fit.activity is not None:
+            one |= plain_values(fit.activity.row())  # the stretches as a text
         low_hz, high_hz = one.pop("band_hz") or (None, None)
         findings = one.pop("findings")
         found = [finding["name"] for finding in findings]

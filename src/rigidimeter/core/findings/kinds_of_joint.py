@@ -113,9 +113,9 @@ JOINT_KINDS = (
     Kind(
         "emg_activity",
         "share of the time in which the 6 Hz envelope of a muscle's EMG passes "
-        "`emg_baseline_factor` times the quietest fifth of the recording; such stretches are left "
-        "out (`estimation.leave_out_active`), except of a muscle that follows the motion, and at "
-        "most `max_left_out_percent` of an epoch",
+        "`emg_baseline_factor` times the quietest fifth of the recording for `min_burst_s`; such "
+        "stretches are left out (`--keep-active` fits them), except of a muscle that follows the "
+        "motion, and at most `max_left_out_percent` of an epoch",
         headline="A muscle was active in {value:.0f} % of the time",
         measured="The EMG of {channel} shows activity in {value:.0f} % of the time (at most "
         "{limit:g} %); nothing is left out for it.",

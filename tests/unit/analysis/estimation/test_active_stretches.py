@@ -7,8 +7,14 @@ import pytest
 from tests.muscles import JOINT, epochs_with_emg, with_reflex_emg
 from typer.testing import CliRunner
 
-from rigidimeter.analysis.reading import estimates_document, read_estimates, write_estimates_json
-from rigidimeter.analysis.study import estimate
+from rigidimeter.analysis.reading import (
+    Recording,
+    estimates_document,
+    read_estimates,
+    write_estimates_json,
+)
+from rigidimeter.analysis.report.epoch_traces import page_traces
+from rigidimeter.analysis.study import estimate, recording_result, result_table
 from rigidimeter.cli.main import app
 from rigidimeter.core.files import csv_text
 from rigidimeter.core.settings import changed_settings
@@ -167,3 +173,17 @@ def test_cocontraction_is_high_where_both_muscles_pull_and_low_where_they_altern
 
     assert percent(loud[0]) > 95
     assert percent(loud[1]) < 30
+
+
+def test_tables_have_the_share_of_the_epoch_and_traces_are_shaded(pushed):
+    settings, [(epoch, _)] = pushed
+    recording = Recording((epoch,), (), settings, ())
+    analysis = estimate(recording)
+    result = recording_result(recording, analysis, "")
+    first = analysis.fits[0].activity.stretches[0]
+    (row,) = result_table(result, "estimates")
+    assert row["active_left_out_percent"] == analysis.fits[0].activity.left_out_percent
+    assert f"{first.start_s:.4g} to {first.stop_s:.4g} s {first.channel}" in row["active_stretches"]
+    (trace,) = page_traces(result).values()
+    assert trace["active"][0] == pytest.approx((first.start_s, first.stop_s), abs=0.002)
+    assert "a muscle was active" in trace["words"]

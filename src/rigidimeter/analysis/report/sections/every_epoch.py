@@ -46,6 +46,15 @@ AMPLITUDE_SHOWN = tuple(
 """How far the joint moved, beside K: in the band of the fit, and at all frequencies."""
 
 
+_ACTIVITY = (
+    Column("active_percent", "Muscle active (% of the epoch)"),
+    Column("active_left_out_percent", "Left out for it (%)"),
+    Column("cocontraction_percent", "Co-contraction (%)"),
+    Column("active_stretches", "When", "reason"),
+)
+"""What the EMG shows, where there is one."""
+
+
 def _quality(prefix: str = "") -> tuple[Column, ...]:
     return (
         Column(f"{prefix}r_squared", "R²"),
@@ -108,11 +117,22 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
     found = any(fit.findings for fit in analysis.fits)
     counts = [Column("n_findings", "Findings", "count")] if found else []
     cautions = Column("cautions", "Caution", "reason")
+    emg = _ACTIVITY if any(fit.activity for fit in analysis.fits) else ()
     yield from_result(
         result,
         "estimates",
         f"Inertia, damping and stiffness, epoch by epoch{in_which}",
-        *(*WHO, *HOW, *_parameters(), *AMPLITUDE_SHOWN, *_quality(), *band, *counts, cautions),
+        *(
+            *WHO,
+            *HOW,
+            *_parameters(),
+            *AMPLITUDE_SHOWN,
+            *_quality(),
+            *band,
+            *emg,
+            *counts,
+            cautions,
+        ),
         empty="No epoch was fitted.",
         folding=True,
     )
