@@ -72,7 +72,7 @@ def test_a_wrong_sign_beside_a_slow_movement_is_excluded():
     slow = 2 * np.sin(2 * np.pi * 0.03 * TIME_S)
     fit, found = fitted(-TORQUE - TRUTH[2] * slow, ANGLE + slow)
     assert not fit.outcome.included
-    assert "the torque's sign is wrong. Say --reaction" in fit.outcome.reason
+    assert "the torque's sign is wrong. Add --reaction" in fit.outcome.reason
     assert found["negative_parameters"].level == "exclude"
 
 
