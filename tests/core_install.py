@@ -27,7 +27,7 @@ from typer.main import get_command
 from rigidimeter.cli.main import app
 
 ROOT = Path(__file__).parents[1]
-LIMIT_S = 600.0
+LIMIT_S = 1800.0
 """What takes longer is interrupted, as by Ctrl-C."""
 
 DEMO = "demo-study/"
@@ -41,6 +41,7 @@ MAY_REFUSE = {
     "commission": "a rig",
     "check": "a rig",
     "emulate": "the extras of the drives",
+    "reproduce": "the extra batch",
 }
 """Commands whose examples need what is not there; they refuse in a sentence."""
 

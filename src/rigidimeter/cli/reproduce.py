@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 
 from rigidimeter.cli.help_pages import OPTIONS
@@ -32,6 +33,8 @@ def reproduce(
 
     names = [name for text in only or [] for name in text.split(",") if name]
     wanted = chosen(names)
+    if not names and find_spec("numba") is None:  # it would be missed after minutes
+        raise UserError("all rows need one more package: pip install 'rigidimeter[batch]'")
     if out.exists() and not out.is_dir():
         raise UserError(f"--out {out}: is a file; name a folder")
     # The virtual study takes about as long as all rows together, and figures a quarter of a row.

@@ -77,7 +77,6 @@ def add(
     For example:
       rigidimeter simulate --out study/monday
       rigidimeter study add study study/monday --subject S01
-      rigidimeter report study --out study/report
     """
     from rigidimeter.core.study_files import extend_study
 

@@ -58,7 +58,7 @@ def compiled() -> Compiled:
         from numba import njit
     except ImportError as error:
         raise UserError(
-            "simulating many epochs needs numba, which is not installed: pip install numba"
+            "simulating many epochs needs numba: pip install 'rigidimeter[batch]'"
         ) from error
 
     def inlined(function: Callable[..., Any], **helpers: Any) -> Any:
