@@ -1,5 +1,7 @@
 # `make demo` and `make test` are all a fresh machine with Python >= 3.11 needs.
 PYTHON ?= python3
+# For pipefail: a failed installation must not count as one.
+SHELL := bash
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
@@ -18,7 +20,7 @@ $(STAMP): pyproject.toml constraints.txt
 	@$(BIN)/python -m pip install --quiet --upgrade --constraint constraints.txt pip
 	@$(BIN)/python -m pip uninstall --quiet --yes setuptools
 	@echo "installing: rigidimeter, its extras and what its tests need; each package is named as it is fetched"
-	@$(BIN)/python -m pip install --progress-bar off --constraint constraints.txt --editable '.[all,dev]' | \
+	@set -o pipefail; $(BIN)/python -m pip install --progress-bar off --constraint constraints.txt --editable '.[all,dev]' | \
 		sed -u -n -e 's/^Collecting \([^ ]*\).*/  \1/p' -e '/^Installing collected/s/:.*//p'
 	@touch $(STAMP)
 
