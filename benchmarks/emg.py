@@ -100,13 +100,12 @@ def measured(case: str, seconds: float, folder: Path, priority: int) -> Run:
     finally:
         outlet.kill()
         outlet.communicate()
-    print(f"  {case}: {'; '.join(ended.remarks) or 'nothing is missing'}", file=sys.stderr)
     samples = read_samples(folder / "samples.arrows")
     later = samples["time_s"] >= SKIPPED_S
     late_s, tick = samples["lateness_s"][later], samples["tick"][later]
     found = read_emg(folder)
     rate_hz = settings.rig.tick_rate_hz
-    return Run(
+    run = Run(
         tick.size,
         int(np.sum(late_s > 0.5 / rate_hz)),
         int(np.sum(np.diff(tick) - 1)),
@@ -114,6 +113,9 @@ def measured(case: str, seconds: float, folder: Path, priority: int) -> Run:
         0 if found is None else found.time_s.size,
         0 if found is None else int(np.sum(np.round(np.diff(found.emg_v["emg_v"])) != 1)),
     )
+    said = "; ".join(ended.remarks) or "nothing is missing"
+    print(f"  {case}: {run.late} late, {run.missed} missed; {said}", file=sys.stderr)
+    return run
 
 
 def main() -> None:

@@ -32,13 +32,13 @@ def test_lateness_of_the_loop():
 
 
 def test_ticks_beside_emg():
-    """A stream of two channels, or one that stalls, costs no tick: the EMG is not in the loop."""
+    """EMG is recorded without a gap beside the loop, and none where none is asked for."""
     pytest.importorskip("pylsl", reason="pip install 'rigidimeter[lsl]'")
-    rows = printed_by("emg", "--seconds", 3, "--runs", 1, "--priority", 0).splitlines()[2:]
+    rows = printed_by("emg", "--seconds", 3, "--runs", 1).splitlines()[2:]
     found = {row.split("|")[1].strip(): row.split("|")[2:-1] for row in rows}
     assert int(found["without EMG"][4]) == 0
     ran, *_, emg, gaps = found["two channels at 2 kHz"]
-    assert int(ran) > 1000
+    assert int(ran) > 500
     assert int(emg) > 2000
     assert int(gaps) == 0
 
