@@ -165,7 +165,8 @@ def _concluded(
 ) -> Conclusion:
     c, level = test.comparison, family.level(LEVEL)
     percent = result.primary.table.difference_percent
-    wanted = percent / 100.0 * abs(test.difference.reference)
+    scaled = test.difference.ratio or c.measure.origin == "ratings"
+    wanted = percent / 100.0 * abs(test.difference.reference) if scaled else math.nan
     half = test.half_width(level)
     verdict: Verdict = "cannot be decided"
     why: Finding | None

@@ -24,7 +24,7 @@ from rigidimeter.analysis.statistics import DayDifference
 from rigidimeter.analysis.study.compared import Comparison
 from rigidimeter.analysis.study.measures import Observation
 from rigidimeter.analysis.study.results import Condition
-from rigidimeter.core.words import decimals, fixed
+from rigidimeter.core.words import clear_of_zero, decimals, fixed
 
 ACCURACY = 0.001
 """As a share: the mean error of J, B and K of relaxed epochs is below it (accuracy.md)."""
@@ -53,8 +53,8 @@ class Difference:
     measured_half : float
         Half the 95 % interval of the measurement alone; NaN of measures without one.
     ratio : bool
-        Whether a per cent has a meaning: not for scores of a scale, nor if the reference is not
-        positive.
+        Whether a per cent has a meaning: not for scores of a scale, values of a table some of
+        which are negative, nor if the reference is not positive.
     """
 
     centre: Literal["mean", "median"]
@@ -128,7 +128,7 @@ def signed(percent: Three, own: Three, unit: str = "", two_below: float = 5.0) -
     if math.isnan(estimate):
         return Signed("–", "")
     after = " %" if known else f" {unit}".rstrip()
-    digits = decimals((high - low) / 2, estimate, two_below)
+    digits = clear_of_zero(decimals((high - low) / 2, estimate, two_below), low, high)
     value, *ends = (fixed(size, digits, sign=True) for size in (estimate, low, high))
     return Signed(f"{value}{after}", "" if math.isnan(low) else f"{' to '.join(ends)}{after}")
 
@@ -138,7 +138,7 @@ def by_units(c: Comparison, found: DayDifference | None) -> Difference:
 
     Without a test it is that of the means over days, or recordings, and has no interval of a test.
     """
-    ratio = c.measure.origin != "ratings"
+    ratio = is_ratio(c)
     if found is None or math.isnan(found.p):
         of_days = [_alike(c.of(name)) for name in c.pair]
         first, second = (_mean(c.of(name), own) for name, own in zip(c.pair, of_days, strict=True))
@@ -160,10 +160,20 @@ def by_units(c: Comparison, found: DayDifference | None) -> Difference:
 def by_values(c: Comparison) -> Difference:
     """Return the medians of a table's values, and the shift of the rank-sum test."""
     first, second = (c.summaries[name].median for name in c.pair)
+    ratio = is_ratio(c)
     if c.test is None:
-        return Difference("median", first, second, second - first)
+        return Difference("median", first, second, second - first, ratio=ratio)
     t = c.test
-    return Difference("median", first, second, -t.shift, -t.shift_high, -t.shift_low, t.p)
+    # All differences of too few values are no interval of this confidence.
+    low, high = (-t.shift_high, -t.shift_low) if t.shift_bounded else (math.nan, math.nan)
+    return Difference("median", first, second, -t.shift, low, high, t.p, ratio=ratio)
+
+
+def is_ratio(c: Comparison) -> bool:
+    """Whether differences of a measure have a meaning in per cent."""
+    if c.measure.origin == "column":
+        return all(o.value >= 0 for o in c.observations)
+    return c.measure.origin != "ratings"
 
 
 def simulated_difference(c: Comparison, conditions: Iterable[Condition]) -> Difference | None:

@@ -35,13 +35,15 @@ ANALYSIS, COMPARISON = "analysis", "comparison.json"
 class Family(NamedTuple):
     """The tests that p of one of them is adjusted for.
 
-    `tests` is their number; `first` is that by which the level of the first of them is divided.
+    `tests` is their number; `first` is that by which the level of the first of them is divided;
+    `order` names the measures of a sequence.
     """
 
     role: Role
     rule: str
     tests: int
     first: int
+    order: tuple[str, ...] = ()
 
     def level(self, alpha: float) -> float:
         """Return the level of the first test of the family."""
@@ -162,7 +164,8 @@ def adjusted(
             family = Family(role, "none", 1, 1)
         elif role == "primary" and primary.table.rule == "sequence":
             conditions = len({tests[k][1] for k in own})
-            family = Family(role, "sequence", count, conditions)
+            order = tuple(primary.table.measures)
+            family = Family(role, "sequence", count, conditions, order)
         found |= dict(
             zip(own, ((one, family) for one in _by(family, own, tests, primary)), strict=True)
         )

@@ -13,7 +13,7 @@ from datetime import date
 
 from rigidimeter.analysis.estimation import method_named
 from rigidimeter.analysis.study.compared import Comparison
-from rigidimeter.analysis.study.differences import signed
+from rigidimeter.analysis.study.differences import by_units, signed
 from rigidimeter.analysis.study.families import Family
 from rigidimeter.analysis.study.ratings_found import RatingsFound
 from rigidimeter.analysis.study.ratings_model import rated_one_condition, without_examiners
@@ -137,7 +137,11 @@ def wide(test: Test, family: Family, half: float, wanted_percent: float) -> Find
         facts |= {"alpha": LEVEL, "exact": 2.0 / math.comb(n_x + n_y, n_x)}
         return found_between("wide_interval", facts, limit=wanted_percent)
     facts = {"tests": plural(family.first, "test")}
-    if size <= wanted_percent:
+    if not test.difference.ratio and c.measure.origin == "column":
+        facts["variant"] = "negative"
+    elif not test.difference.reference:
+        facts["variant"] = "zero"
+    elif size <= wanted_percent:
         facts["variant"] = "held"
     return found_between("wide_interval", facts, size, wanted_percent)
 
@@ -270,10 +274,10 @@ def _of_inertia(c: Comparison, inertia: Comparison, flagged: Flagged) -> Iterato
 
 
 def _differs(inertia: Comparison, facts: Mapping[str, Fact]) -> Finding:
-    first, second = (inertia.summaries[name].median for name in inertia.pair)
-    of_each: dict[str, Fact] = {"reference": inertia.reference, "first": first}
-    of_each |= {"other": inertia.other, "second": second}
-    size = 100.0 * _relative(inertia)
+    d = by_units(inertia, inertia.days)  # as the table of differences has it
+    of_each: dict[str, Fact] = {"reference": inertia.reference, "first": d.reference}
+    of_each |= {"other": inertia.other, "second": d.other}
+    size = abs(100.0 * d.estimate / d.reference)
     return found_between("inertia_of_conditions", {**facts, **of_each}, size)
 
 

@@ -16,8 +16,10 @@ from rigidimeter.analysis.study.differences import signed
 from rigidimeter.analysis.study.families import Role
 from rigidimeter.analysis.study.reached_precision import precisions
 from rigidimeter.analysis.study.results import StudyResult
+from rigidimeter.analysis.study.tested import LEVEL
 from rigidimeter.core.words import (
     amount,
+    clear_of_zero,
     condition_name,
     decimals,
     fixed,
@@ -69,7 +71,7 @@ def lead(result: StudyResult) -> str:
     said = f"{_measured(concluded)} {_concluded(concluded)[0]}"
     if shown:
         where, reach = _whom(concluded)
-        quoted = _beginning(where, _quoted(shown))
+        quoted = _beginning(where, _quoted(shown), _columns(concluded))
         intervals = f" The intervals hold for {reach}." if reach else ""
         said = f"{quoted}{_adjusted(concluded, 'primary')}.{intervals}"
     paths = {out.path for out in result.left_out}
@@ -137,10 +139,20 @@ def _than(c: Comparison) -> str:
     return f"in {condition_name(c.other)} than in {condition_name(c.reference)}{each}"
 
 
-def _beginning(where: str, clause: str) -> str:
-    """Return a clause as the beginning of a sentence, after whom it speaks of."""
+def _beginning(where: str, clause: str, names: Iterable[str] = ()) -> str:
+    """Return a clause as the beginning of a sentence, after whom it speaks of.
+
+    One of the `names`, of columns of a table, stays as it is.
+    """
     text = f"{where}, {clause}" if where else clause
+    if any(text.startswith(f"{name} ") for name in names):
+        return text
     return text[:1].upper() + text[1:]
+
+
+def _columns(concluded: Conclusions) -> list[str]:
+    measures = (one.comparison.measure for one in concluded.each)
+    return [measure.short for measure in measures if measure.origin == "column"]
 
 
 def _measured(concluded: Conclusions) -> str:
@@ -185,9 +197,12 @@ def _adjusted(concluded: Conclusions, *roles: Role) -> str:
         own = [one for one in concluded.each if one.role == role and not math.isnan(one.p)]
         if not own or (tests := own[0].family.tests) < 2:
             continue
+        family = own[0].family
+        if family.rule == "sequence":
+            own.sort(key=lambda one: family.order.index(one.comparison.measure.name))
         names = series([one.comparison.measure.short for one in own])
         further = f" ({tests} tests)" if tests != len(own) else ""
-        if own[0].family.rule == "sequence":
+        if family.rule == "sequence":
             parts.append(f"adjusted in the declared sequence of {names}{further}")
         else:
             parts.append(f"Holm-adjusted over {names}{further}")
@@ -239,7 +254,10 @@ def _concluded(concluded: Conclusions) -> list[str]:
             f"whether {both} differ in {names(withheld)} cannot be decided: {reason}"
             f"{_excluded(foremost(withheld))}{_would_decide(foremost(withheld))}"
         )
-    sentences = [_beginning(where if k < of_whom else "", one) for k, one in enumerate(found)]
+    columns = _columns(concluded)
+    sentences = [
+        _beginning(where if k < of_whom else "", one, columns) for k, one in enumerate(found)
+    ]
     in_whom = f"{where}, " if where and found else ""
     sentences += [_beginning("", f"secondary: {in_whom}{one}") for one in claims("secondary")]
     return [f"{sentence}." for sentence in sentences]
@@ -248,16 +266,24 @@ def _concluded(concluded: Conclusions) -> list[str]:
 def _excluded(members: Iterable[Conclusion]) -> str:
     """Return ``; excluded (95 %): K more than 31 % lower or 4 % higher, B …``."""
     parts: list[str] = []
+    alone: list[str] = []
     for one in members:
+        if one.difference.p < LEVEL <= one.p:
+            each = p_text(one.difference.p), p_text(one.p)
+            alone.append(
+                f"; {one.comparison.measure.short} has {each[0]} alone, {each[1]} adjusted"
+            )
         known = not math.isnan(one.difference.percent[0])
         estimate, low, high = one.difference.percent if known else one.difference.tested
         if math.isnan(low):
             continue
         after = " %" if known else f" {one.comparison.measure.unit}".rstrip()
-        digits = decimals((high - low) / 2, estimate)
+        digits = clear_of_zero(decimals((high - low) / 2, estimate), low, high)
         sides = [("lower", -low), ("higher", high)]
         if known and -low >= _ALL_PERCENT:  # of what is above zero no more can be lost
             sides = sides[1:]
+        if not one.p < LEVEL:  # what p does not exclude after the adjustment
+            sides = [side for side in sides if side[1] > 0]
         words = [
             f"{'more than ' * (not k)}{fixed(end, digits)}{after} {side}"
             if end > 0
@@ -265,7 +291,8 @@ def _excluded(members: Iterable[Conclusion]) -> str:
             for k, (side, end) in enumerate(sides)
         ]
         parts.append(f"{one.comparison.measure.short} {' or '.join(words)}")
-    return f"; excluded (95 %): {', '.join(parts)}" if parts else ""
+    excluded = f"; excluded (95 %): {', '.join(parts)}" if parts else ""
+    return f"{excluded}{''.join(alone)}"
 
 
 def _would_decide(withheld: Iterable[Conclusion]) -> str:

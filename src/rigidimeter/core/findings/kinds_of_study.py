@@ -20,9 +20,10 @@ STUDY_KINDS = (
     ),
     Kind(
         "inertia_of_conditions",
-        "difference of the median J of two conditions, in % of the larger, where the test finds it",
+        "difference of the mean J of two conditions, in % of the reference, where the test finds "
+        "it",
         headline="Inertia differs by {value:.2g} %, and no treatment changes it",
-        measured="The median J is {first:.4g} kg·m² in {reference} and {second:.4g} in {other}.",
+        measured="The mean J is {first:.4g} kg·m² in {reference} and {second:.4g} in {other}.",
         meaning="The posture, the contact with the robot, a unit, or voluntary torque was "
         "different, which changes B and K as well.",
         remedy="Compare how the arm was fixed, the units, and the voluntary torque.",
@@ -33,9 +34,9 @@ STUDY_KINDS = (
                 "meaning": "There is {cause}{others} in {counts}, which changes J, B and K.",
             },
             "degrees": {
-                "headline": "Inertia differs by {value:.2g} %, as where degrees are read as "
+                "headline": "Inertia differs by a factor of about 57, as where degrees are read as "
                 "radians",
-                "meaning": "One is about 57 times the other, and so are B and K.",
+                "meaning": "B and K differ by the same factor.",
                 "remedy": "Check the unit of the angle in both.",
             },
         },
@@ -71,9 +72,10 @@ STUDY_KINDS = (
     Kind(
         "groups_differ",
         "number of groups of subjects, where not each of them shows the difference by itself",
-        headline="groups differ: {groups}",
+        headline="Not each group of subjects shows it: {groups}",
         measured="Within each group by itself: {groups}.",
-        meaning="A mean over groups that respond differently speaks of none of them.",
+        meaning="A mean over groups that respond differently speaks of none of them. Whether the "
+        "groups differ from each other is not tested.",
         remedy="Compare each group by itself: --group NAME, or group= in Python.",
         unit="1",
         example={
@@ -145,6 +147,14 @@ STUDY_KINDS = (
                 "headline": "The 95 % interval holds a difference of {limit:g} %",
                 "measured": "Half the interval, at 0.05 over {tests}, is {value:.3g} % of the "
                 "reference, but the estimate is too far from zero to exclude {limit:g} %.",
+            },
+            "negative": {
+                "headline": "{limit:g} % of values of which some are negative has no meaning",
+                "measured": "Some values are negative, so no size in % says what is worth finding.",
+            },
+            "zero": {
+                "headline": "{limit:g} % of a reference of 0 is 0",
+                "measured": "The reference is 0, so no size in % says what is worth finding.",
             },
             "values": {
                 "headline": "{first} values against {second} cannot reach p < {alpha:g}{of}",

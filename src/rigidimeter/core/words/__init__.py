@@ -4,6 +4,7 @@ from rigidimeter.core.words.numbers import (
     Shown,
     amount,
     axis_unit,
+    clear_of_zero,
     condition_name,
     decimals,
     fixed,

@@ -211,6 +211,20 @@ def decimals(half: float, value: float, two_below: float = 5.0) -> int:
     return max((size < below * 10.0**power) - power, 0)
 
 
+def clear_of_zero(places: int, *ends: float) -> int:
+    """Return decimals with which no end of an interval is rounded to zero, two more at most.
+
+    Examples
+    --------
+    >>> clear_of_zero(0, -31.06, -0.13), clear_of_zero(0, -20.0, 3.0), clear_of_zero(1, 0.0, 2.0)
+    (1, 0, 1)
+    """
+    for more in range(2):
+        if all(round(end, places + more) or not end for end in ends if math.isfinite(end)):
+            return places + more
+    return places + 2
+
+
 def fixed(value: float, places: int, *, sign: bool = False) -> str:
     """Return a number with so many decimals, with its sign if asked for; zero has none.
 
