@@ -16,7 +16,7 @@ import numpy as np
 from tests.muscles import JOINT, Pushed, epochs_with_emg, with_reflex_emg
 from tests.scenarios.recordings import measured_alone
 
-from rigidimeter.analysis.estimation import fit_epochs
+from rigidimeter.analysis.estimation import method_named
 from rigidimeter.analysis.estimation.prepared import prepare
 from rigidimeter.core.records import Activity, Epoch
 from rigidimeter.core.settings import Settings, changed_settings
@@ -39,7 +39,7 @@ FOUND_HEADER = [
     "rest marked (%)",
     "muscles taken for following the motion (%), without the perturbation",
 ]
-FITTED_HEADER = ["subject", "pushes", "method", "active stretches", "bias (%)", "SD (%)", "held"]
+FITTED_HEADER = ["subject", "method", "active stretches", "bias (%)", "SD (%)", "held"]
 REFLEX_HEADER = ["reflex (N·m·s/rad)", "epochs with bursts", "stays in (%)", "without it (%)"]
 
 
@@ -66,7 +66,7 @@ def recordings(
 ) -> Iterator[tuple[Settings, list[Pushed]]]:
     """Yield so many epochs of a subject in sessions."""
     for start in range(0, n, SESSION):
-        yield epochs_with_emg(min(SESSION, n - start), pushes=pushes, seed=100 + start, **subject)
+        yield epochs_with_emg(min(SESSION, n - start), seed=100 + start, **subject)
 
 
 def found_rows(n: int) -> Iterator[Sequence[object]]:
@@ -132,24 +132,26 @@ def without_causes(epoch: Epoch) -> Epoch:
 def fitted_rows(n: int) -> Iterator[Sequence[object]]:
     """Yield bias, SD and coverage of J, B and K, with active stretches left out and with them."""
     for name, subject in SUBJECTS.items():
-        for pushes in (2, 4) if subject else (2,):
-            found: dict[tuple[str, str], list] = {}
-            for settings, epochs in recordings(n, pushes, **subject):
-                recorded = [one.epoch for one in epochs]
-                seen = {"iv": recorded, "bandlimited": list(map(without_causes, recorded))}
-                for way, change in (("left out", {}), ("fitted", KEEP)):
-                    for method, own in seen.items():
-                        fits, _ = fit_epochs(own, method, changed_settings(settings, change))
-                        found.setdefault((method, way), []).extend(fits)
-            for (method, way), fits in sorted(found.items(), reverse=True):
-                values = np.array([fit.value for fit in fits]) / TRUTH - 1
-                held = [(fit.low <= TRUTH) & (fit.high >= TRUTH) for fit in fits]
-                numbers = (
-                    _three(100 * values.mean(axis=0), "+.2f"),
-                    _three(100 * values.std(axis=0, ddof=1), ".2f") if len(fits) > 1 else "–",
-                    _three(100 * np.mean(held, axis=0), ".0f"),
-                )
-                yield name, pushes if subject else 0, method, way, *numbers
+        found: dict[tuple[str, str], list] = {}
+        for settings, epochs in recordings(n, **subject):
+            recorded = [one.epoch for one in epochs]
+            seen = {"iv": recorded, "bandlimited": list(map(without_causes, recorded))}
+            for way, change in (("left out", {}), ("fitted", KEEP)):
+                for method, own in seen.items():
+                    changed = changed_settings(settings, change)
+                    fits, _ = method_named(method).fit(
+                        prepare(own, changed), None, lambda _: None, False
+                    )
+                    found.setdefault((method, way), []).extend(fits)
+        for (method, way), fits in sorted(found.items(), reverse=True):
+            values = np.array([fit.value for fit in fits]) / TRUTH - 1
+            held = [(fit.low <= TRUTH) & (fit.high >= TRUTH) for fit in fits]
+            numbers = (
+                _three(100 * values.mean(axis=0), "+.2f"),
+                _three(100 * values.std(axis=0, ddof=1), ".2f") if len(fits) > 1 else "–",
+                _three(100 * np.mean(held, axis=0), ".0f"),
+            )
+            yield name, method, way, *numbers
 
 
 def reflex_rows(n: int) -> Iterator[Sequence[object]]:
