@@ -162,7 +162,8 @@ def _primary(
     percents = [abs(one.amount) for one in wanted if one.percent and one.parameter != "inertia"]
     smallest = {"difference_percent": min(max(min(percents), 1.0), 100.0)} if percents else {}
     usual = declared or PrimaryTable()
-    return primary_named(names or ",".join(usual.measures), rule or usual.rule, **smallest)
+    measures = ",".join(usual.measures) if names is None else names
+    return primary_named(measures, rule or usual.rule, **smallest)
 
 
 def _scatter_of(folder: Path) -> dict[str, Scatter]:

@@ -48,6 +48,7 @@ EPOCHS_A_DAY = (1, 2, 3, 5, 10, 20)
 """Epochs a day in each condition for which days and subjects are found."""
 
 _NAMES = {"inertia": 0, "damping": 1, "stiffness": 2}
+_SYMBOLS = {PARAMETERS[place].symbol: name for name, place in _NAMES.items()}
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,7 @@ class WantedDifference:
         """
         name, equals, amount = text.partition("=")
         number = amount.strip().removesuffix("%")
+        name = _SYMBOLS.get(name.strip(), name)
         if name.strip() not in _NAMES:
             near = difflib.get_close_matches(name.strip(), _NAMES, n=1)
             known = f"did you mean {near[0]}?" if near else "known: " + ", ".join(_NAMES)
@@ -266,7 +268,7 @@ def _detection(
     key = PARAMETER_NAMES[place]
     value = float(getattr(subject, key))
     difference = value * wanted.amount / 100.0 if wanted.percent else wanted.amount
-    if difference >= value:
+    if difference >= value or (difference <= -value and not wanted.percent):
         raise UserError(_too_large(wanted, condition, value))
     errors = [
         predicted_precision(
@@ -328,16 +330,19 @@ def _sds(found: Detection, epochs: tuple[int, int]) -> tuple[float, float]:
 
 
 def _too_large(wanted: WantedDifference, condition: str, value: float) -> str:
-    """Return why a difference leaves nothing of the parameter."""
+    """Return why a difference is as large as the parameter, or larger."""
     parameter = PARAMETERS[_NAMES[wanted.parameter]]
     amount, place = f"{wanted.amount:g}", f"subject.{condition}.{parameter.name} = {value:.4g}"
-    if wanted.percent or wanted.amount >= 100.0:
+    if wanted.percent or abs(wanted.amount) >= 100.0:
+        left = f"nothing of {parameter.symbol} would be left"
+        if wanted.amount < 0:
+            left = f"{parameter.symbol} would be more than twice as large"
         return (
-            f"--detect {wanted.parameter}={amount}{'%' if wanted.percent else ''}: nothing of "
-            f"{parameter.symbol} would be left ({place}); name a smaller difference"
+            f"--detect {wanted.parameter}={amount}{'%' if wanted.percent else ''}: {left} "
+            f"({place}); name a smaller difference"
         )
     return (
-        f"--detect {wanted.parameter}={amount}: {amount} {parameter.unit} is "
-        f"{'more than' if wanted.amount > value else 'all of'} {parameter.symbol} itself "
+        f"--detect {wanted.parameter}={amount}: {abs(wanted.amount):g} {parameter.unit} is "
+        f"{'more than' if abs(wanted.amount) > value else 'all of'} {parameter.symbol} itself "
         f"({place}); did you mean {amount} %?"
     )

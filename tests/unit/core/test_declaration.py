@@ -27,6 +27,8 @@ TODAY = date.today()
         ("stifness", "holm", '--primary stifness: unknown measure "stifness"; did you mean stiff'),
         ("mass", "holm", "known: stiffness, damping, impulse, work, rating"),
         ("inertia", "holm", "inertia checks the instrument, and is no outcome"),
+        ("J", "holm", "--primary J: inertia checks the instrument"),
+        ("", "holm", '--primary : unknown measure ""; known: stiffness'),
         ("stiffness,stiffness", "holm", "--primary: .*names stiffness_nm_rad twice"),
         ("stiffness", "bonferroni", "--rule bonferroni: unknown rule; write holm or sequence"),
     ],
@@ -34,6 +36,10 @@ TODAY = date.today()
 def test_what_is_no_primary_measure_is_a_sentence(names, rule, words):
     with pytest.raises(UserError, match=words):
         primary_named(names, rule)
+
+
+def test_measures_may_be_named_by_their_symbols():
+    assert primary_named("K, B") == primary_named("stiffness,damping")
 
 
 def test_a_new_study_declares_what_was_asked_for(tmp_path):

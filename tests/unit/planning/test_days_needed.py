@@ -294,6 +294,7 @@ def test_one_condition_has_no_planned_epochs() -> None:
             r"--detect stiffness=18: 18 N·m/rad is more than K itself \(subject.OFF"
             r".stiffness_nm_rad = 1.751\); did you mean 18 %",
         ),
+        ("stiffness=-18", {}, r"stiffness=-18: 18 N·m/rad is more than K .*did you mean -18 %"),
         ("damping=5%", {"power": 1.0}, "--power 1 and --alpha 0.05 must both be between 0 and 1"),
         ("damping=5%", {"alpha": 0.0}, "--power 0.8 and --alpha 0 must both"),
     ],

@@ -15,6 +15,7 @@ from typing import get_args
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import DOCUMENT_BYTES, read_bytes, write_text
+from rigidimeter.core.records import PARAMETERS
 from rigidimeter.core.settings import validated
 from rigidimeter.core.study_files.extended_folder import write_new_study
 from rigidimeter.core.study_files.folder import is_study
@@ -35,6 +36,8 @@ from rigidimeter.core.study_files.tables import table_path, table_rows
 _SHORT = {name.partition("_")[0]: name for name in get_args(PrimaryMeasure)}
 """What people call the measures."""
 
+_SYMBOLS = {parameter.symbol: parameter.name.partition("_")[0] for parameter in PARAMETERS}
+
 _TABLE = re.compile(r"^\[primary\][^\n]*\n(?:(?!\[)[^\n]*\n?)*", re.MULTILINE)
 
 
@@ -44,7 +47,7 @@ def primary_named(names: str, rule: str = "holm", **more: object) -> PrimaryTabl
     Parameters
     ----------
     names : str
-        Such as ``stiffness,damping``, in the order of a sequence.
+        Such as ``stiffness,damping`` or ``K,B``, in the order of a sequence.
     rule : str
         ``holm`` or ``sequence``.
     **more
@@ -61,10 +64,10 @@ def primary_named(names: str, rule: str = "holm", **more: object) -> PrimaryTabl
     ['damping_nm_s_rad', 'stiffness_nm_rad']
     """
     measures = []
-    for name in (part.strip() for part in names.split(",")):
+    for name in (_SYMBOLS.get(part.strip(), part.strip()) for part in names.split(",")):
         if name == "inertia":
             raise UserError(
-                "--primary inertia: inertia checks the instrument, and is no outcome; name "
+                f"--primary {names}: inertia checks the instrument, and is no outcome; name "
                 f"{', '.join(_SHORT)}"
             )
         if name not in (*_SHORT, *_SHORT.values()):
