@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from rigidimeter.rig.acquisition import replay_session
@@ -30,7 +32,9 @@ def rig(tmp_path):
 def test_a_known_inertia_must_be_above_zero(rig, rigidimeter, value):
     ran = rigidimeter("check", rig, "--yes", "--known-inertia-kg-m2", value)
     assert ran.status == 1
-    assert f"--known-inertia-kg-m2 {float(value):g}: must be a number above 0" in ran.err
+    finite = math.isfinite(float(value))
+    wrong = "must be a number above 0" if finite else "is not a number of kg·m², such as 10"
+    assert f"--known-inertia-kg-m2 {float(value):g}: {wrong}" in ran.err
 
 
 def test_a_flag_does_not_look_whether_an_arm_is_in_hardware(rig, rigidimeter):

@@ -189,6 +189,5 @@ def draw_pairs(panels: Sequence[Axes], fit: Fit) -> None:
             p = PARAMETERS[at]
             axis.set_label_text(f"{p.title.capitalize()} {p.symbol} ({scaled[at][1]})")
             axis.set_major_locator(MaxNLocator(4))
-        axes.ticklabel_format(useOffset=False, style="plain")
     panels[0].set_title("95 % intervals and ellipses", loc="left", fontsize=9)
     legend_above(panels[-1])

@@ -72,6 +72,8 @@ def report(
     folder = Path(out)
     if isinstance(result, (str, PathLike)):
         inputs = [result]
+    elif not inputs and isinstance(result, Recording):
+        inputs = result.paths
     elif not inputs and isinstance(result, Sequence):
         inputs = [one for one in result if isinstance(one, (str, PathLike))]
     paths, names = [Path(one) for one in inputs], ""

@@ -90,7 +90,7 @@ def test_all_draw_on_a_figure_of_pyplot_or_on_the_axes_that_they_are_given(
 def test_each_axis_says_what_it_shows_and_in_what_unit(
     recording: Recording, study: StudyResult, cohort: StudyResult
 ) -> None:
-    without = {"Effect size r; above zero: OFF larger than DBS"}  # a share
+    without = {"Effect size r; above zero: DBS larger than OFF"}  # a share
     without |= {"Epoch, in the order of recording", "Day, in the order of recording", ""}
     for name, plot in plots(recording, study, cohort).items():
         panels = np.ravel(plot(None))

@@ -259,7 +259,7 @@ class TestTrafficLight:
         assert (light.level, light.sound, light.doubted) == ("caution", 59, 19)
         assert (light.doubt, light.doubt_epochs) == ("tremor", 19)
         assert light.text == "Torque oscillates at 5 Hz with 0.2 N·m"
-        assert light.remedy.startswith("Record the perturbation")
+        assert light.remedy.startswith("Use --method iv with the recorded perturbation")
 
     def test_a_recording_that_could_not_be_used_is_no_good_quality(self, study):
         refused = LeftOut("b.csv", "M1", "1", "DBS", "its angle is in degrees")

@@ -138,8 +138,9 @@ def test_every_number_states_its_unit():
                 assert unit, f"{prefix}{name} has no unit"
                 suffix = {"1": "", "%": "_percent"}.get(unit)
                 if suffix is None:
-                    ending = unit.replace("·", "_").replace("²", "2").replace("/", "_").lower()
-                    ending = {"1_s": "per_s"}.get(ending, ending)
+                    ending = unit.replace("·", "_").replace("²", "2").replace("µ", "u")
+                    ending = ending.replace("/", "_").lower()
+                    ending = {"1_s": "per_s", "uv_(n_m)": "uv_per_nm"}.get(ending, ending)
                     assert name.endswith(ending.replace("n_m", "nm")), f"{prefix}{name}: {unit}"
                 else:
                     assert name.endswith(suffix)
