@@ -60,6 +60,7 @@ class Strip(NamedTuple):
 
     pair: StudyResult
     said: Statements
+    p_name: str
     rows: tuple[tuple[DifferenceRow, Markup], ...]
 
 
@@ -73,7 +74,7 @@ def strips(result: StudyResult) -> list[Strip]:
         percents = [size for one in concluded.each for size in one.difference.percent]
         to = reach(percents, MOST_PERCENT)
         rows = tuple((row, _plot(row, to)) for row in difference_rows(concluded))
-        found.append(Strip(pair, said, rows))
+        found.append(Strip(pair, said, concluded.p_name, rows))
     return found
 
 

@@ -217,8 +217,11 @@ def day_tests_in_words(result: StudyResult) -> list[str]:
 def _primary(result: StudyResult) -> str:
     """Return the primary measures, where others were compared beside them; else empty."""
     names = [c.measure for c in result.comparisons if c.days and not math.isnan(c.days.p)]
-    primary = [one.short for one in names if result.primary.role(one) == "primary"]
-    return series(primary) if len(primary) < len(names) else ""
+    primary = [one for one in names if result.primary.role(one) == "primary"]
+    declared: list[str] = [*result.primary.table.measures]
+    if result.primary.table.rule == "sequence":
+        primary.sort(key=lambda one: declared.index(one.name))
+    return series([one.short for one in primary]) if len(primary) < len(names) else ""
 
 
 def method_of(name: str) -> Method:

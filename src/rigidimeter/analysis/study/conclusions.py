@@ -123,6 +123,13 @@ class Conclusions:
         """Whether p of a measure is adjusted for other tests."""
         return any(one.family.tests > 1 for one in self.each)
 
+    @property
+    def p_name(self) -> str:
+        """What a column of p is called: Holm's method is not that of a sequence."""
+        if any(one.family.rule == "sequence" for one in self.each):
+            return "p, adjusted"
+        return "p, Holm" if self.adjusted else "p"
+
 
 def conclude(result: StudyResult) -> Conclusions | None:
     """Return what is concluded of each measure; None where no two conditions were compared."""

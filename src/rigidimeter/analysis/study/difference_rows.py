@@ -41,10 +41,10 @@ def difference_cells(result: StudyResult) -> tuple[tuple[str, ...], list[tuple[s
     concluded = conclude(result)
     rows = [] if concluded is None else difference_rows(concluded)
     virtual = any(row.simulated for row in rows)
-    holm = "p, Holm" if concluded is not None and concluded.adjusted else "p"
+    p_name = "p" if concluded is None else concluded.p_name
     reference, other = condition_name(result.reference), condition_name(result.other)
     headings = ("", reference, other, f"{other} − {reference}", "simulated" if virtual else "",
-                "95 % interval", "" if virtual else holm, "difference")  # fmt: skip
+                "95 % interval", "" if virtual else p_name, "difference")  # fmt: skip
     return headings, [
         (
             ", ".join(filter(None, (row.measure, row.unit))),

@@ -19,10 +19,12 @@ from rigidimeter.analysis.report.first_screen import (
     reach,
     strips,
 )
+from rigidimeter.analysis.report.methods_prose import methods_prose
 from rigidimeter.analysis.report.page import contents, parts, render_page, write_report
 from rigidimeter.analysis.statistics import summarise
 from rigidimeter.analysis.study import (
     Difference,
+    Primary,
     StudyResult,
     comparison_document,
     conclude,
@@ -32,6 +34,7 @@ from rigidimeter.analysis.study import (
 )
 from rigidimeter.cli.comparison_text import difference_blocks
 from rigidimeter.core.files import read_json, write_json
+from rigidimeter.core.study_files import PrimaryTable
 
 SMALL = Design(days=(4, 3), epochs=(4, 4), scores=(3, 3))
 
@@ -48,6 +51,15 @@ def test_it_is_said_which_p_the_conclusion_follows(study: StudyResult) -> None:
     assert "p, Holm" in ParsedPage(render_page(study, (), {})).table("DBS against OFF")[0]
     (alone,) = difference_blocks(replace(study, comparisons=study.comparisons[:1]))
     assert alone.headings[6] == "p"
+    order = PrimaryTable(measures=["stiffness_nm_rad", "damping_nm_s_rad"], rule="sequence")
+    declared = replace(study, primary=Primary(order, "study.toml"))
+    (terminal,) = difference_blocks(declared)
+    assert terminal.headings[6] == "p, adjusted"
+    page = render_page(declared, (), {})
+    assert "p, adjusted" in ParsedPage(page).table("DBS against OFF")[0]
+    methods = " ".join(str(methods_prose(declared)).split())
+    assert "adjusted: K and B were primary, each tested only if those before it" in methods
+    assert "adjusted apart by Holm’s method" in methods
 
 
 @pytest.mark.parametrize(
@@ -115,7 +127,7 @@ def test_the_light_is_words(study: StudyResult) -> None:
 
 
 def drawn(study: StudyResult) -> list[str]:
-    ((_, _, rows),) = strips(study)
+    ((_, _, _, rows),) = strips(study)
     return [str(plot) for _, plot in rows]
 
 

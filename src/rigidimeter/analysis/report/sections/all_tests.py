@@ -97,7 +97,7 @@ def _by_days(result: StudyResult, name: str) -> Iterator[Block]:
             Column("days_reference", f"Days {condition_name(result.reference)}", "count"),
             Column("days_other", f"Days {condition_name(result.other)}", "count"),
             Column("days_df", "df"),
-            Column("days_p", "p (Holm)", "p", below="days_p_holm"),
+            Column("days_p", "p (adjusted)", "p", below="days_p_holm"),
             Column("days_p_days", "p of day medians", "p"),
             Column("days_day_share", "Between days", "percent"),
             Column("days_remark", "Remark", "reason"),
