@@ -30,6 +30,7 @@ def test_methods_hold_the_facts_of_the_study(study: StudyResult) -> None:
         in text
     )
     assert "3 examiners gave 27 ratings" in text
+    assert "for each day in addition, and the conclusion on the rating is from that test." in text
     for name in ("Werning", "Young", "Gilson", "Kenward", "Hodges", "Efron", "Holm"):
         assert sum(name in reference for reference in prose.references) >= 1
     assert "Newcombe" not in text
