@@ -1,6 +1,6 @@
 """Pictures of an operator's day for its tutorial, made by `python -m tests.docs.pictures`.
 
-The day runs on the virtual rig in real time and takes about three minutes.
+Up to the computer's failure the day runs on the virtual rig in real time.
 """
 
 from __future__ import annotations
@@ -8,13 +8,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from PIL import Image
-from playwright.sync_api import Page
+from playwright.sync_api import Browser, Page
 from tests.browser import open_browser
 from tests.console.opened import Console, fill, open_page, start
 from tests.console.operator_day import (
     LONG_MS,
     RUNS,
     click_and_run,
+    command,
     in_epoch,
     kill_all,
     opened_session,
@@ -39,10 +40,8 @@ WIDTH, HEIGHT, REPORT_HEIGHT, LIST_HEIGHT = 1100, 860, 1080, 1120
 FORM_HEIGHT = 960
 COLOURS = 256
 ATTEMPTS = 6
-SCORES = {2: "2", 3: "2", 4: "1,5", 5: "1", 6: "1,5"}
 STATE = "document.getElementById('state').textContent"
 ENDED = f"document.body.dataset.view === 'after' && {STATE}.startsWith('ended')"
-SUCCESS = f"{STATE} === 'ended: success'"
 SEEN_MS = 6000
 """After that time in an epoch J, B and K are shown."""
 
@@ -62,10 +61,8 @@ def take(page: Page, folder: Path, name: str, height: int = HEIGHT) -> list[str]
 def run_rest(desk: Console, page: Page, name: str, button: str, until: str) -> None:
     """Run what is left of a session until the page shows so; again where a busy machine stopped it.
 
-    `until` is an expression of the page, such as that an epoch runs or that all is done. Meanwhile
-    each epoch is rated in its rest.
+    `until` is an expression of the page, such as that an epoch runs.
     """
-    due = {f"epoch {place}": score for place, score in SCORES.items()}
     for attempt in range(ATTEMPTS):
         session = opened_session(page, name if attempt == 0 else desk.folder().name)
         click_and_run(desk, page, session, button if attempt == 0 else "Run what is left")
@@ -73,12 +70,7 @@ def run_rest(desk: Console, page: Page, name: str, button: str, until: str) -> N
         while not page.evaluate(ENDED):
             if page.evaluate(until):
                 return
-            rated = page.locator("#rated").text_content() or ""
-            if rated in due:
-                rate(page, int(rated.split()[1]), due.pop(rated))
             page.wait_for_timeout(200)
-        if page.evaluate(until):
-            return
     raise RuntimeError("the machine is too busy for these pictures")
 
 
@@ -108,23 +100,40 @@ def pictures(folder: Path, sessions: Path) -> dict[str, list[str]]:
         words["stopped"] = take(page, folder, "stopped")
         third = "document.getElementById('epoch').textContent === '3 of 6'"
         run_rest(desk, page, first.name, "Run what is left: 5", f"{RUNS} && {third}")
-        second = desk.folder()
         kill_all(desk)
         page.close()
         desk = Console(sessions, protocol=PROTOCOL)
         page = open_page(opened, desk)
         words["restarted"] = take(page, folder, "restarted")
-        opened_session(page, second.name).get_by_role("button", name="Recover").click()
-        page.get_by_text("is closed: ").wait_for()
-        run_rest(desk, page, second.name, "Run what is left: 4", SUCCESS)
-        page.set_viewport_size({"width": WIDTH, "height": LIST_HEIGHT})  # nothing is scrolled
-        session = opened_session(page, first.name)
-        session.get_by_role("button", name="Leave out").first.click()
-        page.locator("input[data-field=reason]").fill("coughed")
-        page.locator("input[data-field=by]").fill("Kim")
-        words["leave-out"] = take(page, folder, "leave-out", LIST_HEIGHT)
-        page.get_by_role("dialog").get_by_role("button", name="Leave out").click()
-        run_rest(desk, page, first.name, "Repeat", SUCCESS)
-        words["report"] = take(study_report(page), folder, "report", REPORT_HEIGHT)
+        page.close()
+        desk.close()
+        words |= after_pictures(opened, folder, sessions / "after")
+    return words
+
+
+def after_pictures(opened: Browser, folder: Path, place: Path) -> dict[str, list[str]]:
+    """Take those of an epoch left out and of the report, after a day that was not in real time."""
+    words = {}
+    protocol, name = place / "day.toml", "S01-1"
+    (place / "sessions").mkdir(parents=True)
+    protocol.write_text(PROTOCOL)
+    again = ("--task", "prbs", "--condition", "OFF", "--epochs", 1)
+    for made in (
+        command("simulate", "--settings", protocol, "--out", place / "sessions" / name),
+        command("simulate", "--settings", protocol, "--out", place / "sessions/S01-2", *again),
+        command("study", "add", place / "sessions", "--subject", "S01"),
+    ):
+        assert made.returncode == 0, made.stderr
+    desk = Console(place, protocol=PROTOCOL)
+    page = open_page(opened, desk)
+    page.set_viewport_size({"width": WIDTH, "height": LIST_HEIGHT})  # nothing is scrolled
+    session = opened_session(page, name)
+    session.get_by_role("button", name="Leave out").first.click()
+    page.locator("input[data-field=reason]").fill("coughed")
+    page.locator("input[data-field=by]").fill("Kim")
+    words["leave-out"] = take(page, folder, "leave-out", LIST_HEIGHT)
+    page.get_by_role("dialog").get_by_role("button", name="Leave out").click()
+    words["report"] = take(study_report(page), folder, "report", REPORT_HEIGHT)
+    page.close()
     desk.close()
     return words
