@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -126,7 +127,10 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
             text = f"{folder}, epoch {event['label']}: no EMG was recorded"
             notices.append(Notice("warning", text))
         channels = {**epoch.channels, **{channel.name: channel for channel in muscles}}
-        epochs.append(replace(epoch, left_out=left_out, channels=channels))
+        since_min = since_change_min(manifest, float(samples["time_s"][rows][0]))
+        epochs.append(
+            replace(epoch, left_out=left_out, channels=channels, since_change_min=since_min)
+        )
     notices += [
         Notice("error", f"{folder}/{EVENTS}: does not say what epoch {number} of the samples was")
         for number in first
@@ -296,6 +300,16 @@ def epoch_of_samples(
         virtual=virtual,
         ticks=Ticks(late.size, *map(int, counts)),
     )
+
+
+def since_change_min(manifest: Mapping[str, Any], time_s: float) -> float:
+    """Return the minutes from the change of the stimulation to a time of a planned session.
+
+    On the clock of its plan, which may run faster in a rehearsal. NaN where it is not known.
+    """
+    place = manifest.get("about", {}).get("plan", {})
+    begun = place.get("since_change_min")
+    return math.nan if begun is None else begun + place["clock_speed"] * time_s / 60.0
 
 
 def _sampled(

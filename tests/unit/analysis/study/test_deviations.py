@@ -64,6 +64,9 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_every_deviation_is_reported_and_no_verdict_changes(study: Path) -> None:
     found = rm.compare(study, resamples=0)
+    # Of each epoch, from the change to its own beginning.
+    first = [epoch for epoch in found.epochs if "day-1-1" in epoch.source]
+    assert [epoch.since_change_min for epoch in first] == pytest.approx([60.0], abs=0.05)
     assert {(one.day, one.order, one.kind) for one in found.deviations} == {
         ("3", 2, "not done"),
         ("2", 2, "out of order"),

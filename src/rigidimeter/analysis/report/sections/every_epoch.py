@@ -172,6 +172,11 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
             *WHO,
             Column("task", "Task", "label"),
             Column("duration_s", "Duration (s)"),
+            *(
+                [Column("since_change_min", "Since the stimulation changed (min)")]
+                if any(math.isfinite(epoch.since_change_min) for epoch in result.epochs)
+                else []
+            ),
             Column("virtual", "Virtual", "label"),
             Column("closed", "Recording ended", "outcome"),
             Column("reason", "Reason", "reason"),
@@ -191,6 +196,7 @@ def _recorded(result: StudyResult) -> list[dict[str, Any]]:
             "condition": epoch.condition,
             "task": epoch.task,
             "duration_s": longest_s(channels),
+            "since_change_min": epoch.since_change_min,
             "virtual": epoch.virtual,
             "closed": epoch.closed.kind,
             "reason": epoch.closed.reason,
