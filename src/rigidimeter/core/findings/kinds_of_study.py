@@ -72,7 +72,7 @@ STUDY_KINDS = (
     Kind(
         "groups_differ",
         "number of groups of subjects, where not each of them shows the difference by itself",
-        headline="Not each group of subjects shows it: {groups}",
+        headline="each group alone: {groups}",
         measured="Within each group by itself: {groups}.",
         meaning="A mean over groups that respond differently speaks of none of them. Whether the "
         "groups differ from each other is not tested.",

@@ -47,6 +47,8 @@ WHEN: Mapping[str, str] = {
     "hides": "When no difference is found",
     "held": "When the interval holds a difference worth finding",
     "values": "When there are too few values for any test",
+    "negative": "When some values of a table are negative",
+    "zero": "When the reference is 0",
     "together": "When all epochs of a condition have it together",
 }
 """When a variant of the words is used."""
