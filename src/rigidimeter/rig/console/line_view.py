@@ -111,7 +111,8 @@ class LineView:
             for role in (Role.RECORDER, Role.ESTIMATOR)
             if status.condition(role) is ProcessCondition.TROUBLE
         ]
-        texts = tuple(filter(None, (facts.stop_words, *self._observer.cautions, *notes)))
+        words = (facts.stop_words, *self._observer.cautions, facts.emg_words, *notes)
+        texts = tuple(filter(None, words))
         for text in texts:
             if text not in self._announced:
                 self._say(text)

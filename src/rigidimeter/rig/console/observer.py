@@ -15,6 +15,7 @@ from rigidimeter.rig.acquisition.processes import (
     SampleReader,
     SessionMemory,
 )
+from rigidimeter.rig.console.emg_state import EmgState
 from rigidimeter.rig.console.indicators import RECENT_S, RecorderState, recent_samples
 from rigidimeter.rig.console.live_parameters import caution, settling_s
 from rigidimeter.rig.console.session_facts import Facts, facts
@@ -76,6 +77,7 @@ class Observer:
             recent_samples(rows),
             self._recorder(),
             self._caution(),
+            EmgState.of(self._shared.status) if self._plan.settings.emg.channels else None,
         )
 
     @property

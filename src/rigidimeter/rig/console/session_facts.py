@@ -14,8 +14,10 @@ from rigidimeter.core.session import PlannedEpoch
 from rigidimeter.core.units import deg_from_rad
 from rigidimeter.rig.acquisition import Phase, State
 from rigidimeter.rig.acquisition.processes import PAUSE_NEXT, STOP_NEXT, LiveEstimate, LoopStatus
+from rigidimeter.rig.console.emg_state import EmgState
 from rigidimeter.rig.console.indicators import (
     Indicator,
+    Level,
     LimitDistance,
     RecentSamples,
     RecorderState,
@@ -104,6 +106,9 @@ class Facts:
         Now; torques are means of 0.1 s. The drive's is that of its motor, NaN if it reports none.
     distances : tuple of LimitDistance
     indicators : tuple of Indicator
+        The last one is that of the EMG where the settings have some.
+    emg_words : str
+        What is wrong with the EMG; empty while all is well.
     cause : Cause
         For which the guard holds or has stopped the rig.
     stop_words : str
@@ -128,6 +133,7 @@ class Facts:
     drive_torque_nm: float
     distances: tuple[LimitDistance, ...]
     indicators: tuple[Indicator, ...]
+    emg_words: str
     cause: Cause
     stop_words: str
     held: bool
@@ -141,6 +147,7 @@ def facts(
     recent: RecentSamples | None = None,
     recorder: RecorderState | None = None,
     caution: str = "",
+    emg: EmgState | None = None,
 ) -> Facts:
     """Return what the operator needs to know now.
 
@@ -155,6 +162,8 @@ def facts(
     recorder : RecorderState
     caution : str
         What is wrong with the torque of the last epoch.
+    emg : EmgState, optional
+        Without it there is no lamp of the EMG.
     """
     recent, recorder = recent or RecentSamples(), recorder or RecorderState()
     state = State(loop.state)
@@ -162,6 +171,8 @@ def facts(
     left_s = session_left_s(progress, loop, plan.settings.protocol.return_s)
     distances = limit_distances(plan.settings.guard, recent, loop.energy_j, progress.range_rad)
     live, live_words = _live(plan, progress, history)
+    of_emg = () if emg is None else (emg.indicator,)
+    wrong = [f"{one.name}: {one.words}" for one in of_emg if one.level >= Level.WATCH]
     return Facts(
         time_s=loop.time_s,
         state=state,
@@ -187,7 +198,9 @@ def facts(
             left_s,
             "; ".join(filter(None, (caution, _wild(progress)))),
             progress.dose,
-        ),
+        )
+        + of_emg,
+        emg_words="".join(wrong),
         cause=Cause(loop.cause),
         stop_words=_stop_words(progress, loop),
         held=not progress.outcome and _held(loop),

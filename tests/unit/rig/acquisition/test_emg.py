@@ -116,12 +116,29 @@ def recorded(
         shared.close()
 
 
+def reached(shared: SessionMemory, condition: ProcessCondition) -> str:
+    """Wait until the process of the EMG shows this; return its note."""
+    until_s = time.monotonic() + 30.0
+    while shared.status.condition(Role.EMG) is not condition:
+        assert time.monotonic() < until_s, shared.status.condition(Role.EMG)
+        time.sleep(0.02)
+    return shared.status.note(Role.EMG)
+
+
 def test_what_a_stream_sends_is_recorded_on_the_clock_of_the_session(amplifier, tmp_path: Path):
     name = f"Amplifier{os.getpid()}"
     amplifier(name, 2000.0, 3, "pause")
     settings = with_emg(source="lsl", stream=name, unit="uV")
     require_emg(settings.emg)
-    origin_s, remarks = recorded(settings, tmp_path / "session", 3.0)
+    notes: list[str] = []
+
+    def watch(shared: SessionMemory) -> None:
+        notes.append(reached(shared, ProcessCondition.TROUBLE))
+        reached(shared, ProcessCondition.RUNNING)
+
+    origin_s, remarks = recorded(settings, tmp_path / "session", 3.0, session=watch)
+    from_s = notes[0].removeprefix("missing since ").removesuffix(" s")
+    assert remarks[0].startswith(f"EMG is missing from {from_s} to ")
     emg = read_emg(tmp_path / "session")
     assert list(emg.emg_v) == ["emg_v", "emg_2_v"]  # the third has no muscle
     assert emg.closed
@@ -182,7 +199,13 @@ def test_a_card_that_fails_is_named_and_what_it_gave_is_kept(tmp_path: Path):
     np.testing.assert_array_equal(first.source_time_s, np.arange(100) / 2000.0)
     np.testing.assert_array_equal(second.source_time_s, np.arange(100, 350) / 2000.0)
     assert before_s <= first.source_time_s[-1] + first.monotonic_offset_s <= time.monotonic()
-    _, remarks = recorded(settings, tmp_path / "session", 1e9, broken_card)
+    notes: list[str] = []
+
+    def watch(shared: SessionMemory) -> None:
+        notes.append(reached(shared, ProcessCondition.FAILED))
+
+    _, remarks = recorded(settings, tmp_path / "session", 1e9, broken_card, watch)
+    assert remarks[-1] == f"EMG {notes[0]}"
     assert remarks[-1].startswith("EMG ended at")
     assert remarks[-1].endswith("the buffer ran over")
     assert read_emg(tmp_path / "session").closed

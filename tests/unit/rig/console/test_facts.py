@@ -17,6 +17,7 @@ from rigidimeter.rig.acquisition.processes import (
     ProcessCondition,
 )
 from rigidimeter.rig.console import (
+    EmgState,
     Facts,
     Level,
     RecentSamples,
@@ -189,6 +190,26 @@ def test_all_lamps_are_good_and_say_what_they_know():
         "0 of 120 epochs, 0.0 of 60 min of motion, 0 of 30 arrivals at the position limit"
     )
     assert len({level.sign for level in Level}) == len(Level)
+
+
+@pytest.mark.parametrize(
+    ("emg", "level", "words"),
+    [
+        (EmgState(), Level.UNKNOWN, "starts"),
+        (EmgState(ProcessCondition.RUNNING, "", 0.1), Level.GOOD, "is recorded"),
+        (EmgState(ProcessCondition.RUNNING, "", 3.0), Level.WATCH, "its process does not answer"),
+        (EmgState(ProcessCondition.TROUBLE, "missing since 3.0 s", 0.1), Level.WATCH, "missing"),
+        (EmgState(ProcessCondition.FAILED, "ended at 3.0 s: x", 9.0), Level.WATCH, "ended at 3.0"),
+        (EmgState(ProcessCondition.DONE, "", 9.0), Level.GOOD, "all is in the file"),
+    ],
+)
+def test_emg_that_is_missing_is_named_and_stops_nothing(emg, level, words):
+    found = shown(told(started(1, "1")), emg=emg)
+    lamp = found.indicators[-1]
+    assert (lamp.name, lamp.level) == ("EMG", level)
+    assert lamp.words.startswith(words)
+    assert found.emg_words == (f"EMG: {lamp.words}" if level is Level.WATCH else "")
+    assert found.stop_words == ""
 
 
 @pytest.mark.parametrize(("epochs", "level"), [(95, Level.GOOD), (96, Level.WATCH)])

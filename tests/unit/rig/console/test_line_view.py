@@ -9,7 +9,7 @@ import pytest
 from tests.unit.rig.console.test_live_values import estimate
 from tests.unit.rig.console.test_session_progress import EPOCHS, started, told
 
-from rigidimeter.core.settings import Settings
+from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.rig.acquisition import NOTHING, Command, Order, Phase, State
 from rigidimeter.rig.acquisition.processes import (
     Flag,
@@ -158,6 +158,24 @@ def test_an_order_goes_once_and_is_confirmed(desk):
     desk.look()
     assert desk.orders() == [Command.PAUSE]
     assert desk.said() == ["ordered: pause"]
+
+
+def test_emg_that_stalls_is_named_once_and_again_when_it_stalls_again(desk):
+    with_emg = parse_settings({"emg": {"source": "virtual", "muscles": ["biceps"]}})
+    desk.terminal = LineView(None, desk.out, SessionPlan(with_emg, EPOCHS), lambda: desk.now_s)
+    status, said = desk.shared_status, []
+    status.join(Role.EMG)
+    for condition, note in (
+        (ProcessCondition.RUNNING, None),
+        (ProcessCondition.TROUBLE, "missing since 3.0 s"),
+        (ProcessCondition.TROUBLE, None),
+        (ProcessCondition.RUNNING, None),
+        (ProcessCondition.TROUBLE, "missing since 9.0 s"),
+    ):
+        status.set_condition(Role.EMG, condition, note)
+        desk.look()
+        said += desk.said()
+    assert said == ["EMG: missing since 3.0 s", "EMG: missing since 9.0 s"]
 
 
 def test_lines_are_taken_when_they_are_whole(desk):

@@ -1,8 +1,8 @@
 """The process of the EMG: from its source into a file of its own beside the samples.
 
 It waits for source and disk, and nothing waits for it: not the loop, not the recorder. Where the
-source gives nothing or breaks off, EMG is missing and nothing else; what is missing is named when
-the session has ended, and when it is read.
+source gives nothing or breaks off, EMG is missing and nothing else; that is in the shared status at
+once, and what is missing is named when the session has ended, and when it is read.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from rigidimeter.model import VirtualMuscles
 from rigidimeter.rig.acquisition.processes.end_signals import leave_to_the_others
 from rigidimeter.rig.acquisition.processes.ring import SampleReader
 from rigidimeter.rig.acquisition.processes.session_memory import SessionMemory
-from rigidimeter.rig.acquisition.processes.status_values import Role
+from rigidimeter.rig.acquisition.processes.shared_status import SharedStatus
+from rigidimeter.rig.acquisition.processes.status_values import ProcessCondition, Role
 from rigidimeter.rig.devices.base import EmgSamples, EmgSource
 
 POLL_S = 0.05
@@ -140,6 +141,7 @@ def emg_main(
     leave_to_the_others()
     os.nice(NICENESS)
     shared = SessionMemory.attach_or_end(names)
+    shared.status.join(Role.EMG)
     found: list[str] = []
     try:
         events = _Events(shared)
@@ -173,7 +175,8 @@ def _record(
     """Record; return what is missing, as sentences."""
     status = shared.status
     missing: list[str] = []
-    over, last_s = False, 0.0
+    over, last_s, arrived_s = False, 0.0, time.monotonic()
+    status.set_condition(Role.EMG, ProcessCondition.RUNNING)
     try:
         while not over:
             # A loop that was killed did not say that it ended; the recorder does.
@@ -181,6 +184,10 @@ def _record(
             over = ended or os.getppid() != console_pid
             events.follow()
             source_s, offset_s, emg_v = source.read()
+            status.beat(Role.EMG)
+            if source_s.size or events.origin_s is None:
+                arrived_s = time.monotonic()
+            _show(status, last_s, stalled=time.monotonic() - arrived_s > STALLED_S)
             if events.origin_s is not None:
                 time_s = source_s + (offset_s - events.origin_s)
                 since = time_s >= 0.0  # the session's clock began
@@ -194,8 +201,11 @@ def _record(
             if not over:
                 time.sleep(POLL_S)
     except (UserError, OSError) as error:
-        missing.append(f"EMG ended at {last_s:.1f} s: {error}")
+        note = f"ended at {last_s:.1f} s: {error}"
+        status.set_condition(Role.EMG, ProcessCondition.FAILED, note)
+        missing.append(f"EMG {note}")
     else:
+        status.set_condition(Role.EMG, ProcessCondition.DONE)
         loop = status.loop()
         missing += _gap(last_s, loop.time_s if loop is not None else 0.0)
     finally:
@@ -206,6 +216,15 @@ def _record(
     if status.folder() != written.folder:
         missing.append(f"EMG is in {written.folder / EMG}, not with the samples; copy it to them")
     return missing
+
+
+def _show(status: SharedStatus, last_s: float, *, stalled: bool) -> None:
+    """Show whether EMG comes, or since when it is missing."""
+    if not stalled:
+        status.set_condition(Role.EMG, ProcessCondition.RUNNING)
+    elif status.condition(Role.EMG) is not ProcessCondition.TROUBLE:
+        note = f"missing since {last_s:.1f} s"
+        status.set_condition(Role.EMG, ProcessCondition.TROUBLE, note)
 
 
 def _gap(last_s: float, next_s: float) -> list[str]:

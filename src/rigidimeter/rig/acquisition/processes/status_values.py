@@ -16,6 +16,7 @@ class Role(IntEnum):
     RECORDER = 1
     CONSOLE = 2
     ESTIMATOR = 3
+    EMG = 4
 
 
 class ProcessCondition(IntEnum):

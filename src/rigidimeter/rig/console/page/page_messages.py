@@ -208,7 +208,7 @@ def session_state(facts: Facts, progress: Progress) -> dict[str, Any]:
             }
             for indicator in facts.indicators
         ],
-        "alert": in_buttons(facts.stop_words),
+        "alert": "\n".join(filter(None, (in_buttons(facts.stop_words), facts.emg_words))),
         "orders": [] if progress.outcome else list(ORDERS_IN[facts.state]),
         "rate": {"number": rated.number, "place": rated.place} if rated is not None else None,
     }

@@ -7,8 +7,10 @@ import numpy as np
 from tests.unit.rig.console.test_facts import PLAN, QUIET, RUNNING, shown
 from tests.unit.rig.console.test_session_progress import ended, started, told
 
-from rigidimeter.rig.console import AT_ONCE, TRACES, Level, LiveValue, Traces, facts
+from rigidimeter.rig.acquisition.processes import ProcessCondition
+from rigidimeter.rig.console import AT_ONCE, TRACES, EmgState, Level, LiveValue, Traces, facts
 from rigidimeter.rig.console.page import LEVELS, points, session_state
+from rigidimeter.rig.guard import Cause
 
 KNOWN = tuple(LiveValue(symbol, "", 1.0, 0.1, True, "") for symbol in "JBK")
 
@@ -22,6 +24,19 @@ def test_lamps_and_limits_have_the_signs_of_the_terminal():
     near = facts(PLAN, progress, RUNNING, recent=QUIET._replace(largest_torque_nm=9.5))
     torque = next(one for one in session_state(near, progress)["limits"] if one["name"] == "torque")
     assert torque["sign"] == Level.WATCH.sign
+
+
+def test_emg_that_is_missing_is_in_the_banner_beside_what_stopped_the_rig():
+    progress = told(started(1, "1"))
+    emg = EmgState(ProcessCondition.TROUBLE, "missing since 3.0 s", 0.1)
+    state = session_state(shown(progress, emg=emg), progress)
+    assert state["alert"] == "EMG: missing since 3.0 s"
+    assert state["lamps"][-1]["text"] == "EMG: missing since 3.0 s"
+    held = shown(progress, RUNNING._replace(cause=int(Cause.STALLED)), emg=emg)
+    stop, missing = session_state(held, progress)["alert"].split("\n")
+    assert Cause.STALLED.sentence in stop
+    assert missing == "EMG: missing since 3.0 s"
+    assert session_state(shown(progress), progress)["alert"] == ""
 
 
 def test_the_panes_are_those_of_the_epoch_that_runs_or_ran_last():
