@@ -29,6 +29,14 @@ from rigidimeter.model.drive_side import (
     drive_side_step,
     reported_torque_nm,
 )
+from rigidimeter.model.emg_envelope import (
+    EMG_BAND_HZ,
+    ENVELOPE_RATE_HZ,
+    LiveEnvelope,
+    emg_band_hz,
+    emg_filters,
+    envelope_step,
+)
 from rigidimeter.model.joint import (
     JointDynamics,
     arm_response,
@@ -46,7 +54,7 @@ from rigidimeter.model.linear_loop import (
     voluntary_motion_sd,
 )
 from rigidimeter.model.loop_poles import spectral_radius
-from rigidimeter.model.muscle_activity import EMG_BAND_HZ, VirtualEmg, VirtualMuscles
+from rigidimeter.model.muscle_activity import VirtualEmg, VirtualMuscles
 from rigidimeter.model.recursion import (
     STATE_SIZE,
     online_design,

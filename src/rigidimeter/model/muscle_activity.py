@@ -19,6 +19,7 @@ import scipy
 from numpy.typing import NDArray
 
 from rigidimeter.core.settings import EmgSettings, Settings, SubjectSettings
+from rigidimeter.model.emg_envelope import EMG_BAND_HZ
 from rigidimeter.model.subject_torque import (
     SubjectTorque,
     noise_band,
@@ -28,7 +29,6 @@ from rigidimeter.model.subject_torque import (
 
 Array = NDArray[np.float64]
 
-EMG_BAND_HZ = (20.0, 450.0)
 HUM_HZ = 50.0
 _V_PER_UV = 1e-6
 

@@ -17,11 +17,8 @@ import scipy
 
 from rigidimeter.core.records import EMG_CHANNELS, Channel, Epoch
 from rigidimeter.core.settings import DiagnosticsSettings
+from rigidimeter.model import ENVELOPE_RATE_HZ, emg_band_hz, emg_filters, envelope_step
 
-BAND_HZ = (20.0, 450.0)
-HIGHEST_OF_RATE = 0.45
-ENVELOPE_HZ = 6.0
-ENVELOPE_RATE_HZ = 50.0
 BASELINE_QUANTILE = 0.2
 
 Spans = list[tuple[float, float]]
@@ -30,17 +27,20 @@ Spans = list[tuple[float, float]]
 def emg_channels(epoch: Epoch) -> list[Channel]:
     """Return the EMG of every muscle that has an envelope: ``emg_v``, ``emg_2_v`` and so on."""
     muscles = (epoch.channels[name] for name in EMG_CHANNELS if name in epoch.channels)
-    return [one for one in muscles if len(one) > ENVELOPE_RATE_HZ and np.diff(band_hz(one)) > 0]
+    return [
+        one
+        for one in muscles
+        if len(one) > ENVELOPE_RATE_HZ and np.diff(emg_band_hz(one.mean_rate_hz)) > 0
+    ]
 
 
 def envelope(emg: Channel) -> Channel:
     """Return the envelope of an EMG in V, at `ENVELOPE_RATE_HZ` or so."""
     rate_hz = emg.mean_rate_hz
     raw = np.where(np.isfinite(emg.values), emg.values, 0.0)
-    band = scipy.signal.butter(2, band_hz(emg), "bandpass", fs=rate_hz, output="sos")
+    band, low = emg_filters(rate_hz)
     rectified = np.abs(scipy.signal.sosfiltfilt(band, raw))
-    low = scipy.signal.butter(2, ENVELOPE_HZ, "lowpass", fs=rate_hz, output="sos")
-    step = max(int(rate_hz / ENVELOPE_RATE_HZ), 1)
+    step = envelope_step(rate_hz)
     values = np.maximum(scipy.signal.sosfiltfilt(low, rectified), 0.0)
     return Channel(emg.name, emg.time_s[::step], values[::step])
 
@@ -101,11 +101,6 @@ def cocontraction_percent(envelopes: Sequence[Channel], largest_v: Sequence[floa
     larger = np.maximum(one, two)
     pulled = larger > 0.0
     return 100.0 * float(np.mean(np.minimum(one, two)[pulled] / larger[pulled]))
-
-
-def band_hz(emg: Channel) -> tuple[float, float]:
-    """Return the band of an EMG, which its rate may leave empty."""
-    return BAND_HZ[0], min(BAND_HZ[1], HIGHEST_OF_RATE * emg.mean_rate_hz)
 
 
 def share_percent(spans: Spans, length_s: float) -> float:

@@ -1,9 +1,12 @@
-"""Whether the EMG of the session comes, in words for the operator."""
+"""The EMG of the session for the operator: whether it comes, and the envelope of each muscle."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rigidimeter.rig.acquisition.processes import ProcessCondition, Role, SharedStatus
 from rigidimeter.rig.console.indicators import Indicator, Level
@@ -48,3 +51,27 @@ class EmgState:
         if self.condition is ProcessCondition.TROUBLE:
             return Indicator("EMG", Level.WATCH, self.note)
         return Indicator("EMG", Level.GOOD, "is recorded")
+
+
+class EnvelopeReader:
+    """Reads what came of the envelope since the last call.
+
+    Parameters
+    ----------
+    status : SharedStatus
+    muscles : int
+    """
+
+    def __init__(self, status: SharedStatus, muscles: int) -> None:
+        self._status, self._columns, self._last_s = status, 1 + muscles, -math.inf
+
+    def read(self) -> NDArray[np.float64]:
+        """Return time in s and µV of each muscle, shape (n, 1 + muscles).
+
+        A reader that comes later than after a second misses points.
+        """
+        points = np.frombuffer(self._status.envelope()).reshape(-1, self._columns)
+        points = points[points[:, 0] > self._last_s]
+        if len(points):
+            self._last_s = float(points[-1, 0])
+        return points

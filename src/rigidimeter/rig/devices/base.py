@@ -256,7 +256,15 @@ class EmgSamples(NamedTuple):
 
 
 class EmgSource(Protocol):
-    """A source of EMG, which is read in a process of its own: its calls may wait."""
+    """A source of EMG, which is read in a process of its own: its calls may wait.
+
+    Attributes
+    ----------
+    rate_hz : float
+        Nominal.
+    """
+
+    rate_hz: float
 
     def read(self) -> EmgSamples:
         """Return the samples since the last call, none if there are none."""

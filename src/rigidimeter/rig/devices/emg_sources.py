@@ -102,7 +102,7 @@ class LslEmg:
 
         self._muscles, self._scale = len(settings.muscles), _IN_VOLTS[settings.unit]
         info = _found(settings)
-        self._channels = info.channel_count()
+        self.rate_hz, self._channels = float(info.nominal_srate()), info.channel_count()
         self._inlet = StreamInlet(info, max_buflen=BUFFER_S)
         self._inlet.open_stream(FIND_S)
         self._local_ahead_s = local_clock() - time.monotonic()
@@ -144,7 +144,7 @@ class DaqEmg:
     """
 
     def __init__(self, settings: EmgSettings, reader: VoltageReader | None = None) -> None:
-        self._rate_hz = settings.rate_hz
+        self.rate_hz = settings.rate_hz
         self._clock = SampleClock(_DRIFT)
         self._clock.restart(settings.rate_hz)
         self._count, self._offset_s = 0, 0.0
@@ -173,7 +173,7 @@ class DaqEmg:
         except ReaderError as error:
             raise DeviceError(f"EMG card: {error}") from error
         n = len(emg_v)
-        source_s = (self._count + np.arange(n)) / self._rate_hz
+        source_s = (self._count + np.arange(n)) / self.rate_hz
         self._count += n
         if n:
             taken_s = self._clock.taken_s(time.monotonic(), n)

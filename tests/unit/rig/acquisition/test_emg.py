@@ -17,13 +17,14 @@ import pytest
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import Sample, SessionWriter, read_emg
 from rigidimeter.core.settings import EmgSettings, Settings, parse_settings
-from rigidimeter.model import VirtualMuscles
+from rigidimeter.model import LiveEnvelope, VirtualMuscles
 from rigidimeter.rig.acquisition.processes import (
     ProcessCondition,
     Role,
     SessionMemory,
     emg_main,
 )
+from rigidimeter.rig.console import EnvelopeReader
 from rigidimeter.rig.devices import DaqEmg, ReaderError, open_emg, require_emg
 
 CONFIG = """\
@@ -224,6 +225,7 @@ def test_the_virtual_subject_has_the_emg_of_its_ticks(tmp_path: Path):
     ]
 
     conditions = {1: "OFF", 2: "DBS"}
+    shown: list[np.ndarray] = []
 
     def session(shared: SessionMemory) -> None:
         for k, row in enumerate(rows):
@@ -233,6 +235,13 @@ def test_the_virtual_subject_has_the_emg_of_its_ticks(tmp_path: Path):
             assert shared.samples.push(row)
             if k % 400 == 0:
                 time.sleep(0.08)
+        until_s = time.monotonic() + 30.0
+        reader = EnvelopeReader(shared.status, 2)
+        while not shown or shown[-1][-1, 0] < 2.97:
+            assert time.monotonic() < until_s
+            shown.append(reader.read())
+            shown[:] = [points for points in shown if len(points)]
+            time.sleep(0.02)
 
     _, remarks = recorded(settings, tmp_path / "session", 1.4, None, session)
     emg = read_emg(tmp_path / "session")
@@ -241,3 +250,6 @@ def test_the_virtual_subject_has_the_emg_of_its_ticks(tmp_path: Path):
     np.testing.assert_allclose(np.column_stack([*emg.emg_v.values()]), truth, atol=1e-15)
     np.testing.assert_allclose(emg.time_s, np.arange(len(truth)) / 2000.0, atol=1e-9)
     assert remarks == []
+    points = np.vstack(shown)
+    expected = LiveEnvelope(2000.0, 2).block(np.arange(len(truth)) / 2000.0, 1e6 * truth)
+    np.testing.assert_allclose(points, expected[-len(points) :], atol=1e-9)

@@ -17,11 +17,12 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import EMG, EmgLog, read_manifest
 from rigidimeter.core.settings import EmgSettings, Settings
-from rigidimeter.model import VirtualMuscles
+from rigidimeter.model import ENVELOPE_RATE_HZ, LiveEnvelope, VirtualMuscles
 from rigidimeter.rig.acquisition.processes.end_signals import leave_to_the_others
 from rigidimeter.rig.acquisition.processes.ring import SampleReader
 from rigidimeter.rig.acquisition.processes.session_memory import SessionMemory
@@ -36,6 +37,8 @@ STALLED_S = 0.5
 WAITING_S = 60.0
 """So much EMG waits for a disk that takes nothing."""
 SYNC_S = 1.0
+SHOWN_S = 1.0
+"""So much of the envelope is in the shared status."""
 
 
 class _Events:
@@ -65,18 +68,31 @@ class _Virtual:
         first = settings.subject[settings.protocol.blocks[0].condition]
         self._muscles = VirtualMuscles(settings, first.relaxed)
         self._reader, self._events = SampleReader(shared.samples), events
-        self._rate_hz, self._count = settings.emg.rate_hz, 0
+        self.rate_hz, self._count = settings.emg.rate_hz, 0
 
     def read(self) -> EmgSamples:
         rows, _ = self._reader.read()
         self._events.follow()  # an epoch's beginning is written before its first tick
         emg_v = self._muscles.take(rows["tick"], rows["epoch"], self._events.conditions)
-        source_s = (self._count + np.arange(len(emg_v))) / self._rate_hz
+        source_s = (self._count + np.arange(len(emg_v))) / self.rate_hz
         self._count += len(emg_v)
         return EmgSamples(source_s, self._events.origin_s or 0.0, emg_v)
 
     def close(self) -> None:
         """Do nothing: there is no connection."""
+
+
+class _Envelope:
+    """The newest points of the envelope in the shared status: time in s, and µV of each muscle."""
+
+    def __init__(self, source: EmgSource, muscles: int, status: SharedStatus) -> None:
+        self._live, self._status = LiveEnvelope(source.rate_hz, muscles), status
+        self._points = np.empty((0, 1 + muscles))
+
+    def show(self, time_s: NDArray[np.float64], emg_v: NDArray[np.float64]) -> None:
+        points = np.vstack([self._points, self._live.block(time_s, 1e6 * emg_v)])
+        self._points = points[-round(SHOWN_S * ENVELOPE_RATE_HZ) :]
+        self._status.show_envelope(self._points.tobytes())
 
 
 class _Written:
@@ -148,7 +164,8 @@ def emg_main(
         source = open_emg(settings.emg) if open_emg else _Virtual(settings, shared, events)
         written = _Written(settings, _folder(shared))
         remarks.send([])
-        found = _record(source, written, events, shared, lost_s, console_pid)
+        envelope = _Envelope(source, len(settings.emg.channels), shared.status)
+        found = _record(source, written, envelope, events, shared, lost_s, console_pid)
     except (UserError, OSError) as error:
         found = [f"EMG was not recorded: {error}"]
     finally:
@@ -167,6 +184,7 @@ def _folder(shared: SessionMemory) -> Path:
 def _record(
     source: EmgSource,
     written: _Written,
+    envelope: _Envelope,
     events: _Events,
     shared: SessionMemory,
     lost_s: float,
@@ -195,6 +213,7 @@ def _record(
                     first_s = float(time_s[since][0])
                     missing += _gap(last_s, first_s)
                     last_s = float(time_s[-1])
+                    envelope.show(time_s[since], emg_v[since])
                 written.append(
                     EmgSamples(source_s[since], offset_s - events.origin_s, emg_v[since])
                 )

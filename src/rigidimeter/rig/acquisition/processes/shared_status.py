@@ -48,7 +48,8 @@ _NAME_BYTES = 48
 _PATH_BYTES = 4096
 _FOLDER_BYTE = _NOTES_BYTE + len(Role) * _NOTE_BYTES
 _ASKED_BYTE = _FOLDER_BYTE + _PATH_BYTES
-_BYTES = _ASKED_BYTE + _PATH_BYTES
+_ENVELOPE_BYTE = _ASKED_BYTE + _PATH_BYTES
+_BYTES = _ENVELOPE_BYTE + _PATH_BYTES
 _TRIES = 1000
 
 
@@ -125,6 +126,7 @@ class SharedStatus:
         path = f"@q{_PATH_BYTES - 16}s"
         self._folder = _Block(memory, _FOLDER_BYTE // 8, path)
         self._asked = _Block(memory, _ASKED_BYTE // 8, path)
+        self._envelope = _Block(memory, _ENVELOPE_BYTE // 8, path)
 
     @classmethod
     def create(cls, name: str = "") -> SharedStatus:
@@ -325,6 +327,14 @@ class SharedStatus:
         """Return the live estimate; None if its process was killed while it wrote."""
         values = self._live.read()
         return None if values is None else LiveEstimate(*values)  # type: ignore[arg-type]
+
+    def show_envelope(self, points: bytes) -> None:
+        """Show the newest points of the EMG's envelope; only its process may."""
+        self._envelope.write(len(points), points)
+
+    def envelope(self) -> bytes:
+        """Return the newest points of the EMG's envelope, as they were shown."""
+        return _text(self._envelope)
 
     @property
     def synced_samples(self) -> int:

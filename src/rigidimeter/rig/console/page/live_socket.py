@@ -20,7 +20,15 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from rigidimeter.core.files import json_line
 from rigidimeter.rig.acquisition import Command, Order
 from rigidimeter.rig.acquisition.processes import Flag, ProcessCondition, Role, SessionMemory
-from rigidimeter.rig.console import Alarm, Alarms, BandTorque, Observer, TraceReader, save_to
+from rigidimeter.rig.console import (
+    Alarm,
+    Alarms,
+    BandTorque,
+    EnvelopeReader,
+    Observer,
+    TraceReader,
+    save_to,
+)
 from rigidimeter.rig.console.page.page_messages import (
     PageMessage,
     RefusedMessage,
@@ -82,6 +90,9 @@ class _Attached:
         self._band = BandTorque(settings.online, rate_hz)
         self._traces = TraceReader(self.memory.samples, rate_hz, POINTS_PER_S, band=self._band)
         self._known_since_s = math.nan
+        emg = settings.emg
+        self._muscles = emg.muscles if emg.channels else []
+        self._envelope = EnvelopeReader(self.memory.status, len(self._muscles))
         self._observer = Observer(running.plan, self.memory)
         self._alarms = Alarms()
         self.heard, self.stopped = Alarm.NONE, False
@@ -101,6 +112,9 @@ class _Attached:
         self.stopped = self._alarms.stopped
         full = self.memory.status.condition(Role.RECORDER) is ProcessCondition.TROUBLE
         state = session_state(facts, progress)
+        if self._muscles:
+            points = self._envelope.read().round(3).tolist()
+            state["emg"] = {"muscles": self._muscles, "points": points}
         return state | {
             "number": self.running.number,
             "save": full,

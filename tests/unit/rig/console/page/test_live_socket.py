@@ -7,13 +7,15 @@ import time
 from collections import deque
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from starlette.websockets import WebSocketDisconnect
 from tests.unit.rig.acquisition.exact_rig import LONGEST
 from tests.unit.rig.acquisition.whole_session import RETURN, session
+from tests.unit.rig.console.test_session_progress import EPOCHS
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.settings import Settings
+from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.rig.acquisition import NOTHING, Command
 from rigidimeter.rig.acquisition.processes import (
     Flag,
@@ -24,7 +26,7 @@ from rigidimeter.rig.acquisition.processes import (
     SharedSupervision,
     shared_memory,
 )
-from rigidimeter.rig.console import Alarm
+from rigidimeter.rig.console import Alarm, SessionPlan
 from rigidimeter.rig.console.page import (
     ORDERS,
     LiveSockets,
@@ -163,6 +165,28 @@ def operator(tmp_path, monkeypatch):
     made = Operator(tmp_path)
     yield made
     made.memory.close()
+
+
+@pytest.mark.parametrize("muscles", [["biceps", "triceps"], []])
+def test_the_page_gets_each_point_of_the_envelope_once_and_nothing_without_emg(
+    operator, muscles, tmp_path
+):
+    source = "virtual" if muscles else "none"
+    settings = parse_settings({"emg": {"source": source, "muscles": muscles}})
+    follow = operator.state.console(SessionPlan(settings, EPOCHS), tmp_path)
+    follow(operator.memory)
+    operator.sockets._attached = None
+    operator.sockets._follow()
+    sent = []
+    for points in ([[0.02, 4.0, 5.0]], [[0.02, 4.0, 5.0], [0.04, 4.0, 6.0]]):
+        operator.status.show_envelope(np.array(points).tobytes())
+        sent.append(operator.sockets._attached.state().get("emg"))
+    operator.sockets._attached.memory.close()
+    if muscles:
+        points = [[[0.02, 4.0, 5.0]], [[0.04, 4.0, 6.0]]]
+        assert sent == [{"muscles": muscles, "points": one} for one in points]
+    else:
+        assert sent == [None, None]
 
 
 SENT = 30

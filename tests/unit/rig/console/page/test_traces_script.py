@@ -72,3 +72,16 @@ def test_the_drives_torque_has_a_pane_of_its_own_with_its_value(page):
     assert [title.partition(" [")[0] for title in kept] == [
         *("torque", "angle", "velocity command", "drive's torque", "torque"),
     ]
+
+
+def test_the_envelope_of_each_muscle_is_in_a_pane_where_there_is_emg(page):
+    send(page, math.nan)
+    points = [[7.0, 4.0, 12.5], [7.02, 4.25, 13.5]]
+    sent = {"muscles": ["biceps", "triceps"], "points": points}
+    page.evaluate("(sent) => rigTraces.emg(sent)", sent)
+    (title,) = [one for one in send(page, math.nan) if one.startswith("EMG envelope [µV]")]
+    assert title == "EMG envelope [µV]: — biceps: 4.25 – – triceps: 13.50"
+    page.evaluate("rigTraces.task('sinusoid')")
+    assert sum("EMG" in one for one in send(page, math.nan)) == 1
+    page.evaluate("rigTraces.emg({ muscles: [], points: [] })")
+    assert not any("EMG" in one for one in send(page, math.nan))

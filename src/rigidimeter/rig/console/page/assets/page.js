@@ -87,6 +87,7 @@
     for (const id of ["counts", "live"]) fill($(id), session[id], () => node("div", ""), write);
     show("live-of", session.live_of ? `of ${session.live_of}` : "");
     traces.task(session.task);
+    traces.emg(session.emg || { muscles: [], points: [] });
     show("band-model", session.modelled ? "thick measured, thin modelled" : "measured, no model yet");
     banner(session.alert);
     const lamp = () => { const made = node("div", "lamp"); made.append(node("b", ""), node("span", "")); return made; };

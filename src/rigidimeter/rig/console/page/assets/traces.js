@@ -5,12 +5,13 @@ window.rigTraces = (() => {
   const PANES = ["torque [N·m]", "angle [deg]", "velocity command [deg/s]", "perturbation [N·m]", "drive's torque [N·m]"];
   const PERTURBATION = 3, DRIVE = 4;
   const DASHES = [[], [8, 4], [2, 3]];  // lines are told apart by their dashes too
+  const MARKS = ["—", "– –", "···"];
   const TITLE_PX = 22, TIME_AXIS_PX = 52, FONT = "14px system-ui", LABEL = { labelFont: FONT, labelSize: 20 };
   const $ = (id) => document.getElementById(id);
   const colour = (name) => getComputedStyle(document.body).getPropertyValue(name).trim();
-  let data, band, loop, fresh = false, driven = false, plots = [], task = "", epoch = null, epochPlots = [], epochWidth = 0;
+  let data, band, loop, fresh = false, driven = false, plots = [], task = "", muscles = [], envelope = [[]], epoch = null, epochPlots = [], epochWidth = 0;
 
-  function clear() { data = [[], [], [], [], [], []]; band = [[], [], []]; loop = [[], [], []]; fresh = true; }
+  function clear() { data = [[], [], [], [], [], []]; band = [[], [], []]; loop = [[], [], []]; envelope = [[], ...muscles.map(() => [])]; fresh = true; }
 
   function samples(buffer) {
     const numbers = new Float64Array(buffer), number = (at) => (Number.isFinite(numbers[at]) ? numbers[at] : null);
@@ -25,13 +26,28 @@ window.rigTraces = (() => {
       if (loop[0].length && time - loop[0][loop[0].length - 1] > 0.5) loop = [[], [], []];  // another epoch
       for (let k = 0; k < 3; k++) loop[k].push(k ? number(at + 10 + k) : time);
     }
-    for (const columns of [data, band, loop]) {
+    forget([data, band, loop]);
+  }
+
+  function forget(all) {
+    for (const columns of all) {
       const times = columns[0], from = times[times.length - 1] - WINDOW_S;
       let old = 0;
       while (old < times.length && times[old] < from) old++;
       if (old) for (const one of columns) one.splice(0, old);
     }
     fresh = true;
+  }
+
+  // The envelope of each muscle, of points that hold the time and then the muscles.
+  function emg(sent) {
+    if (sent.muscles.join("\n") !== muscles.join("\n")) {
+      muscles = sent.muscles;
+      envelope = [[], ...muscles.map(() => [])];
+      plot();
+    }
+    for (const point of sent.points) point.forEach((value, k) => envelope[k].push(value));
+    forget([envelope]);
   }
 
   function newest(values) {
@@ -75,9 +91,10 @@ window.rigTraces = (() => {
     const last = shown[shown.length - 1];
     for (const at of shown) {
       const made = pane($("panes"), PANES[at]), torque = at === 0 || at === DRIVE;
-      add(made, () => [data[0], data[at + 1]], [{}], cyclic && at === last);
+      add(made, () => [data[0], data[at + 1]], [{}], cyclic && at === last && !muscles.length);
       if (torque) plots[plots.length - 1].rig.said = () => { made.firstChild.firstChild.data = PANES[at] + newest(data[at + 1]); };
     }
+    if (muscles.length) emgPlot(add, cyclic);
     if (cyclic) plots.push(loopPlot(pane($("panes"), "torque [N·m] over angle [deg], last 10 s", "pane loop")));
     else {
       const at = pane($("panes"), "band torque [N·m]: "), said = document.createElement("span");
@@ -86,6 +103,19 @@ window.rigTraces = (() => {
       add(at, () => band, [{ width: 5, stroke: colour("--measured") }, { width: 1.5, stroke: colour("--ink") }], true);
     }
     resize();
+  }
+
+  function emgPlot(add, timed) {
+    const made = pane($("panes"), "EMG envelope [µV]:"), colours = ["--accent", "--bad", "--ok"].map(colour);
+    const lines = muscles.map((_, k) => ({ stroke: colours[(k + Math.floor(k / 3)) % 3], dash: DASHES[k % 3] }));
+    const names = lines.map((line) => {
+      const name = document.createElement("span");
+      name.style.color = line.stroke;
+      made.firstChild.append(" ", name);
+      return name;
+    });
+    add(made, () => envelope, lines, timed);
+    plots[plots.length - 1].rig.said = () => names.forEach((name, k) => { name.textContent = `${MARKS[k % 3]} ${muscles[k]}${newest(envelope[k + 1])}`; });
   }
 
   function loopPlot(at) {
@@ -193,5 +223,5 @@ window.rigTraces = (() => {
     requestAnimationFrame(draw);
   }
 
-  return { begin, clear, samples, resize, task: (name) => { if (name !== task) { task = name; plot(); } } };
+  return { begin, clear, samples, emg, resize, task: (name) => { if (name !== task) { task = name; plot(); } } };
 })();
