@@ -81,6 +81,14 @@ def test_the_envelope_of_each_muscle_is_in_a_pane_where_there_is_emg(page):
     page.evaluate("(sent) => rigTraces.emg(sent)", sent)
     (title,) = [one for one in send(page, math.nan) if one.startswith("EMG envelope [µV]")]
     assert title == "EMG envelope [µV]: — biceps: 4.25 – – triceps: 13.50"
+    page.evaluate("(sent) => rigTraces.emg(sent)", sent | {"points": [[6.5, 1.0, 1.0]]})
+    assert title in send(page, math.nan)  # what comes late is not the newest
+    page.evaluate("rigTraces.clear()")
+    page.evaluate("(sent) => rigTraces.emg(sent)", sent | {"points": [[6.0, 4.0, 12.5]]})
+    send(page, math.nan)  # of 1.1 s later
+    page.evaluate("(sent) => rigTraces.emg(sent)", sent | {"points": []})
+    missing = "EMG envelope [µV]: — biceps – – triceps"
+    assert missing in send(page, math.nan)
     page.evaluate("rigTraces.task('sinusoid')")
     assert sum("EMG" in one for one in send(page, math.nan)) == 1
     page.evaluate("rigTraces.emg({ muscles: [], points: [] })")
