@@ -225,8 +225,8 @@ class Epoch:
         Standard error of the offset between the clocks of torque and motion, where it was found.
     ticks : Ticks or None
         Those of the loop that sent the command; None where the recording does not say.
-    since_change_min : float
-        From the change of the stimulation to the beginning; NaN where it is not known.
+    since_change_min : float or None
+        From the change of the stimulation to the beginning; None where it is not known.
     """
 
     source: str
@@ -241,7 +241,7 @@ class Epoch:
     left_out: tuple[LeftOut, ...] = ()
     clock_error_s: float = 0.0
     ticks: Ticks | None = None
-    since_change_min: float = math.nan
+    since_change_min: float | None = None
 
     @property
     def name(self) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -302,14 +301,14 @@ def epoch_of_samples(
     )
 
 
-def since_change_min(manifest: Mapping[str, Any], time_s: float) -> float:
+def since_change_min(manifest: Mapping[str, Any], time_s: float) -> float | None:
     """Return the minutes from the change of the stimulation to a time of a planned session.
 
-    On the clock of its plan, which may run faster in a rehearsal. NaN where it is not known.
+    On the clock of its plan, which may run faster in a rehearsal. None where it is not known.
     """
     place = manifest.get("about", {}).get("plan", {})
     begun = place.get("since_change_min")
-    return math.nan if begun is None else begun + place["clock_speed"] * time_s / 60.0
+    return None if begun is None else begun + place["clock_speed"] * time_s / 60.0
 
 
 def _sampled(

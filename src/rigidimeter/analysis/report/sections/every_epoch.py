@@ -174,7 +174,7 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
             Column("duration_s", "Duration (s)"),
             *(
                 [Column("since_change_min", "Since the stimulation changed (min)")]
-                if any(math.isfinite(epoch.since_change_min) for epoch in result.epochs)
+                if any(epoch.since_change_min is not None for epoch in result.epochs)
                 else []
             ),
             Column("virtual", "Virtual", "label"),
