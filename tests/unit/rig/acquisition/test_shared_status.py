@@ -81,7 +81,7 @@ def test_what_one_process_shows_another_sees(shared_status):
 def test_what_is_half_written_is_not_read(shared_status):
     shared_status.show_loop(LoopStatus(tick=1))
     words = shared_status.memory.words
-    words[96] += 1  # as a writer that was killed between the two counts leaves it
+    words[104] += 1  # as a writer that was killed between the two counts leaves it
     assert shared_status.loop() is None
     shared_status.show_loop(LoopStatus(tick=2))
     assert shared_status.loop().tick == 2
