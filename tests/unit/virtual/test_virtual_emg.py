@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.replayed import assert_folder_replayed
 
 import rigidimeter as rm
 from rigidimeter.analysis.export import sessions_of_recording
@@ -32,6 +33,7 @@ def folder(tmp_path_factory) -> Path:
     """Return a session of two epochs with the EMG of two muscles."""
     folder = tmp_path_factory.mktemp("emg") / "session"
     run_virtual_session(parse_settings(TABLES), folder)
+    assert_folder_replayed(folder)
     return folder
 
 
@@ -71,6 +73,7 @@ def test_a_session_without_emg_is_as_before(tmp_path: Path):
     }
     del small["emg"]
     run_virtual_session(parse_settings(small), tmp_path / "session")
+    assert_folder_replayed(tmp_path / "session")
     assert not (tmp_path / "session" / EMG).exists()
     names = {name for epoch in rm.read(tmp_path / "session").epochs for name in epoch.channels}
     assert not [name for name in names if name.startswith("emg")]
@@ -79,6 +82,7 @@ def test_a_session_without_emg_is_as_before(tmp_path: Path):
 def test_the_motion_is_that_without_emg(folder: Path, tmp_path: Path):
     without = {key: value for key, value in TABLES.items() if key != "emg"}
     run_virtual_session(parse_settings(without), tmp_path / "session")
+    assert_folder_replayed(tmp_path / "session")
     columns = read_session_files(folder).samples.columns
     for name, values in read_session_files(tmp_path / "session").samples.columns.items():
         np.testing.assert_array_equal(values, columns[name], err_msg=name)

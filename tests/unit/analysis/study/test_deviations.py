@@ -7,6 +7,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
+from tests.replayed import assert_folder_replayed
 from tests.small_study import tiny
 
 import rigidimeter as rm
@@ -58,6 +59,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
             created_utc=now.isoformat(),
             about=session_facts(plan, due, now, reason="late" if wait_min == 4 else ""),
         )
+        assert_folder_replayed(folder / due.folder)
         extend_study(folder, [folder / due.folder])
     return folder
 
