@@ -197,7 +197,7 @@ def rehearse_plan(
 ) -> None:
     """Carry out what is left of a plan on the virtual rig.
 
-    No wait takes time: every day is a calendar day of a clock of its own, which begins tomorrow.
+    No wait takes time: every day is a calendar day of a clock of its own, in the past.
 
     \b
     For example:
@@ -209,7 +209,8 @@ def rehearse_plan(
 
     plan = plan_of(folder)
     left = len(plan.blocks)
-    tomorrow = datetime.now(UTC) + timedelta(days=1)
+    # All of it before now, so that what is switched from now on is the last change.
+    first_day = datetime.now(UTC) - timedelta(days=plan.about.days + 1)
     with Meter("rehearse", left) as meter:
         done: list[Path] = []
 
@@ -217,7 +218,7 @@ def rehearse_plan(
             done.append(session)
             meter.reach(len(done))
 
-        rehearse(plan, tomorrow, wait_share=wait_share, on_session=on_session)
+        rehearse(plan, first_day, wait_share=wait_share, on_session=on_session)
     echo(f"{len(done)} sessions of {folder} were recorded on the virtual rig")
     echo(f"Next: rigidimeter compare {folder}")
 
