@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -96,26 +96,26 @@ class NextSession:
         )
         return new_session(begun.settings, begun.about, begun.source)
 
-    def wait(self) -> None:
-        """Count down to the end of the wait.
+    def waited(self) -> NextSession:
+        """Count down to the end of the wait; return the session as it is due then.
 
         Raises
         ------
         UserError
-            If the wait has not begun.
+            If the wait has not begun, or the stimulation was changed meanwhile.
         """
         said, speed = self.said, self.said.speed
         left = self.due.left_min(datetime.now(UTC), speed)
         if said.begin_anyway:
             echo(f"Begun without waiting: {said.begin_anyway}")
-            return
+            return self
         if left is None:
             raise UserError(
                 f"{wait_words(self.due, datetime.now(UTC))}; enter it with --stimulation "
                 '"on since 10:42", or begin with --begin-anyway REASON'
             )
         if left <= 0.0:
-            return
+            return self
         echo(wait_words(self.due, datetime.now(UTC), speed))
         total_s = 60.0 * left / speed
         start_s = time.monotonic()
@@ -123,6 +123,11 @@ class NextSession:
             while (gone_s := time.monotonic() - start_s) < total_s:
                 meter.reach(gone_s)
                 time.sleep(min(_TICK_S, total_s - gone_s))
+        _, day, order = self.due.block.key
+        due = next_block(self.plan, self.due.block.subject, (day, order))
+        if due is None or due.wait_from != self.due.wait_from:
+            raise UserError("the stimulation was changed during the wait; begin the wait again")
+        return replace(self, due=due)
 
 
 def next_session(study: Path, said: SaidOfSession, *, virtual: bool) -> NextSession:

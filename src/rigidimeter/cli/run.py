@@ -176,7 +176,7 @@ def run(
     planned = planned.within(entered_range(range_deg, rig, planned.settings, lead=lead_range))
     planned = checked_rig(planned, rig)
     if due is not None:
-        due.wait()
+        due = due.waited()
         planned = replace(planned, about=due.planned().about)
     attended, confirmed = attendance(rig, unattended=unattended, confirm=confirm)
     shown = planned.shown(virtual=rig is None)

@@ -11,11 +11,10 @@ from rigidimeter.core.study_files import (
     StimulationChange,
     StudyPlan,
     add_change,
+    begun_session,
     due_block,
     extend_study,
     recorded_blocks,
-    session_facts,
-    session_settings_of,
 )
 from rigidimeter.virtual.virtual_session import run_virtual_session
 
@@ -54,31 +53,24 @@ def rehearse(
     UserError
         If a settings file or the study cannot be used, or a session does not end well.
     """
-    begun = datetime(first_day.year, first_day.month, first_day.day, _NINE, tzinfo=UTC)
+    morning = datetime(first_day.year, first_day.month, first_day.day, _NINE, tzinfo=UTC)
     days = list(dict.fromkeys(block.day for block in plan.blocks))
     folders = []
     for subject in plan.about.subjects:
-        now, today = begun, ""
+        now, today = morning, ""
         while due := due_block(plan, recorded_blocks(plan.folder), subject):
             block = due.block
             if block.day != today:
-                today, now = block.day, begun + timedelta(days=days.index(block.day))
+                today, now = block.day, morning + timedelta(days=days.index(block.day))
             if due.left_min(now) is None:
                 add_change(plan.folder, StimulationChange(subject, now, due.stimulation, "virtual"))
                 due = due_block(plan, recorded_blocks(plan.folder), subject) or due
             now += timedelta(minutes=wait_share * (due.left_min(now) or 0.0))
-            folder = plan.folder / due.folder
+            reason = "rehearsed with shorter waits"
+            begun = begun_session(plan, due, now, operator="virtual", reason=reason)
+            folder = begun.folder
             done = run_virtual_session(
-                session_settings_of(plan, due),
-                folder,
-                created_utc=now.isoformat(),
-                about=session_facts(
-                    plan,
-                    due,
-                    now,
-                    operator="virtual",
-                    reason="rehearsed with shorter waits" if wait_share < 1.0 else "",
-                ),
+                begun.settings, folder, created_utc=now.isoformat(), about=begun.about
             )
             if done.outcome != "success":
                 raise UserError(f"{folder}: the session ended with {done.outcome}: {done.reason}")

@@ -47,8 +47,6 @@ from rigidimeter.core.study_files.plan_progress import (
     due_block,
     named_block,
     recorded_blocks,
-    session_facts,
-    session_settings_of,
 )
 from rigidimeter.core.study_files.recorded_sessions import recorded_session, session_rows
 from rigidimeter.core.study_files.stimulation_log import (

@@ -5,24 +5,28 @@ No sentence here names a condition to an examiner who is blinded.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import in_codes
-from rigidimeter.core.settings import Settings
+from rigidimeter.core.settings import Settings, changed_settings, load_settings
 from rigidimeter.core.study_files.day_plan import StudyPlan, read_plan
 from rigidimeter.core.study_files.plan_progress import (
     DueBlock,
     due_block,
     named_block,
     recorded_blocks,
-    session_facts,
-    session_settings_of,
 )
+
+_SESSIONS = 1
+"""The stream of the plan's seed from which sessions draw theirs."""
 
 PLAN_COLUMNS = ("day", "order", "condition", "task", "wait, min", "raters", "")
 
@@ -121,11 +125,12 @@ def begun_session(
     plan : StudyPlan
     due : DueBlock
     now : datetime
+        When its first epoch may begin.
     operator, note : str
     speed : float
-        Of the clock of the waits.
+        Of the clock of the waits; above 1 in rehearsals alone.
     reason : str
-        Why the wait is cut short; empty where it is not.
+        Why not to wait; not recorded where the wait is over.
 
     Raises
     ------
@@ -133,11 +138,45 @@ def begun_session(
         If its settings file cannot be read, or has epochs of another condition.
     """
     try:
-        settings = session_settings_of(plan, due)
+        settings = _settings(plan, due)
     except UserError as error:
         raise UserError(*(in_codes(line, plan.about.codes) for line in error.lines)) from None
-    about = session_facts(plan, due, now, operator=operator, note=note, speed=speed, reason=reason)
-    return BegunSession(plan.folder / due.folder, settings, about, plan.folder / due.block.protocol)
+    block, since = due.block, due.since_min(now, speed)
+    change = due.change if since is not None else None
+    place = {
+        "sha256": plan.sha256,
+        **asdict(block),
+        "stimulation": due.stimulation,
+        "stimulation_changed_utc": change.changed_utc.isoformat() if change else None,
+        "since_change_min": None if since is None else round(since, 2),
+        "clock_speed": speed,
+        "wait_cut_short": "" if due.left_min(now, speed) == 0.0 else reason,
+    }
+    about = {
+        "subject": block.subject,
+        "operator": operator,
+        "note": note,
+        "day": block.day,
+        "conditions": [block.condition],
+        "plan": place,
+        **({"blinded": True, "codes": plan.about.codes} if plan.blinded else {}),
+    }
+    return BegunSession(plan.folder / due.folder, settings, about, plan.folder / block.protocol)
+
+
+def _settings(plan: StudyPlan, due: DueBlock) -> Settings:
+    """Return the settings of a session of the plan, with a seed of its own."""
+    source = plan.folder / due.block.protocol
+    key = (_SESSIONS, plan.blocks.index(due.block), due.part)
+    state = np.random.SeedSequence(plan.about.seed, spawn_key=key).generate_state(1)
+    settings = changed_settings(load_settings(source), {"seed": int(state[0])}, str(source))
+    conditions = {block.condition for block in settings.protocol.blocks}
+    if conditions != {due.block.condition}:
+        raise UserError(
+            f"{source}: has epochs of {', '.join(sorted(conditions))}, and the plan has "
+            f"{due.block.condition} in this session; correct one of them"
+        )
+    return settings
 
 
 def plan_rows(plan: StudyPlan, subject: str) -> list[tuple[str, ...]]:
@@ -186,5 +225,5 @@ def wait_words(due: DueBlock, now: datetime, speed: float = 1.0) -> str:
             "for this session, or nobody wrote down when"
         )
     if left > 0.0:
-        return f"Wait {left:.0f} min more, of {due.block.wait_min:g} min"
+        return f"Wait {math.ceil(left)} min more, of {due.block.wait_min:g} min"
     return "No wait is left"

@@ -8,25 +8,18 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import EVENTS, is_session, read_events, read_manifest
-from rigidimeter.core.settings import Settings, changed_settings, load_settings
 from rigidimeter.core.study_files.day_plan import PlannedBlock, StudyPlan
 from rigidimeter.core.study_files.stimulation_log import (
     StimulationChange,
     last_change,
     read_changes,
 )
-
-_SESSIONS = 1
-"""The stream of the plan's seed from which sessions draw theirs."""
 
 
 @dataclass(frozen=True)
@@ -176,71 +169,3 @@ def _due(
     if wait_from is not None and wait_from.stimulation != wanted:
         wait_from = None
     return DueBlock(block, place, wanted, change, wait_from, part)
-
-
-def session_settings_of(plan: StudyPlan, due: DueBlock) -> Settings:
-    """Return the settings of a session of the plan, with a seed of its own.
-
-    Raises
-    ------
-    UserError
-        If its settings file cannot be read, or has epochs of another condition.
-    """
-    source = plan.folder / due.block.protocol
-    key = (_SESSIONS, plan.blocks.index(due.block), due.part)
-    state = np.random.SeedSequence(plan.about.seed, spawn_key=key).generate_state(1)
-    settings = changed_settings(load_settings(source), {"seed": int(state[0])}, str(source))
-    conditions = {block.condition for block in settings.protocol.blocks}
-    if conditions != {due.block.condition}:
-        raise UserError(
-            f"{source}: has epochs of {', '.join(sorted(conditions))}, and the plan has "
-            f"{due.block.condition} in this session; correct one of them"
-        )
-    return settings
-
-
-def session_facts(
-    plan: StudyPlan,
-    due: DueBlock,
-    now: datetime,
-    *,
-    operator: str = "",
-    note: str = "",
-    speed: float = 1.0,
-    reason: str = "",
-) -> dict[str, Any]:
-    """Return what the manifest of a session of the plan says of it (`about`).
-
-    Parameters
-    ----------
-    plan : StudyPlan
-    due : DueBlock
-    now : datetime
-        When its first epoch may begin.
-    operator, note : str
-    speed : float
-        Of the clock of the waits; above 1 in rehearsals alone.
-    reason : str
-        Why the wait was cut short, where it was.
-    """
-    block, since = due.block, due.since_min(now, speed)
-    change = due.change if since is not None else None
-    place: dict[str, Any] = {
-        "sha256": plan.sha256,
-        **asdict(block),
-        "stimulation": due.stimulation,
-        "stimulation_changed_utc": change.changed_utc.isoformat() if change else None,
-        "since_change_min": None if since is None else round(since, 2),
-        "clock_speed": speed,
-        "wait_cut_short": reason,
-    }
-    blinded = {"blinded": True, "codes": plan.about.codes} if plan.blinded else {}
-    return {
-        "subject": block.subject,
-        "operator": operator,
-        "note": note,
-        "day": block.day,
-        "conditions": [block.condition],
-        "plan": place,
-        **blinded,
-    }

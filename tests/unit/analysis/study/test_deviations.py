@@ -18,12 +18,11 @@ from rigidimeter.core.study_files import (
     PlanToml,
     StimulationChange,
     add_change,
+    begun_session,
     extend_study,
     named_block,
     read_plan,
     recorded_blocks,
-    session_facts,
-    session_settings_of,
     write_plan,
 )
 from rigidimeter.planning import StudyDays, draw_days
@@ -53,14 +52,12 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
         due = named_block(plan, recorded_blocks(folder), ("S01", day, order))
         assert due is not None
         now += timedelta(minutes=wait_min)
+        begun = begun_session(plan, due, now, reason="late")
         run_virtual_session(
-            session_settings_of(plan, due),
-            folder / due.folder,
-            created_utc=now.isoformat(),
-            about=session_facts(plan, due, now, reason="late" if wait_min == 4 else ""),
+            begun.settings, begun.folder, created_utc=now.isoformat(), about=begun.about
         )
-        assert_folder_replayed(folder / due.folder)
-        extend_study(folder, [folder / due.folder])
+        assert_folder_replayed(begun.folder)
+        extend_study(folder, [begun.folder])
     return folder
 
 

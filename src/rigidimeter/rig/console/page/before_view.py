@@ -78,9 +78,7 @@ class BeforeView:
                 chosen.on_value_change(lambda event: self._choose(str(event.value or "")))
         self._wrong_file = ui.label("").classes("problem").props('role="alert"')
         self._not_stored = ui.label("").classes("problem").props('role="alert"')
-        self._rig = RigView(
-            state, jobs, self._may_act, in_control, self._settings, self._show_steps
-        )
+        self._rig = RigView(state, jobs, in_control, self._settings, self._show_steps)
         with ui.row().classes("w-full"):
             for one in (*METADATA, NOTE):
                 self._input(one)
@@ -125,7 +123,7 @@ class BeforeView:
     def _choose(self, name: str) -> None:
         """Begin the form anew with another protocol; of a wrong one the page says what is wrong."""
         place = self._state.place
-        if not name or not self._may_act():
+        if not name or not self._rig.may_act():
             return
         try:
             settings = read_protocol(place.protocols, name)
@@ -233,18 +231,9 @@ class BeforeView:
     def _settings(self) -> Settings | None:
         return self._entered.settings if self._entered is not None else None
 
-    def _may_act(self) -> bool:
-        if not self._in_control():
-            ui.notify("this page watches: another one has control")
-        elif self._state.busy:
-            ui.notify("not while a session runs or the rig is checked")
-        else:
-            return True
-        return False
-
     def _ask(self) -> None:
         entered = self._entered
-        if not self._may_act():
+        if not self._rig.may_act():
             return
         if entered is None or entered.settings is None:
             return
@@ -288,7 +277,7 @@ class BeforeView:
         lines: Callable[[Path, Settings], list[str]],
     ) -> None:
         """Show what a command says of the settings that were entered, first in sentences."""
-        if not self._may_act():
+        if not self._rig.may_act():
             return
         settings = self._settings()
         if settings is None:

@@ -75,7 +75,7 @@ class PlanView:
             self._change = self._input("stimulation", "Stimulation: on, off, or off since 10:42")
             ui.button("Enter the change", on_click=self._enter).mark("enter-change")
         self._switched = ui.label("").mark("switched")
-        self._rig = RigView(state, jobs, self._may_act, in_control, self._settings, self._show)
+        self._rig = RigView(state, jobs, in_control, self._settings, self._show)
         fields = (*METADATA[1:], NOTE, *(RANGE if place.rig is not None else ()))
         with ui.row().classes("w-full"):
             self._fields = {
@@ -189,19 +189,10 @@ class PlanView:
     def _settings(self) -> Settings | None:
         return self._begun.settings if self._begun is not None else None
 
-    def _may_act(self) -> bool:
-        if not self._in_control():
-            ui.notify("this page watches: another one has control")
-        elif self._state.busy:
-            ui.notify("not while a session runs or the rig is checked")
-        else:
-            return True
-        return False
-
     def _enter(self) -> None:
         """Write down that the stimulation was switched."""
         due, now = self._due, datetime.now(UTC)
-        if due is None or not self._may_act():
+        if due is None or not self._rig.may_act():
             return
         try:
             by = parse_line(self._fields["operator"].value or "", "operator", 40)
@@ -227,7 +218,7 @@ class PlanView:
 
     def _ask(self, reason: str) -> None:
         """Ask for the session; without a reason only after its wait."""
-        if not self._may_act():
+        if not self._rig.may_act():
             return
         self._load()  # another program may have recorded it meanwhile
         plan, due = self._plan, self._due

@@ -28,10 +28,8 @@ class RigView:
     ----------
     state : ServerState
     jobs : Jobs
-    may_act : callable
-        Whether the page may act now; it says why not.
     in_control : callable
-        Whether the page still has control; a check is stopped when it has lost it.
+        Whether the page has control; a check is stopped when it has lost it.
     settings : callable
         What was entered; None if something is wrong with it.
     checked : callable
@@ -42,13 +40,12 @@ class RigView:
         self,
         state: ServerState,
         jobs: Jobs,
-        may_act: Callable[[], bool],
         in_control: Callable[[], bool],
         settings: Callable[[], Settings | None],
         checked: Callable[[], None],
     ) -> None:
         self._state, self._jobs = state, jobs
-        self._may_act, self._in_control, self._settings = may_act, in_control, settings
+        self._in_control, self._settings = in_control, settings
         self._checked = checked
         self._steps: tuple[RigStep, ...] = ()
         self._rows()
@@ -64,6 +61,16 @@ class RigView:
         if steps != self._steps:
             self._steps = steps
             self._rows.refresh()
+
+    def may_act(self) -> bool:
+        """Whether the page may begin something now; it shows why not."""
+        if not self._in_control():
+            ui.notify("this page watches: another one has control")
+        elif self._state.busy:
+            ui.notify("not while a session runs or the rig is checked")
+        else:
+            return True
+        return False
 
     def _with_reading(self, step: RigStep) -> RigStep:
         """Return the step of the zero with what was read last."""
@@ -91,7 +98,7 @@ class RigView:
     async def _run(self, action: str) -> None:
         """Run a check with the settings that were entered."""
         settings = self._settings()
-        if not self._may_act():
+        if not self.may_act():
             return
         if settings is None:
             ui.notify("first put right what is wrong in the form")
