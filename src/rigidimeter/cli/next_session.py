@@ -12,6 +12,7 @@ from rigidimeter.cli.output import echo
 from rigidimeter.cli.planned_session import PlannedSession, new_session
 from rigidimeter.cli.progress import Meter
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.session import in_codes
 from rigidimeter.core.study_files import (
     DueBlock,
     StudyPlan,
@@ -125,7 +126,9 @@ class NextSession:
                 time.sleep(min(_TICK_S, total_s - gone_s))
         _, day, order = self.due.block.key
         due = next_block(self.plan, self.due.block.subject, (day, order))
-        if due is None or due.wait_from != self.due.wait_from:
+        if due is None or due.part != self.due.part:
+            raise UserError("the session was recorded by another program during the wait")
+        if due.wait_from != self.due.wait_from:
             raise UserError("the stimulation was changed during the wait; begin the wait again")
         return replace(self, due=due)
 
@@ -161,7 +164,7 @@ def next_session(study: Path, said: SaidOfSession, *, virtual: bool) -> NextSess
 def added(session: NextSession) -> None:
     """Add the recorded session to the study, and say what is left of the plan."""
     for line in extend_study(session.plan.folder, [session.folder]):
-        echo(line)
+        echo(in_codes(line, session.plan.about.codes))
     echo(next_words(session.plan, session.due.block.subject))
 
 

@@ -12,6 +12,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.study_files import (
     PLAN_TABLE,
     PlanToml,
+    RecordedBlock,
     StudyPlan,
     add_change,
     due_block,
@@ -101,6 +102,31 @@ def test_the_wait_runs_from_the_change(plan: StudyPlan) -> None:
     assert due.left_min(NOW) is None
 
 
+def recorded(order: int, day: str, *, begun: bool = True) -> RecordedBlock:
+    facts = {"subject": "S01", "day": day, "order": order}
+    return RecordedBlock("sessions/x", NOW.isoformat(), facts, 1, 1, begun)
+
+
+def test_what_was_switched_before_another_day_is_not_known(plan: StudyPlan) -> None:
+    add_change(plan.folder, parse_change("off since 09:00", "S01", NOW, zone=UTC))
+    done = [recorded(1, "1"), recorded(2, "1")]
+    due = due_block(plan, done, "S01")
+    assert due is not None
+    assert (due.block.day, due.block.order) == ("2", 1)
+    assert due.left_min(NOW + timedelta(days=1)) is None
+    add_change(plan.folder, parse_change("off", "S01", NOW + timedelta(hours=23)))
+    due = due_block(plan, done, "S01")
+    assert due is not None
+    assert due.since_min(NOW + timedelta(days=1)) == 60.0
+
+
+def test_a_session_that_was_refused_is_still_due(plan: StudyPlan) -> None:
+    due = due_block(plan, [recorded(1, "1", begun=False)], "S01")
+    assert due is not None
+    assert due.block.key == ("S01", "1", 1)
+    assert due.folder.endswith("S01-day-1-1-2")  # the folder of the refused one is there
+
+
 def test_a_blinded_wait_runs_from_the_last_report(plan: StudyPlan) -> None:
     codes = {"OFF": "code-A", "DBS": "code-B"}
     blinded = replace(plan, about=plan.about.model_copy(update={"codes": codes}))
@@ -122,11 +148,16 @@ def test_changes_are_in_order(plan: StudyPlan) -> None:
     add_change(plan.folder, parse_change("on", "S01", NOW))
     with pytest.raises(UserError, match="is before its last change"):
         add_change(plan.folder, parse_change("off since 10:00", "S01", NOW, zone=UTC))
+    with pytest.raises(UserError, match="11:45 has not come yet, it is 11:00"):
+        parse_change("off since 11:45", "S02", NOW, zone=UTC)
     late = parse_change("off since 23:50", "S02", NOW, zone=UTC)
     assert late.changed_utc == datetime(2026, 1, 4, 23, 50, tzinfo=UTC)
     table = plan.folder / "stimulation.csv"
+    table.write_text("# of the nurse\n" + table.read_text())
+    add_change(plan.folder, late)
+    assert table.read_text().startswith("# of the nurse")  # what stands there stays
     table.write_text(table.read_text().replace(",on,", ",half,"))
-    with pytest.raises(UserError, match="line 2"):
+    with pytest.raises(UserError, match=r"line 4: .*half"):
         read_changes(plan.folder)
 
 

@@ -63,7 +63,7 @@ def deviations(folder: Path, sessions: Sequence[SessionEntry]) -> tuple[Deviatio
     plan = read_plan(folder)
     if plan is None:
         return ()
-    recorded = recorded_blocks(folder)
+    recorded = [one for one in recorded_blocks(folder) if one.begun]
     listed = {entry.path: entry for entry in sessions}
     found = list(_of_plan(plan, recorded))
     for one in recorded:

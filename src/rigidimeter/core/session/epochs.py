@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
@@ -304,11 +305,15 @@ def epoch_of_samples(
 def since_change_min(manifest: Mapping[str, Any], time_s: float) -> float | None:
     """Return the minutes from the change of the stimulation to a time of a planned session.
 
-    On the clock of its plan, which may run faster in a rehearsal. None where it is not known.
+    On the clock of its plan, which may run faster in a rehearsal. Of a session that is continued
+    from its own beginning, so by the times of both. None where it is not known.
     """
     place = manifest.get("about", {}).get("plan", {})
-    begun = place.get("since_change_min")
-    return None if begun is None else begun + place["clock_speed"] * time_s / 60.0
+    changed = place.get("stimulation_changed_utc")
+    if changed is None:
+        return None
+    begun = datetime.fromisoformat(manifest["created_utc"]) - datetime.fromisoformat(changed)
+    return float(place["clock_speed"]) * (begun.total_seconds() + time_s) / 60.0
 
 
 def _sampled(

@@ -29,6 +29,7 @@ from rigidimeter.core.files import (
     toml_text,
     write_text,
 )
+from rigidimeter.core.session import in_codes
 from rigidimeter.core.settings import Section, read_section
 from rigidimeter.core.study_files.study_toml import is_outside
 
@@ -167,10 +168,19 @@ def read_plan(study: Path) -> StudyPlan | None:
     UserError
         Naming the file, the line, the value and what would be right.
     """
-    table, about_path = study / PLAN_TABLE, study / PLAN_FILE
-    if not table.exists() and not about_path.exists():
+    about_path = study / PLAN_FILE
+    if not (study / PLAN_TABLE).exists() and not about_path.exists():
         return None
     about = read_section(about_path, PLAN_SCHEMA, PlanToml)
+    try:
+        return _read_table(study, about)
+    except UserError as error:
+        raise UserError(*(in_codes(line, about.codes) for line in error.lines)) from None
+
+
+def _read_table(study: Path, about: PlanToml) -> StudyPlan:
+    """Return the plan with its table, checked."""
+    table = study / PLAN_TABLE
     with noted_digests() as noted:
         found = read_text_table(table, may_be_empty=True)
     missing = [column for column in COLUMNS if column not in found.columns]

@@ -36,8 +36,11 @@ TABLE_COLUMNS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "ratings": (("subject", "day", "condition", "examiner", "score"), ("note",)),
     "exclusions": (("path", "epoch", "reason"), ("by", "note")),
     "key": (("code", "condition"), ("note",)),
+    "stimulation": (("changed_utc", "subject", "stimulation"), ("by", "note")),
 }
 """The columns of each table: those that it must have, and those that it may have."""
+
+_OF_THE_ANALYSIS = ("sessions", "ratings", "exclusions", "key")
 
 _MAY_BE_EMPTY = ("note", "part", "by", "mapping", "join", "clock_offset")
 
@@ -125,7 +128,7 @@ def read_study_folder(folder: Path, key: Path | None = None) -> StudyFolder:
             notices.append(Notice("warning", text))
         files = {STUDY_FILE: folder / STUDY_FILE}
         tables: dict[str, tuple[TableRow, ...] | None] = {}
-        for name in TABLE_COLUMNS:
+        for name in _OF_THE_ANALYSIS:
             path, namer = folder / getattr(about, name), STUDY_FILE
             named = name in about.model_fields_set or name == "sessions"
             if name == "key" and key is not None:

@@ -181,7 +181,7 @@ def _settings(plan: StudyPlan, due: DueBlock) -> Settings:
 
 def plan_rows(plan: StudyPlan, subject: str) -> list[tuple[str, ...]]:
     """Return the sessions of a subject as cells of a table, in the order of `PLAN_COLUMNS`."""
-    done = {one.key for one in recorded_blocks(plan.folder)}
+    done = {one.key for one in recorded_blocks(plan.folder) if one.begun}
     return [
         (
             block.day,

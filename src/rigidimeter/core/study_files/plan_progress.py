@@ -35,7 +35,8 @@ class RecordedBlock:
         `about.plan` of the manifest; empty where the session was not run from a plan.
     good, planned : int
         Epochs that ended with success, and those that were planned.
-    closed : bool
+    begun : bool
+        Whether an epoch was started; one that was refused before is still to be recorded.
     """
 
     path: str
@@ -43,7 +44,7 @@ class RecordedBlock:
     facts: Mapping[str, Any]
     good: int
     planned: int
-    closed: bool
+    begun: bool
 
     @property
     def key(self) -> tuple[str, str, int] | None:
@@ -65,7 +66,8 @@ class DueBlock:
     stimulation : str
         What it must be: ``on`` or ``off``.
     change : StimulationChange or None
-        The last change of the subject's stimulation that was written down.
+        The last change of the subject's stimulation that was written down, since the last session
+        of another day.
     wait_from : StimulationChange or None
         From when the wait runs: from the change; where examiners are blinded from the last report,
         which is made before every session, also where nothing is changed, since a wait that is
@@ -118,7 +120,7 @@ def recorded_blocks(study: Path) -> tuple[RecordedBlock, ...]:
                 manifest.get("about", {}).get("plan", {}),
                 sum(event["outcome"] == "success" for event in ended),
                 len(manifest["protocol"]),
-                any(event["event"] == "session_ended" for event in events),
+                any(event["event"] == "epoch_started" for event in events),
             )
         )
     return tuple(sorted(found, key=lambda one: one.created_utc))
@@ -131,9 +133,9 @@ def due_block(plan: StudyPlan, recorded: Sequence[RecordedBlock], subject: str) 
     again, by its name.
     """
     own = [block for block in plan.blocks if block.subject == subject]
-    times = {key: sum(one.key == key for one in recorded) for key in {b.key for b in own}}
+    done = {one.key for one in recorded if one.begun}
     for number, block in enumerate(own, start=1):
-        if not times[block.key]:
+        if block.key not in done:
             return _due(plan, recorded, block, (number, len(own)))
     return None
 
@@ -145,8 +147,7 @@ def named_block(
     own = [block for block in plan.blocks if block.subject == key[0]]
     for number, block in enumerate(own, start=1):
         if block.key == key:
-            part = 1 + sum(one.key == key for one in recorded)
-            return _due(plan, recorded, block, (number, len(own)), part)
+            return _due(plan, recorded, block, (number, len(own)))
     return None
 
 
@@ -155,17 +156,28 @@ def _due(
     recorded: Sequence[RecordedBlock],
     block: PlannedBlock,
     place: tuple[int, int],
-    part: int = 1,
 ) -> DueBlock:
-    changes = read_changes(plan.folder)
-    wanted, change = plan.about.stimulation_of(block.condition), last_change(changes, block.subject)
+    own = [one for one in recorded if one.begun and one.facts.get("subject") == block.subject]
+    changes = [one for one in read_changes(plan.folder) if one.subject == block.subject]
+    wanted = plan.about.stimulation_of(block.condition)
+    # What was switched between two days, at home, nobody wrote down.
+    today = _after([one for one in own if one.facts["day"] != block.day], changes)
+    change = last_change(today)
     wait_from = change
     if plan.blinded:
-        before = [one.created_utc for one in recorded if one.facts.get("subject") == block.subject]
-        since = datetime.fromisoformat(max(before)) if before else None
-        reports = [one for one in changes if one.subject == block.subject]
-        new = [one for one in reports if since is None or one.changed_utc > since]
+        new = _after(own, changes)
         wait_from = new[-1] if new else None
     if wait_from is not None and wait_from.stimulation != wanted:
         wait_from = None
+    part = 1 + sum(one.key == block.key for one in recorded)
     return DueBlock(block, place, wanted, change, wait_from, part)
+
+
+def _after(
+    sessions: Sequence[RecordedBlock], changes: Sequence[StimulationChange]
+) -> list[StimulationChange]:
+    """Return the changes since the last of these sessions began."""
+    if not sessions:
+        return list(changes)
+    last = datetime.fromisoformat(max(one.created_utc for one in sessions))
+    return [one for one in changes if one.changed_utc > last]

@@ -6,15 +6,18 @@ A wait runs from the last change, not from the moment at which somebody says tha
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, tzinfo
 from pathlib import Path
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import csv_text, read_text_table, write_text
+from rigidimeter.core.study_files.tables import add_rows, checked_table
 
 STIMULATION_TABLE = "stimulation.csv"
-_COLUMNS = ("changed_utc", "subject", "stimulation", "by")
+NOT_YET = timedelta(hours=2)
+"""A time of day that is less ahead is a slip; one that is more is of the day before."""
+
 _STATES = ("on", "off")
 _CLOCK = re.compile(r"(on|off)(?:\s+since\s+(\d{1,2}):(\d{2}))?")
 
@@ -71,6 +74,11 @@ def parse_change(
     if found[2]:
         local = now.astimezone(zone)
         changed = local.replace(hour=hour, minute=minute, second=0, microsecond=0)
+        if local < changed < local + NOT_YET:
+            raise UserError(
+                f"stimulation {text.strip()!r}: {changed:%H:%M} has not come yet, it is "
+                f"{local:%H:%M}; write a time that is over"
+            )
         if changed > local:
             changed -= timedelta(days=1)
     return StimulationChange(subject, changed.astimezone(UTC), found[1], by)
@@ -87,15 +95,13 @@ def read_changes(study: Path) -> tuple[StimulationChange, ...]:
     path = study / STIMULATION_TABLE
     if not path.exists():
         return ()
-    table = read_text_table(path, may_be_empty=True)
-    missing = [column for column in _COLUMNS if column not in table.columns]
-    if missing:
-        raise UserError(
-            f"{path}: there is no column {missing[0]}; it must have {', '.join(_COLUMNS)}"
-        )
+    table = checked_table(path, "stimulation")
     found = []
     for k, line in enumerate(table.lines):
-        when, subject, state, by = (table.columns[column][k] for column in _COLUMNS)
+        when, subject, state = (
+            table.columns[column][k] for column in ("changed_utc", "subject", "stimulation")
+        )
+        by = table.columns["by"][k] if "by" in table.columns else ""
         try:
             changed = datetime.fromisoformat(when)
         except ValueError:
@@ -118,28 +124,28 @@ def add_change(study: Path, change: StimulationChange) -> None:
         If the table cannot be read or written, or the change is older than the last one of the
         subject.
     """
-    before = read_changes(study)
-    last = last_change(before, change.subject)
+    last = last_change([one for one in read_changes(study) if one.subject == change.subject])
     if last is not None and change.changed_utc < last.changed_utc:
         raise UserError(
             f"stimulation of {change.subject}: {change.changed_utc:%Y-%m-%d %H:%M} UTC is before "
             f"its last change, {last.stimulation} at {last.changed_utc:%Y-%m-%d %H:%M} UTC; "
             f"correct {study / STIMULATION_TABLE} if that is wrong"
         )
-    rows = [
-        (one.changed_utc.isoformat(timespec="seconds"), one.subject, one.stimulation, one.by)
-        for one in (*before, change)
-    ]
-    write_text(study / STIMULATION_TABLE, csv_text(_COLUMNS, rows))
+    row = {
+        "changed_utc": change.changed_utc.isoformat(timespec="seconds"),
+        "subject": change.subject,
+        "stimulation": change.stimulation,
+        "by": change.by,
+    }
+    add_rows(study / STIMULATION_TABLE, "stimulation", [row])
 
 
-def last_change(changes: tuple[StimulationChange, ...], subject: str) -> StimulationChange | None:
-    """Return the last change of a subject, None without one.
+def last_change(changes: Sequence[StimulationChange]) -> StimulationChange | None:
+    """Return the last change of one subject, None without one.
 
     A state that was reported again, unchanged, counts from its first report.
     """
-    own = [one for one in changes if one.subject == subject]
-    first = len(own) - 1
-    while first > 0 and own[first - 1].stimulation == own[-1].stimulation:
+    first = len(changes) - 1
+    while first > 0 and changes[first - 1].stimulation == changes[-1].stimulation:
         first -= 1
-    return own[first] if own else None
+    return changes[first] if changes else None

@@ -31,11 +31,13 @@ _ABOUT = {
     "standard names.\n# part distinguishes two sessions of one day in one condition.\n",
     "ratings": "# One row a score.\n",
     "exclusions": "# Epochs that you take out: which, why, and who says so.\n",
+    "stimulation": "# One row a change of a subject's stimulation: on or off, and since when.\n",
 }
 _COLUMNS = {
     "sessions": ("path", "subject", "day", "condition", "part", "mapping", "note"),
     "ratings": ("subject", "day", "condition", "examiner", "score", "note"),
     "exclusions": ("path", "epoch", "reason", "by"),
+    "stimulation": ("changed_utc", "subject", "stimulation", "by"),
 }
 _MAY_BE_LOST = "note"
 

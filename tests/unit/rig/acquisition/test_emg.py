@@ -98,7 +98,8 @@ def recorded(
         process = context.Process(target=emg_main, args=arguments)
         process.start()
         theirs.close()
-        assert ours.recv() == []  # connected
+        if refusal := ours.recv():  # empty once it is connected
+            raise UserError(*refusal)
         origin_s = time.monotonic()
         shared.events.push(0, {"event": "clock_started", "monotonic_s": origin_s})
         session(shared)
@@ -166,6 +167,15 @@ def test_a_stream_that_is_slow_or_narrow_or_absent_is_refused(amplifier, monkeyp
     monkeypatch.setattr("rigidimeter.rig.devices.emg_sources.FIND_S", 0.2)
     with pytest.raises(UserError, match="no stream of this name was found"):
         require_emg(with_emg(source="lsl", stream="Nobody").emg)
+
+
+def vanished(_: EmgSettings) -> DaqEmg:
+    raise RuntimeError("the outlet is gone")  # as pylsl raises it
+
+
+def test_a_source_that_vanishes_while_it_is_connected_is_refused(tmp_path: Path):
+    with pytest.raises(UserError, match="EMG was not recorded: the outlet is gone"):
+        recorded(with_emg(source="lsl", stream="Gone"), tmp_path / "session", 1.0, vanished)
 
 
 class Card:

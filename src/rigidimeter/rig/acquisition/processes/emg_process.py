@@ -166,8 +166,9 @@ def emg_main(
         remarks.send([])
         envelope = _Envelope(source, len(settings.emg.channels), shared.status)
         found = _record(source, written, envelope, events, shared, lost_s, console_pid)
-    except (UserError, OSError) as error:
-        found = [f"EMG was not recorded: {error}"]
+    except Exception as error:  # of the source's package too: else an end without a word
+        found = [f"EMG was not recorded: {error or type(error).__name__}"]
+        shared.status.set_condition(Role.EMG, ProcessCondition.FAILED, found[0])
     finally:
         with suppress(OSError):
             remarks.send(found)
@@ -219,8 +220,8 @@ def _record(
                 )
             if not over:
                 time.sleep(POLL_S)
-    except (UserError, OSError) as error:
-        note = f"ended at {last_s:.1f} s: {error}"
+    except Exception as error:  # of the source's package too
+        note = f"ended at {last_s:.1f} s: {error or type(error).__name__}"
         status.set_condition(Role.EMG, ProcessCondition.FAILED, note)
         missing.append(f"EMG {note}")
     else:

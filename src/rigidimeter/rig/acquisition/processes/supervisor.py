@@ -307,7 +307,10 @@ def _await_emg(remarks: Connection, status: SharedStatus) -> None:
         status.beat(Role.CONSOLE)
         if time.monotonic() > until_s:
             raise UserError(f"the source of EMG did not answer within {EMG_S:g} s")
-    refusal = remarks.recv()
+    try:
+        refusal = remarks.recv()
+    except EOFError:
+        refusal = ["the process of the EMG ended before its source was connected"]
     if refusal:
         raise UserError(*refusal)
 

@@ -87,7 +87,7 @@ class BeforeView:
                 self._input(one)
         self._blocks()
         with ui.row().classes("w-full items-start"):
-            rests = "Rest between epochs; several values, separated by ;, are drawn at random"
+            rests = "Rest between epochs (drawn if several: 10; 20)"
             self._input(Field("rests", rests, "s"))
             blinded = ui.checkbox("Blinded: show codes for conditions").mark("blinded")
             blinded.value = self._form[BLINDED] == YES

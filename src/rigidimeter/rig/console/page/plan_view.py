@@ -63,7 +63,7 @@ class PlanView:
         if place.clock_speed != 1.0:
             ui.label(f"Rehearsal: waits pass {place.clock_speed:g} times as fast. Recorded.")
         with ui.row().classes("w-full items-center"):
-            self._subject = ui.select([], label="Subject", on_change=self._load).classes("entry")
+            self._subject = ui.select([], label="Subject", on_change=self._other).classes("entry")
             self._named = ui.select([_DUE], label="Session", value=_DUE, on_change=self._load)
             self._named.classes("entry").mark("session")
         self._words = ui.label("").classes("text-lg").mark("due")
@@ -108,6 +108,11 @@ class PlanView:
         paths = (root / name for name in (PLAN_TABLE, PLAN_FILE, STIMULATION_TABLE))
         times = tuple(path.stat().st_mtime_ns if path.exists() else 0 for path in paths)
         return times, finished and finished.number
+
+    def _other(self) -> None:
+        """Offer what is due of another subject."""
+        self._named.value = _DUE
+        self._load()
 
     def _load(self) -> None:
         """Read the plan and which session is due."""
@@ -171,9 +176,10 @@ class PlanView:
             )
         needed = f"This session needs the stimulation {due.stimulation}"
         if due.change is None:
-            return f"{needed}; nobody entered whether it is."
+            return f"{needed}; nobody entered today whether it is."
         since = due.change.changed_utc.astimezone()
-        return f"{needed}; it is {due.change.stimulation} since {since:%H:%M}."
+        day = "" if since.date() == datetime.now(UTC).astimezone().date() else f"{since:%Y-%m-%d} "
+        return f"{needed}; it is {due.change.stimulation} since {day}{since:%H:%M}."
 
     def _left_min(self) -> float | None:
         if self._due is None:
@@ -220,8 +226,14 @@ class PlanView:
         """Ask for the session; without a reason only after its wait."""
         if not self._rig.may_act():
             return
+        shown = self._due
         self._load()  # another program may have recorded it meanwhile
         plan, due = self._plan, self._due
+        if due is not None and (
+            shown is None or (shown.block, shown.part) != (due.block, due.part)
+        ):
+            ui.notify("another session is due now; start again if it is the one that you want")
+            return
         over = self._left_min() == 0.0
         if plan is None or due is None or self._problem.text or not (over or reason):
             return
@@ -233,7 +245,7 @@ class PlanView:
                 operator=self._entered("operator", 40),
                 note=self._entered("note", 200),
                 speed=self._state.place.clock_speed,
-                reason="" if over else reason,
+                reason=reason,
             )
             about = dict(begun.about) | self._range(due.block.subject)
         except UserError as error:

@@ -49,7 +49,7 @@ class PrimaryView:
             words, day = primary_words(self.declared), self.declared.declared
             ui.label(f"Primary measures: {words}, declared {day}").mark("primary")
             return
-        usual = {"": f"not declared ({primary_words(PrimaryTable())})"}
+        usual = {"": f"default: {primary_words(PrimaryTable())}"}
         measures = ui.select(
             usual | {one: one for one in PRIMARIES},
             label="Primary measures of the study",

@@ -271,13 +271,15 @@ def extended(place: Place) -> list[str]:
     """
     if place.one_session:
         return []
+    codes: Mapping[str, str] = {}
     try:
         plan = read_plan(place.root)
+        codes = {} if plan is None else plan.about.codes
         known = None if plan is not None else list(place.settings.subject)
         found = extend_study(place.root, known=known)
     except (UserError, OSError) as error:
-        return [f"not in the study: {error}"]
-    return found if plan is None else [in_codes(line, plan.about.codes) for line in found]
+        found = [f"not in the study: {error}"]
+    return [in_codes(line, codes) for line in found]
 
 
 def rate(place: Place, session: str, examiner: str, score: str) -> str:
