@@ -48,7 +48,7 @@ class Scatter:
     def __str__(self) -> str:
         """Return what a plan assumes, in words."""
         epochs = f"{self.between_epochs_percent:.2g} % between epochs"
-        days = f"{self.condition_in_day_percent:.2g} % between days"
+        days = f"{self.condition_in_day_percent:.2g} % of condition by day"
         if self.source_of_days in ("", self.source):
             return f"{epochs}, {days} ({self.source})"
         return f"{epochs} ({self.source}), {days} ({self.source_of_days})"

@@ -242,7 +242,7 @@ def test_the_first_screen_has_the_perturbation_the_loop_the_errors_and_the_days(
     assert damping["planned"]["epochs_a_day"] == [3, 3]
     words = " ".join(text.split())
     assert "primary measures: stiffness and damping, by Holm (level 0.05)" in words
-    assert "damping 12 % between epochs (subject.OFF), 6.4 % between days (chosen)" in words
+    assert "damping 12 % between epochs (subject.OFF), 6.4 % of condition by day (chosen)" in words
 
 
 def test_without_a_difference_it_names_the_option_that_asks_for_days() -> None:

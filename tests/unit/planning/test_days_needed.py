@@ -233,7 +233,10 @@ def test_settings_that_give_the_scatter_of_epochs_are_used() -> None:
     found = found_for("damping=20%", tables)
     assert found.scatter.between_epochs_percent == 25.0
     assert found.scatter.condition_in_day_percent == ASSUMED["damping"].condition_in_day_percent
-    assert f"{found.scatter}" == "25 % between epochs (subject.OFF), 6.4 % between days (chosen)"
+    assert (
+        f"{found.scatter}"
+        == "25 % between epochs (subject.OFF), 6.4 % of condition by day (chosen)"
+    )
     unvaried = {"subject": {"OFF": {"damping_cv_percent": 0.0}, "DBS": {}}}
     assert found_for("damping=20%", VARIED | unvaried).scatter == ASSUMED["damping"]
     given = {"damping": Scatter(1.0, 2.0, 3.0, "a study")}

@@ -148,13 +148,12 @@ def conclude(result: StudyResult) -> Conclusions | None:
         (
             test.comparison
             for test, (p, _) in own
-            if test.comparison.measure.name == CHECK
-            and p < LEVEL
-            and not negligible(test.comparison, result)
+            if test.comparison.measure.name == CHECK and p < LEVEL and not negligible(test, result)
         ),
         None,
     )
     found = [_concluded(test, p, family, basis, result, moved) for test, (p, family) in own]
+    found = _in_sequence(found, result)
     if moved is not None:
         (why,) = (one.finding for one in found if one.comparison is moved)
         found = [_beside(one, why) for one in found]
@@ -179,7 +178,7 @@ def _concluded(
     why: Finding | None
     if math.isnan(p):
         why = without_test(c, result, test.remark)
-    elif p < LEVEL and (why := negligible(c, result)):
+    elif p < LEVEL and (why := negligible(test, result)):
         verdict = "no difference shown"
     elif p < LEVEL:
         why = next(objections(test, basis, result, moved), None)
@@ -188,7 +187,8 @@ def _concluded(
         before = result.primary.before(c.measure)
         why = found_between("earlier_in_sequence", {"before": before}, test.p)
     elif half <= wanted and max(abs(test.difference.low), abs(test.difference.high)) < wanted:
-        verdict, why = "no difference shown", hidden(c, result)
+        why = hidden(c, result)
+        verdict = "cannot be decided" if why else "no difference shown"
     else:
         why = hidden(c, result) or wide(test, family, half, percent)
     return Conclusion(
@@ -204,6 +204,22 @@ def _concluded(
         needed=needed(test, wanted, level) if verdict == "cannot be decided" else None,
         simulated=simulated_difference(c, result.conditions),
     )
+
+
+def _in_sequence(found: list[Conclusion], result: StudyResult) -> list[Conclusion]:
+    """Return the conclusions; of a declared sequence none is claimed behind one that is not."""
+    shown = True
+    ordered: dict[str, int] = {name: k for k, name in enumerate(result.primary.table.measures)}
+    own = [k for k, one in enumerate(found) if one.family.rule == "sequence"]
+    for k in sorted(own, key=lambda k: ordered[found[k].comparison.measure.name]):
+        one = found[k]
+        claimed = one.verdict in ("lower", "higher")
+        if claimed and not shown:
+            before = result.primary.before(one.comparison.measure)
+            why = found_between("earlier_in_sequence", {"before": before}, one.difference.p)
+            found[k] = replace(one, verdict="cannot be decided", finding=why)
+        shown = shown and claimed
+    return found
 
 
 def _beside(one: Conclusion, moved: Finding | None) -> Conclusion:

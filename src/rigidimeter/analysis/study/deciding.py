@@ -9,25 +9,27 @@ between epochs of these recordings.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from rigidimeter.analysis.study.compared import Comparison
+from rigidimeter.analysis.study.measures import Observation
 from rigidimeter.analysis.study.tested import Test
 from rigidimeter.core.records import PARAMETERS
 from rigidimeter.planning import ASSUMED, day_difference_sd, pairs_needed
 
-_MIN_EPOCHS = 3
-"""With fewer epochs of a condition their scatter is the assumed one."""
+_MIN_DEGREES = 2
+"""With fewer degrees of freedom within days the scatter of epochs is the assumed one."""
 
 _FEW_DF = 3.0
 """With fewer degrees of freedom the SD of days is hardly known."""
 
 
 class Needed(NamedTuple):
-    """How many would decide: days with both conditions, subjects, or values of each."""
+    """How many would decide: days with both conditions, subjects, recordings or values of each."""
 
     number: int
     unit: str
@@ -45,16 +47,17 @@ def needed(test: Test, size: float, level: float) -> Needed | None:
         Of the test.
     """
     c, unit = test.comparison, "day"
-    if math.isnan(test.p) or (
-        test.by is not None and test.by.unit == "day" and test.by.df < _FEW_DF
-    ):
+    if test.by is not None and not math.isnan(test.p):
+        unit = test.by.unit
+    few = test.by is not None and unit != "subject" and test.by.df < _FEW_DF
+    if math.isnan(test.p) or few:
         sd = _assumed_sd(c)
         if sd is None and not math.isnan(test.p):
             sd = _tested_sd(test)
     elif test.by is None:
         sd, unit = math.hypot(*(np.std(c.values[name], ddof=1) for name in c.pair)), "value"
     else:
-        sd, unit = _tested_sd(test), "subject" if test.by.unit == "subject" else "day"
+        sd = _tested_sd(test)
     number = None if sd is None or not size > 0 else pairs_needed(size, sd, alpha=level)
     if number is None or number <= _count(test):
         return None
@@ -94,9 +97,20 @@ def _assumed_sd(c: Comparison) -> float | None:
     days = [len({(o.subject, o.day, o.source) for o in own}) for own in each]
     epochs = [max(round(len(own) / n), 1) for own, n in zip(each, days, strict=True)]
     scatter = ASSUMED[title]
-    if min(map(len, each)) >= _MIN_EPOCHS:
-        sd_percent = max(c.summaries[name].sd_percent for name in c.pair)
-        scatter = replace(scatter, between_epochs_percent=sd_percent)
     if min(values) <= 0:
         return None
+    within = [_within_days(own) for own in each]
+    if all(degrees >= _MIN_DEGREES for _, degrees in within):
+        percents = (100.0 * sd / value for (sd, _), value in zip(within, values, strict=True))
+        scatter = replace(scatter, between_epochs_percent=max(percents))
     return day_difference_sd(scatter, (values[0], values[1]), (0.0, 0.0), (epochs[0], epochs[1]))
+
+
+def _within_days(observations: Sequence[Observation]) -> tuple[float, int]:
+    """Return the SD of epochs about the mean of their day, and its degrees of freedom."""
+    days: dict[tuple[str, str, str], list[float]] = {}
+    for o in observations:
+        days.setdefault((o.subject, o.day, o.source), []).append(o.value)
+    degrees = sum(len(own) - 1 for own in days.values())
+    squares = math.fsum(float(np.var(own)) * len(own) for own in days.values())
+    return (math.sqrt(squares / degrees) if degrees else math.nan), degrees

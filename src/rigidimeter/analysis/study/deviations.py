@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from rigidimeter.analysis.study.measures import RATING
 from rigidimeter.analysis.study.results import Deviation, SessionEntry, StudyResult
 from rigidimeter.analysis.study.tested import basis_of, tested, tested_again
 from rigidimeter.core.errors import UserError
@@ -24,7 +25,7 @@ from rigidimeter.core.study_files import (
     read_plan,
     recorded_blocks,
 )
-from rigidimeter.core.words import p_text, plural, series
+from rigidimeter.core.words import fixed, plural, series
 
 TOLERANCE_MIN = 0.5
 """By which a wait may be shorter than planned."""
@@ -149,18 +150,23 @@ def deviation_words(result: StudyResult) -> str:
     again = without_deviating(result)
     depends = ""
     if again:
-        depends = f" Without the sessions that deviate: {series([row['words'] for row in again])}."
+        words = series([row["words"] for row in again])
+        depends = f" Without the sessions that deviate: {words} (p unadjusted)."
     return f"Sessions not as planned: {counted}.{depends}"
 
 
 def without_deviating(result: StudyResult) -> list[dict[str, Any]]:
-    """Return the test of each measure of J, B and K once more, without the sessions that deviate.
+    """Return the test of each primary measure once more, without the sessions that deviate.
 
     One row for each measure that can still be tested; p is that of this test alone.
     """
     paths = {one.path for one in result.deviations if one.path}
     sources = {entry.source for entry in result.sessions if entry.path in paths}
-    compared = [c for c in result.comparisons if c.paired and c.measure.origin == "fits"]
+    compared = [
+        c
+        for c in result.comparisons
+        if c.paired and c.measure is not RATING and result.primary.role(c.measure) == "primary"
+    ]
     if not sources or not compared:
         return []
     rows = []
@@ -173,14 +179,15 @@ def without_deviating(result: StudyResult) -> list[dict[str, Any]]:
         if math.isnan(again.p):
             continue
         percent = again.difference.percent[0]
-        words = f"{c.measure.short} {percent:+.0f} %, {p_text(again.p)}, with them {before.said}"
+        size = f"{fixed(percent, 0, sign=True)} %"
+        words = f"{c.measure.short} {size}, {again.said}, with them {before.said}"
         rows.append(
             {
                 "measure": c.measure.name,
                 "difference_percent": percent,
                 "p": again.p,
                 "p_with_all": before.p,
-                "words": words.replace("-", "−"),
+                "words": words,
             }
         )
     return rows

@@ -13,7 +13,7 @@ from datetime import date
 
 from rigidimeter.analysis.estimation import method_named
 from rigidimeter.analysis.study.compared import Comparison
-from rigidimeter.analysis.study.differences import by_units, signed
+from rigidimeter.analysis.study.differences import Difference, by_units, signed
 from rigidimeter.analysis.study.families import Family
 from rigidimeter.analysis.study.ratings_found import RatingsFound
 from rigidimeter.analysis.study.ratings_model import rated_one_condition, without_examiners
@@ -146,14 +146,14 @@ def wide(test: Test, family: Family, half: float, wanted_percent: float) -> Find
     return found_between("wide_interval", facts, size, wanted_percent)
 
 
-def negligible(c: Comparison, result: StudyResult) -> Finding | None:
+def negligible(test: Test, result: StudyResult) -> Finding | None:
     """Return that a difference is smaller than an error which no check finds; else None.
 
     How the joint moves between the samples is known to `max_between_samples_percent` alone.
     """
     allowed = result.settings.diagnostics.max_between_samples_percent
-    size = 100.0 * _relative(c)
-    if c.measure.origin != "fits" or size > allowed:
+    size = 100.0 * _share(test.difference)
+    if test.comparison.measure.origin != "fits" or size > allowed:
         return None
     return found_between("within_accuracy", {}, size, allowed)
 
@@ -268,7 +268,8 @@ def _of_inertia(c: Comparison, inertia: Comparison, flagged: Flagged) -> Iterato
     What makes another inertia, such as a unit or torque of the subject, changes B and K in
     proportion.
     """
-    if c is inertia or _relative(inertia) > SHARE_OF_INERTIA * _relative(c):
+    of_each = [_share(by_units(one, one.days)) for one in (inertia, c)]
+    if c is inertia or of_each[0] > SHARE_OF_INERTIA * of_each[1]:
         carried = {**_carried(c, flagged), "variant": "flagged"} if flagged else {}
         yield _differs(inertia, carried)
 
@@ -281,10 +282,9 @@ def _differs(inertia: Comparison, facts: Mapping[str, Fact]) -> Finding:
     return found_between("inertia_of_conditions", {**facts, **of_each}, size)
 
 
-def _relative(c: Comparison) -> float:
-    """Return the difference of the medians as a share of the larger."""
-    first, second = (c.summaries[name].median for name in c.pair)
-    return abs(first - second) / max(abs(first), abs(second))
+def _share(d: Difference) -> float:
+    """Return a difference as a share of the larger value."""
+    return abs(d.estimate) / max(abs(d.reference), abs(d.other))
 
 
 def _cleared(test: Test, result: StudyResult) -> bool:

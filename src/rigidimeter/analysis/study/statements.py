@@ -205,8 +205,9 @@ def _adjusted(concluded: Conclusions, *roles: Role) -> str:
         if family.rule == "sequence":
             parts.append(f"adjusted in the declared sequence of {names}{further}")
         else:
-            parts.append(f"Holm-adjusted over {names}{further}")
-    text = ", and apart ".join(parts).replace("apart Holm-adjusted", "apart")
+            again = bool(parts) and parts[-1].startswith("Holm")  # named once
+            parts.append(f"{'' if again else 'Holm-adjusted '}over {names}{further}")
+    text = ", and apart ".join(parts)
     return f"; p {text}; each 95 % interval is unadjusted" if parts else ""
 
 
@@ -290,7 +291,8 @@ def _excluded(members: Iterable[Conclusion]) -> str:
             else f"{side} at all"
             for k, (side, end) in enumerate(sides)
         ]
-        parts.append(f"{one.comparison.measure.short} {' or '.join(words)}")
+        if words:
+            parts.append(f"{one.comparison.measure.short} {' or '.join(words)}")
     excluded = f"; excluded (95 %): {', '.join(parts)}" if parts else ""
     return f"{excluded}{''.join(alone)}"
 
@@ -300,9 +302,10 @@ def _would_decide(withheld: Iterable[Conclusion]) -> str:
     for one in withheld:
         if one.needed is not None:
             number, unit = one.needed
-            of = {"day": " in both conditions", "value": " in each"}.get(unit, "")
+            in_each = {"day": " in both conditions", "value": " in each", "recording": " in each"}
+            many = f"{plural(number, unit)}{in_each.get(unit, '')}"
             return (
-                f"; with {plural(number, unit)}{of} a difference of {one.wanted_percent:g} % in "
+                f"; with {many} a difference of {one.wanted_percent:g} % in "
                 f"{one.comparison.measure.short} would be shown with a chance of 80 %"
             )
     return ""

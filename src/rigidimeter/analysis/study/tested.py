@@ -23,6 +23,7 @@ from rigidimeter.analysis.study.compared import Comparison
 from rigidimeter.analysis.study.comparison import day_test, rank_test
 from rigidimeter.analysis.study.differences import Difference, by_units, by_values
 from rigidimeter.analysis.study.measures import Observation
+from rigidimeter.core.words import p_text
 
 LEVEL = 0.05
 
@@ -88,7 +89,7 @@ class Test:
     @property
     def said(self) -> str:
         """p, or why there is none."""
-        return self.remark if math.isnan(self.p) else f"p = {self.p:.2g}"
+        return self.remark if math.isnan(self.p) else p_text(self.p)
 
 
 def basis_of(compared: Sequence[Comparison]) -> Basis:

@@ -57,7 +57,7 @@ STUDY_KINDS = (
         remedy="Repeat these epochs, or use a method that the finding does not bias.",
         variants={
             "hides": {
-                "headline": "{cause} can hide one: {counts}",
+                "headline": "{cause} can hide a difference: {counts}",
                 "measured": "There is {cause}{others} in {counts}.",
                 "meaning": "What it does to J, B and K can hide a difference.",
             },
@@ -94,7 +94,7 @@ STUDY_KINDS = (
         unit="1",
         variants={
             "hides": {
-                "headline": "{who} rated one of the conditions alone, which can hide one",
+                "headline": "{who} rated one of the conditions alone, which can hide a difference",
                 "measured": "{who} rated one of the conditions alone.",
                 "meaning": "The offsets of these examiners can hide a difference.",
             }
@@ -123,9 +123,9 @@ STUDY_KINDS = (
     ),
     Kind(
         "within_accuracy",
-        "difference of the medians of J, B or K, in % of the larger",
+        "difference of J, B or K, in % of the larger",
         headline="{value:.2g} % is within the {limit:g} % that motion between samples may cause",
-        measured="The medians differ by {value:.2g} % (at most {limit:g} %).",
+        measured="They differ by {value:.2g} % (at most {limit:g} %).",
         meaning="How the joint moves between the samples is known no better, whatever p.",
         remedy="Use a drive and a rate that show the motion between the samples.",
         level="note",

@@ -231,22 +231,20 @@ class PrimaryTable(Section):
                 raise ValueError(f"measures names {name} twice; name each measure once")
         return self
 
-    def first_level(self, alpha: float, comparisons: int = 1) -> float:
+    def first_level(self, alpha: float) -> float:
         """Return the level of the first test of the family.
 
         Parameters
         ----------
         alpha : float
             Of the family, between 0 and 1.
-        comparisons : int
-            Of conditions with the reference.
 
         Examples
         --------
         >>> PrimaryTable().first_level(0.05), PrimaryTable(rule="sequence").first_level(0.05)
         (0.025, 0.05)
         """
-        return alpha / (comparisons * (len(self.measures) if self.rule == "holm" else 1))
+        return alpha / (len(self.measures) if self.rule == "holm" else 1)
 
 
 class AnalysisTable(Section):

@@ -8,7 +8,7 @@ import pytest
 import scipy
 from tests.unit.analysis.report.cohorts import Design, made_study, ratings_found
 
-from rigidimeter.analysis.statistics import holm
+from rigidimeter.analysis.statistics import holm, summarise
 from rigidimeter.analysis.study import (
     Observation,
     Primary,
@@ -87,8 +87,10 @@ def test_a_difference_that_stands_without_them_is_shown(study):
 
 def test_a_doubt_that_can_hide_a_difference_is_said(study):
     found = of(doubted(study, "lack_of_fit", in_dbs), "inertia_kg_m2")
-    assert found.verdict == "no difference shown"
-    assert found.reason == "lack_of_fit can hide one: 0 of 23 epochs in OFF, 19 of 19 in DBS"
+    assert found.verdict == "cannot be decided"
+    assert (
+        found.reason == "lack_of_fit can hide a difference: 0 of 23 epochs in OFF, 19 of 19 in DBS"
+    )
 
 
 def test_a_note_is_no_doubt_of_an_estimate_but_of_a_score_of_the_same_epoch(study):
@@ -160,6 +162,40 @@ def with_values(study: StudyResult, change) -> StudyResult:
     by_source = {session.source: session for session in study.sessions}
     comparisons = day_tests(gathered(analysis, ("OFF", "DBS"), by_source))
     return replace(study, analysis=analysis, comparisons=comparisons)
+
+
+def test_what_is_within_the_accuracy_is_asked_of_what_was_tested(study):
+    """Each day falls by a tenth, and most epochs of OFF and of DBS are of days that are alike."""
+    (c,) = (one for one in study.comparisons if one.measure.name == "stiffness_nm_rad")
+    levels, many = (2.5, 2.7, 3.0, 3.1, 3.2), {"OFF": 1, "DBS": 2}
+    observations = tuple(
+        Observation(level * factor * (1 + 1e-4 * k), name, "M1", f"{day}", f"{day}-{name}", f"{k}")
+        for name, factor in (("OFF", 1.0), ("DBS", 0.9))
+        for day, level in enumerate(levels)
+        for k in range(15 if day == many[name] else 2)
+    )
+    values = {name: [o.value for o in observations if o.condition == name] for name in many}
+    summaries = {name: summarise(own) for name, own in values.items()}
+    assert summaries["OFF"].median == pytest.approx(summaries["DBS"].median, rel=1e-3)
+    again = replace(c, observations=observations, summaries=summaries, days=None)
+    uneven = day_tests((again,))
+    found = of(replace(study, comparisons=uneven), "stiffness_nm_rad")
+    assert found.p < 1e-3
+    assert found.verdict == "lower"
+
+
+def test_in_a_sequence_nothing_is_claimed_behind_what_is_within_the_accuracy(study):
+    def slight(fit: Fit) -> np.ndarray:
+        spread = 1.0 + 1e-4 * (int(fit.epoch[1:]) % 3)
+        of_dbs = np.array([1.0, 0.995, 0.82]) if in_dbs(fit) else 1.0
+        return np.array([0.0045, 0.137, 1.75]) * of_dbs * spread
+
+    made = with_values(study, slight)
+    order = ("damping_nm_s_rad", "stiffness_nm_rad")
+    found = declared(made, *order, rule="sequence")
+    assert of(found, order[0]).finding.name == "within_accuracy"
+    assert of(found, order[1]).verdict == "cannot be decided"
+    assert of(declared(made, *order, rule="holm"), order[1]).verdict == "lower"
 
 
 def test_the_paper_s_second_stage_concludes_nothing(study):

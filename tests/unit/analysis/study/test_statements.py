@@ -350,7 +350,7 @@ def test_what_few_days_cannot_decide_is_said_with_what_would() -> None:
     assert concluded(few) == (
         "In this subject, whether OFF and DBS differ in K, B, impulse and work cannot be decided: "
         "the chance to show a difference of 20 % was below one half; excluded (95 %): K more than "
-        "68 % lower or 36 % higher, B more than 73 % lower or 31 % higher; with 8 days in both "
+        "68 % lower or 36 % higher, B more than 73 % lower or 31 % higher; with 7 days in both "
         "conditions a difference of 20 % in K would be shown with a chance of 80 %.",
         "Secondary: in this subject, rating is lower in DBS than in OFF.",
     )

@@ -130,9 +130,10 @@ def _left_out_or_push(case: Case, look: Look) -> Harmless:
 
 
 def _locked(case: Case) -> bool:
-    """Return whether a muscle follows the motion."""
+    """Return whether all that the muscles do follows the motion."""
     activity = None if case.prepared is None else case.prepared.activity
-    return activity is not None and any(one.locked for one in activity.stretches)
+    stretches = () if activity is None else activity.stretches
+    return bool(stretches) and all(one.locked for one in stretches)
 
 
 MOVEMENT_CHECKS = (

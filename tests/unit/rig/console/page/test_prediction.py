@@ -31,7 +31,8 @@ def test_the_planned_epochs_of_a_condition_have_an_interval():
         "To detect 20 % less stiffness among stiffness and damping, by Holm (chance 80 %): "
         f"{days} days with 4 + 4 epochs ({alone} if it were the only primary measure), or "
         f"{subjects} subjects with one day each. Assumed SD: 16 % between epochs (Table 2 of the "
-        "paper), 8.5 % between days (chosen); between subjects 50 % of the difference (chosen)."
+        "paper), 8.5 % of condition by day (chosen); between subjects 50 % of the difference "
+        "(chosen)."
     )
     assert 3 < alone < days < 20
 
