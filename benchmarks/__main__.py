@@ -1,7 +1,7 @@
 """Measure side by side in one run; print medians and ratios, never a verdict.
 
 Machines differ and are noisy, so each figure stands beside a reference that was measured in turn
-with it. Run by `make bench`; a table goes to `docs/reference/benchmarks.md`.
+with it. Run by `make bench`; a table goes to `docs/development/benchmarks.md`.
 
     python -m benchmarks
     python -m benchmarks --quick    # each once, on as little as possible; the page stays
@@ -27,7 +27,7 @@ from rigidimeter.analysis.reading import ReadOptions, read_recording
 from rigidimeter.core.settings import parse_settings
 from rigidimeter.virtual import run_virtual_session
 
-TABLE = Path(__file__).parent.parent / "docs" / "reference" / "benchmarks.md"
+TABLE = Path(__file__).parent.parent / "docs" / "development" / "benchmarks.md"
 IMPORTS = 20
 """Repeats of what takes a second and differs by some percent."""
 END = "<!-- measured: end -->"

@@ -4,7 +4,7 @@
     python -m benchmarks.between_samples PI friction     # these structures; the others stay
 
 The rig is `tests.scenarios.drive_rig`, which shares no equation with the estimation. The tables go
-to `docs/reference/between-samples.md`.
+to `docs/development/between-samples.md`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tests.scenarios.drive_rig import STRUCTURES, TRUTH, DriveRig, run
 from rigidimeter.analysis.study import estimate
 from rigidimeter.core.settings import parse_settings
 
-TABLE = Path(__file__).parent.parent / "docs" / "reference" / "between-samples.md"
+TABLE = Path(__file__).parent.parent / "docs" / "development" / "between-samples.md"
 RATES_HZ = (100.0, 200.0, 333.0, 500.0, 1000.0, 2000.0)
 FIRST_HZ = (500.0, 1000.0, 333.0, 200.0, 2000.0, 100.0)
 """The same in the order in which they are run."""

@@ -4,7 +4,7 @@
     python -m benchmarks.late_drive 4        # so many recordings of forty epochs a row
 
 The rig is `tests.scenarios.late_drive_rig`, which shares no equation with the estimation. The table
-goes to `docs/reference/late-drive.md`.
+goes to `docs/development/late-drive.md`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from rigidimeter.core.settings import parse_settings
 
 Array = NDArray[np.float64]
 
-TABLE = Path(__file__).parent.parent / "docs" / "reference" / "late-drive.md"
+TABLE = Path(__file__).parent.parent / "docs" / "development" / "late-drive.md"
 EPOCHS, RECORDINGS = 40, 10
 ALWAYS = ("torque_nm", "angle_rad", "perturbation_nm")
 RECORDED = {

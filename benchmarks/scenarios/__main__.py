@@ -5,7 +5,7 @@
 
 With `--keep` the recordings of each row go to that file, row by row, and rows that are in it stay
 unless they are measured again; ``--recordings 0`` only writes. The page
-`docs/reference/scenarios.md` is written when every row of it is kept. A recording of four epochs by
+`docs/development/scenarios.md` is written when every row of it is kept. A recording of four epochs by
 three methods takes about 2.5 s: 100 of each row are two hours on two cores.
 """
 
@@ -24,7 +24,7 @@ from benchmarks.scenarios.measure import METHODS, measure
 from benchmarks.scenarios.page import page, summary, table
 from benchmarks.scenarios.rule import Row, row
 
-PAGE = Path(__file__).parents[2] / "docs" / "reference" / "scenarios.md"
+PAGE = Path(__file__).parents[2] / "docs" / "development" / "scenarios.md"
 
 Found = dict[str, dict[str, list[dict[str, Any]]]]
 """By scenario and method: the recordings."""

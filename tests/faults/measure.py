@@ -27,7 +27,7 @@ from tests.faults.torque_faults import table as torque_faults
 
 ROOT = Path(__file__).parents[2]
 HAZARDS = ROOT / "docs" / "reference" / "hazards.md"
-GUARD_LAWS = ROOT / "docs" / "reference" / "guard-laws.md"
+GUARD_LAWS = ROOT / "docs" / "development" / "guard-laws.md"
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 
 FAULTS: dict[int, tuple[str, str, str]] = {

@@ -9,7 +9,7 @@ from pathlib import Path
 from tests.golden.case import Case
 from tests.golden.table import Answers
 
-PAGE = Path(__file__).parents[2] / "docs" / "reference" / "golden-answers.md"
+PAGE = Path(__file__).parents[2] / "docs" / "development" / "golden-answers.md"
 HEAD = """\
 # Golden answers
 

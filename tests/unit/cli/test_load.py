@@ -17,7 +17,7 @@ from rigidimeter.analysis.estimation.terms import TERMS
 from rigidimeter.core.findings import KINDS
 
 ROOT = Path(__file__).parents[3]
-HOW_TO = ROOT / "docs" / "how-to" / "add-an-estimator.md"
+HOW_TO = ROOT / "docs" / "development" / "add-an-estimator.md"
 EXAMPLES = re.findall(r"```python\n(.*?)```", HOW_TO.read_text("utf-8"), re.S)
 ESTIMATOR, CHECK, HARMLESS, TERM = EXAMPLES
 

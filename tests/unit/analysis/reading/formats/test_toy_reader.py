@@ -92,7 +92,7 @@ def test_a_format_that_needs_another_package_says_which(monkeypatch, path):
 
 
 ROOT = Path(__file__).parents[5]
-HOW_TO = ROOT / "docs" / "how-to" / "add-a-file-format.md"
+HOW_TO = ROOT / "docs" / "development" / "add-a-file-format.md"
 
 
 def test_the_example_of_the_document_is_read_by_the_command_line(tmp_path, rigidimeter):
