@@ -159,7 +159,7 @@ def stimulation(
     \b
     For example:
       rigidimeter study stimulation winter
-      rigidimeter study stimulation winter "off since 10:42"
+      rigidimeter study stimulation winter off
       rigidimeter study stimulation winter on --by nurse
     """
     from rigidimeter.core.study_files import (
