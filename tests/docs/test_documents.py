@@ -71,6 +71,13 @@ def test_the_documents_are_there() -> None:
     assert len([words for _, words in SHELL if words[0] == "rigidimeter"]) > 10
 
 
+def test_the_entry_of_the_first_release_is_short() -> None:
+    """What was unlike before nobody has; a merge that brings its lines back fails here too."""
+    entry = re.split(r"^## \[", (ROOT / "CHANGELOG.md").read_text("utf-8"), flags=re.M)[-1]
+    assert entry.startswith(("Unreleased]: 0.1.0", "0.1.0]"))
+    assert 200 < len(entry.split()) < 500
+
+
 @pytest.mark.parametrize(("where", "words"), SHELL, ids=[shlex.join(words) for _, words in SHELL])
 def test_a_command_line_is_one_that_exists(where: str, words: list[str]) -> None:
     if words[0] == "make":
