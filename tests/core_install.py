@@ -170,7 +170,9 @@ def main() -> int:
             for ran in both.map(lambda each, folder: tried(program, each, folder), lines, folders):
                 failed += ran
     for each in failed:
-        print(f"\nfailed, with status {each.status}: {shlex.join(each.words)}\n{each.out}{each.err}")
+        print(
+            f"\nfailed, with status {each.status}: {shlex.join(each.words)}\n{each.out}{each.err}"
+        )
     return int(bool(failed))
 
 

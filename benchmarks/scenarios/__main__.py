@@ -5,8 +5,8 @@
 
 With `--keep` the recordings of each row go to that file, row by row, and rows that are in it stay
 unless they are measured again; ``--recordings 0`` only writes. The page
-`docs/development/scenarios.md` is written when every row of it is kept. A recording of four epochs by
-three methods takes about 2.5 s: 100 of each row are two hours on two cores.
+`docs/development/scenarios.md` is written when every row of it is kept. A recording of four epochs
+by three methods takes about 2.5 s: 100 of each row are two hours on two cores.
 """
 
 from __future__ import annotations
