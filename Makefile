@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 OUT ?= demo-study
 
-.PHONY: install demo test check bench bench-loop hazards mutation golden fuzz docs-pictures clean
+.PHONY: install demo test check docs bench bench-loop hazards mutation golden fuzz docs-pictures clean
 
 install: $(STAMP)
 
@@ -38,6 +38,13 @@ check: install
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The site, in build/site; a warning, a dead link or a misspelt word is an error.
+docs: install
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[docs]'
+	$(BIN)/codespell README.md docs examples src
+	$(BIN)/sphinx-build --fail-on-warning --keep-going -q -b html docs build/site
+	@echo "the site: build/site/index.html"
 
 bench: install
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[all,dev,bench]'
