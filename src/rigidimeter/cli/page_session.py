@@ -24,7 +24,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import codes_of, count_epochs, in_codes, rest_of
 from rigidimeter.core.settings import changed_settings
 from rigidimeter.core.study_files import next_words, plan_of
-from rigidimeter.rig.acquisition.processes import Ended, Realtime, SessionMemory
+from rigidimeter.rig.acquisition.processes import Ended, EndedEarly, Realtime, SessionMemory
 from rigidimeter.rig.console import StopKeys, stop_keys
 from rigidimeter.rig.console.page import (
     SILENT_S,
@@ -154,6 +154,7 @@ def lead_session(
         good, of = count_epochs(ended.folder)
         left = len(rest_of(ended.folder).epochs)
     except UserError as error:
+        state.ending = isinstance(error, EndedEarly) and bool(error.signals)
         lines = [in_codes(line, codes) for line in error.lines]
         state.over(folder, "not run", tuple(map(in_buttons, lines)))
         for line in lines:

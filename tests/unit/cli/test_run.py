@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
+import signal
 from dataclasses import asdict
 from types import SimpleNamespace
 
@@ -18,7 +19,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import SessionWriter
 from rigidimeter.core.settings import parse_settings
 from rigidimeter.planning import plan
-from rigidimeter.rig.acquisition.processes import Realtime
+from rigidimeter.rig.acquisition.processes import EndedEarly, Realtime
 from rigidimeter.rig.console.page import Place, ServerState, StartRequest
 from rigidimeter.rig.devices import STOP_HIGH, STOP_LOW, Home, RigFile, load_rig
 
@@ -360,6 +361,19 @@ def test_a_session_on_the_page_runs_only_while_the_page_is_there(tmp_path, monke
     assert lead_session(state, StartRequest("s", settings), Realtime(), lambda: None) is None
     assert told["operator_seen_ns"] == state.operator_seen_ns
     assert state.finished.sentences == ("that is enough",)
+
+
+def test_a_signal_while_the_source_of_emg_is_awaited_ends_the_program_of_the_page(
+    tmp_path, monkeypatch
+):
+    def supervise(*_, **__):
+        raise EndedEarly("it was ended while the session waited", [signal.SIGTERM])
+
+    monkeypatch.setattr("rigidimeter.cli.planned_session.supervise", supervise)
+    settings = parse_settings({})
+    state = ServerState(Place(tmp_path, settings, "the defaults"))
+    assert lead_session(state, StartRequest("s", settings), Realtime(), lambda: None) is None
+    assert state.ending
 
 
 def test_a_protocol_beyond_the_dose_of_a_session_is_refused_before_any_process_starts(

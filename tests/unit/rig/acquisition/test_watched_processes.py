@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from functools import partial
+from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -26,6 +27,7 @@ from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.planning import plan
 from rigidimeter.rig.acquisition import Command, Order, Phase, State
 from rigidimeter.rig.acquisition.processes import (
+    EndedEarly,
     Flag,
     Patience,
     Prepared,
@@ -570,21 +572,27 @@ class Started(Watched):
     is_alive = alive
 
 
+def silent_pipe(duplex: bool) -> tuple[Connection, SimpleNamespace]:
+    """Return a pipe whose other end stays open and says nothing."""
+    ours, theirs = Pipe(duplex)
+    return ours, SimpleNamespace(close=lambda: theirs)
+
+
 def supervised(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, **options: Any) -> list[Started]:
     """Run `supervise`, which fails; return the processes that it started."""
     monkeypatch.setattr(shared_memory, "WHERE", tmp_path)
     monkeypatch.setattr(supervisor, "held_back", nullcontext)
     monkeypatch.setattr(supervisor, "signals_are_orders", lambda _: nullcontext([]))
-    context = SimpleNamespace(Process=Started)
+    context = SimpleNamespace(Process=Started, Pipe=silent_pipe)
     monkeypatch.setattr(supervisor.multiprocessing, "get_context", lambda _: context)
     monkeypatch.setattr(Started, "made", [], raising=False)
     prepare = options.pop("prepare", lambda memory: None)
     monkeypatch.setattr(Started, "prepare", prepare, raising=False)
-    error = options.pop("error")
+    error, settings = options.pop("error"), options.pop("settings", Settings())
     with pytest.raises(type(error), match=str(error)):
         supervisor.supervise(
             lambda _: None,
-            RecordingPlan(tmp_path / "session", Settings()),
+            RecordingPlan(tmp_path / "session", settings),
             realtime=loop_process.Realtime(live_estimate=False),
             **options,
         )
@@ -641,3 +649,39 @@ def test_the_page_is_asked_for_its_operator_while_the_session_runs(
         operator_seen_ns=lambda: BEGAN,
     )
     assert {one.heart_ns for one in started} == {BEGAN}
+
+
+@pytest.mark.parametrize(
+    ("flag", "sentence"),
+    [
+        (Flag.EMERGENCY_STOP, "the emergency stop was pressed while the session waited for the"),
+        (Flag.END_ASKED, "it was ended while the session waited for the source of EMG"),
+        (Flag.ABORT_ASKED, "it was ended while the session waited for the source of EMG"),
+    ],
+)
+def test_a_session_that_waits_for_its_emg_can_be_ended(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, flag: Flag, sentence: str
+) -> None:
+    """The console is asked while the source of EMG does not answer, and the loop never starts."""
+    monkeypatch.setattr(supervisor, "EMG_S", 5.0)
+    asked: list[SessionMemory] = []
+
+    def ready(memory: SessionMemory) -> None:
+        memory.status.set_condition(Role.RECORDER, ProcessCondition.READY)
+
+    def console(memory: SessionMemory) -> None:
+        asked.append(memory)
+        if len(asked) == 2:
+            memory.status.raise_flag(flag)
+
+    started = supervised(
+        monkeypatch,
+        tmp_path,
+        prepare=ready,
+        console=console,
+        error=EndedEarly(sentence, []),
+        settings=parse_settings({"emg": {"muscles": ["biceps"], "source": "virtual"}}),
+    )
+    assert [one.name for one in started] == ["rigidimeter-recorder", "rigidimeter-emg"]
+    assert len(asked) == 2
+    assert all(one.told for one in started)

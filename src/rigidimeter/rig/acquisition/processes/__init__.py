@@ -30,5 +30,5 @@ from rigidimeter.rig.acquisition.processes.status_values import (
     ProcessCondition,
     Role,
 )
-from rigidimeter.rig.acquisition.processes.supervisor import Ended, supervise
+from rigidimeter.rig.acquisition.processes.supervisor import Ended, EndedEarly, supervise
 from rigidimeter.rig.acquisition.processes.watchdog import WatchedProcess

@@ -47,6 +47,7 @@ RING_S = 60.0
 POLL_S = 0.05
 EMG_S = 30.0
 """For how long a source of EMG is waited for before the session."""
+_AWAITING_EMG = "while the session waited for the source of EMG"
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,14 @@ class Ended:
     recovered: Recovered | None
     remarks: tuple[str, ...]
     signals: Sequence[int] = ()
+
+
+class EndedEarly(UserError):
+    """A session was to end before it began; `signals` are those that this process was sent."""
+
+    def __init__(self, sentence: str, signals: Sequence[int]) -> None:
+        super().__init__(sentence)
+        self.signals = tuple(signals)
 
 
 def supervise(
@@ -121,6 +130,8 @@ def supervise(
     ------
     UserError
         If the session folder cannot be made, or the source of EMG does not answer.
+    EndedEarly
+        If the session was to end before the source of EMG answered.
     """
     realtime, patience = realtime or Realtime(), patience or Patience()
     context = multiprocessing.get_context("spawn")
@@ -136,6 +147,7 @@ def supervise(
         processes.append(process)
         return process
 
+    follow = _Follower(shared, console, operator_seen_ns or time.monotonic_ns)
     with signals_are_orders(status) as signals:
         try:
             me = os.getpid()
@@ -147,7 +159,7 @@ def supervise(
                 emg = (recording.settings, open_emg, shared.names, patience.stopping_s, me, theirs)
                 muscles = start("emg", _emg_main, *emg)
                 theirs.close()
-                _await_emg(emg_remarks, status)
+                _await_emg(emg_remarks, status, follow, signals)
             loop = start("loop", loop_main, target, recording, shared.names, realtime, patience, me)
             _await_recorder(recorder, status)
             rig = recording.settings.rig
@@ -160,7 +172,6 @@ def supervise(
             if recording.settings.sharing.lsl:
                 sending = (recording.settings, shared.names, patience.stopping_s, me)
                 streamer = start("lsl", _streamer_main, *sending)
-            follow = _Follower(shared, console, operator_seen_ns or time.monotonic_ns)
             remarks = _see_through(loop, recorder, status, patience, follow)
             recorder_watch = WatchedProcess(recorder.pid or 0)
             try:
@@ -300,11 +311,23 @@ def _end(process: BaseProcess, wait_s: float) -> None:
         process.join(2.0)
 
 
-def _await_emg(remarks: Connection, status: SharedStatus) -> None:
-    """Wait until the source of EMG is connected: nothing moves before."""
+def _await_emg(
+    remarks: Connection,
+    status: SharedStatus,
+    follow: Callable[[], object],
+    signals: Sequence[int],
+) -> None:
+    """Wait until the source of EMG is connected: nothing moves before.
+
+    The console is asked meanwhile, so that it can be ended there.
+    """
     until_s = time.monotonic() + EMG_S
     while not remarks.poll(POLL_S):
-        status.beat(Role.CONSOLE)
+        follow()
+        if status.flag(Flag.EMERGENCY_STOP):
+            raise EndedEarly(f"the emergency stop was pressed {_AWAITING_EMG}", signals)
+        if status.flag(Flag.END_ASKED) or status.flag(Flag.ABORT_ASKED):
+            raise EndedEarly(f"it was ended {_AWAITING_EMG}", signals)
         if time.monotonic() > until_s:
             raise UserError(f"the source of EMG did not answer within {EMG_S:g} s")
     try:
