@@ -169,7 +169,7 @@ def lead_session(
     sentences += [*ended.remarks, *extended(state.place)]
     if state.place.planned:
         sentences.append(_next_words(state.place.root, planned.about))
-    sentences = [in_codes(sentence, codes) for sentence in sentences]
+    sentences = [in_codes(sentence, codes) for sentence in sentences if sentence]
     echo(" ".join(sentences))
     sentences.append(next_buttons(closed=bool(ended.outcome), good=good, left=left))
     state.over(ended.folder, ended.outcome or "no outcome", tuple(map(in_buttons, sentences)))
@@ -177,9 +177,9 @@ def lead_session(
 
 
 def _next_words(study: Path, about: Mapping[str, Any]) -> str:
-    """Return which session of the subject is due now."""
+    """Return which session of the subject is due now; empty where the plan has not the subject."""
     try:
-        return f"Next: {next_words(plan_of(study), str(about.get('subject', '')))}"
+        return next_words(plan_of(study), str(about.get("subject", "")))
     except UserError as error:
         return str(error)
 

@@ -16,7 +16,7 @@ _SHOWN = 12
 
 def show_plan(plan: StudyPlan) -> None:
     """Show the plan of each subject, what was recorded of it, and what is due."""
-    from rigidimeter.core.study_files import PLAN_COLUMNS, next_words, plan_rows
+    from rigidimeter.core.study_files import PLAN_COLUMNS, next_words, plan_rows, recorded_blocks
 
     waits = sum(block.wait_min for block in plan.blocks) / 60.0
     edited = " Edited after it was drawn." if plan.edited else ""
@@ -27,9 +27,10 @@ def show_plan(plan: StudyPlan) -> None:
             "",
         ]
     )
+    recorded = recorded_blocks(plan.folder)
     headings = tuple(name.replace(", ", "\n") for name in PLAN_COLUMNS)
     for subject in plan.about.subjects:
-        rows = plan_rows(plan, subject)
+        rows = plan_rows(plan, subject, recorded)
         first = next((k for k, row in enumerate(rows) if not row[-1]), 0)
         start = max(min(first - 2, len(rows) - _SHOWN), 0)
         shown = rows[start : start + _SHOWN]
@@ -37,7 +38,7 @@ def show_plan(plan: StudyPlan) -> None:
         show([f"Subject {subject}", Table(headings, shown, "<<<<><<")])
         if more:
             echo(f"  {more} more in {plan.folder / 'plan.csv'}")
-        echo(f"  {next_words(plan, subject)}")
+        echo(f"  {next_words(plan, subject, recorded)}")
     echo(f"Run the next one: rigidimeter run --next {plan.folder}")
 
 

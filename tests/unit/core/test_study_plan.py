@@ -16,6 +16,7 @@ from rigidimeter.core.study_files import (
     StudyPlan,
     add_change,
     due_block,
+    next_words,
     parse_change,
     read_changes,
     read_plan,
@@ -125,6 +126,22 @@ def test_a_session_that_was_refused_is_still_due(plan: StudyPlan) -> None:
     assert due is not None
     assert due.block.key == ("S01", "1", 1)
     assert due.folder.endswith("S01-day-1-1-2")  # the folder of the refused one is there
+
+
+def test_what_is_next_and_what_is_said_when_nothing_is(tmp_path: Path) -> None:
+    spec = replace(SPEC, subjects=("S01", "S02"), days=1)
+    about = ABOUT.model_copy(update={"subjects": ["S01", "S02"]})
+    protocols = {f"protocols/{name}.toml": "" for name in SPEC.conditions}
+    plan = write_plan(tmp_path / "two", about, draw_days(spec, 1), protocols)
+    done = [recorded(1, "1")]
+    assert next_words(plan, "S01", done) == ("Next: Session 2 of 2 of S01: day 1, number 2, DBS")
+    done.append(recorded(2, "1"))
+    assert (
+        next_words(plan, "S01", done) == "All sessions of S01 are recorded; some of S02 are left."
+    )
+    done += [replace(one, facts={**one.facts, "subject": "S02"}) for one in done]
+    assert next_words(plan, "S01", done) == "All sessions of the plan are recorded."
+    assert next_words(plan, "S09", done) == ""
 
 
 def test_a_blinded_wait_runs_from_the_last_report(plan: StudyPlan) -> None:

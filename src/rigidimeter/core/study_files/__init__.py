@@ -49,6 +49,12 @@ from rigidimeter.core.study_files.plan_progress import (
     recorded_blocks,
 )
 from rigidimeter.core.study_files.recorded_sessions import recorded_session, session_rows
+from rigidimeter.core.study_files.session_scan import (
+    SESSIONS,
+    ScannedSession,
+    scan_session,
+    session_folders,
+)
 from rigidimeter.core.study_files.stimulation_log import (
     STIMULATION_TABLE,
     StimulationChange,

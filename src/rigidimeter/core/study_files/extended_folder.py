@@ -24,6 +24,7 @@ from rigidimeter.core.study_files.recorded_sessions import (
     session_rows,
     stimulated,
 )
+from rigidimeter.core.study_files.session_scan import scan_session, session_folders
 from rigidimeter.core.study_files.study_toml import (
     DBS,
     OFF,
@@ -124,7 +125,9 @@ def extend_study(
     there |= {os.path.normpath(cell) for cell in commented_cells(table) if cell}
     asked = folders is not None
     said = []
-    for folder in _found(study) if folders is None else folders:
+    if not asked and not study.is_dir():
+        raise UserError(f"{study}: there is no such folder")
+    for folder in session_folders(study) if folders is None else folders:
         path = os.path.relpath(os.path.realpath(folder), os.path.realpath(study))
         if path in there:
             said += [f"{path}: is in {table.name} already"] if asked else []
@@ -189,15 +192,6 @@ def rate_session(study: Path, path: str, examiner: str, score: float) -> None:
     add_rows(table_path(study, "ratings"), "ratings", [row])
 
 
-def _found(study: Path) -> list[Path]:
-    """Return the session folders of a study folder, the oldest first."""
-    if not study.is_dir():
-        raise UserError(f"{study}: there is no such folder")
-    places = (study, study / "sessions")
-    found = [path for place in places if place.is_dir() for path in place.iterdir()]
-    return sorted(path for path in found if path.is_dir() and is_session(path))
-
-
 def _added(
     study: Path,
     table: Path,
@@ -209,12 +203,11 @@ def _added(
     asked: bool,
 ) -> list[str]:
     """Add one session; return what is to be said of it."""
-    folder = study / path
-    manifest = read_manifest(folder)
-    events, _ = read_events(folder / EVENTS) if (folder / EVENTS).is_file() else ([], False)
-    if not any(event["event"] == "session_ended" for event in events):
+    one = scan_session(study, study / path)
+    manifest = one.manifest
+    if not one.of("session_ended"):
         return [f"{path}: was not closed, so it is not in the study yet"] if asked else []
-    session = recorded_session(path.as_posix(), manifest, events)
+    session = recorded_session(path.as_posix(), manifest, one.events)
     session = replace(session, subject=session.subject or subject)
     if not session.subject:
         if asked:

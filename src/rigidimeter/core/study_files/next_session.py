@@ -6,7 +6,7 @@ No sentence here names a condition to an examiner who is blinded.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
@@ -20,6 +20,7 @@ from rigidimeter.core.settings import Settings, changed_settings, load_settings
 from rigidimeter.core.study_files.day_plan import StudyPlan, read_plan
 from rigidimeter.core.study_files.plan_progress import (
     DueBlock,
+    RecordedBlock,
     due_block,
     named_block,
     recorded_blocks,
@@ -86,7 +87,10 @@ def subject_of(plan: StudyPlan, subject: str) -> str:
 
 
 def next_block(
-    plan: StudyPlan, subject: str, named: tuple[str, int] | None = None
+    plan: StudyPlan,
+    subject: str,
+    named: tuple[str, int] | None = None,
+    recorded: Sequence[RecordedBlock] | None = None,
 ) -> DueBlock | None:
     """Return the session of a subject that is due, or the one of this day and number.
 
@@ -96,13 +100,15 @@ def next_block(
     subject : str
     named : (str, int), optional
         One that was recorded before is run as a further part.
+    recorded : sequence of RecordedBlock, optional
+        What was recorded; read from the study folder by default.
 
     Returns
     -------
     DueBlock or None
         None if all were recorded, or the plan has no session of that name.
     """
-    recorded = recorded_blocks(plan.folder)
+    recorded = recorded_blocks(plan.folder) if recorded is None else recorded
     if named is None:
         return due_block(plan, recorded, subject)
     return named_block(plan, recorded, (subject, *named))
@@ -179,9 +185,11 @@ def _settings(plan: StudyPlan, due: DueBlock) -> Settings:
     return settings
 
 
-def plan_rows(plan: StudyPlan, subject: str) -> list[tuple[str, ...]]:
+def plan_rows(
+    plan: StudyPlan, subject: str, recorded: Sequence[RecordedBlock]
+) -> list[tuple[str, ...]]:
     """Return the sessions of a subject as cells of a table, in the order of `PLAN_COLUMNS`."""
-    done = {one.key for one in recorded_blocks(plan.folder) if one.begun}
+    done = {one.key for one in recorded if one.begun}
     return [
         (
             block.day,
@@ -208,10 +216,23 @@ def due_words(plan: StudyPlan, due: DueBlock) -> str:
     )
 
 
-def next_words(plan: StudyPlan, subject: str) -> str:
-    """Return which session of a subject is due now, or that all of the plan are recorded."""
-    due = next_block(plan, subject)
-    return due_words(plan, due) if due else "All sessions of the plan are recorded."
+def next_words(
+    plan: StudyPlan, subject: str, recorded: Sequence[RecordedBlock] | None = None
+) -> str:
+    """Return which session of a subject is due now, or that all are recorded, and whose are left.
+
+    Nothing of a subject that is not in the plan.
+    """
+    if subject not in plan.about.subjects:
+        return ""
+    recorded = recorded_blocks(plan.folder) if recorded is None else recorded
+    due = next_block(plan, subject, None, recorded)
+    if due is not None:
+        return f"Next: {due_words(plan, due)}"
+    left = [one for one in plan.about.subjects if next_block(plan, one, None, recorded)]
+    if left:
+        return f"All sessions of {subject} are recorded; some of {', '.join(left)} are left."
+    return "All sessions of the plan are recorded."
 
 
 def wait_words(due: DueBlock, now: datetime, speed: float = 1.0) -> str:

@@ -5,7 +5,6 @@ A session that was run from a plan has its place in its manifest, under `about.p
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,8 +12,13 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.core.session import EVENTS, is_session, read_events, read_manifest
 from rigidimeter.core.study_files.day_plan import PlannedBlock, StudyPlan
+from rigidimeter.core.study_files.session_scan import (
+    SESSIONS,
+    ScannedSession,
+    scan_session,
+    session_folders,
+)
 from rigidimeter.core.study_files.stimulation_log import (
     StimulationChange,
     last_change,
@@ -88,7 +92,7 @@ class DueBlock:
         """The folder of the session below that of the study; it does not tell the condition."""
         part = f"-{self.part}" if self.part > 1 else ""
         name = f"{self.block.subject}-day-{self.block.day}-{self.block.order}{part}"
-        return "sessions/" + re.sub(r"[^\w.-]+", "-", name)
+        return f"{SESSIONS}/" + re.sub(r"[^\w.-]+", "-", name)
 
     def since_min(self, now: datetime, speed: float = 1.0) -> float | None:
         """Return the minutes since the change, on a clock that is `speed` times as fast."""
@@ -106,24 +110,19 @@ class DueBlock:
 
 def recorded_blocks(study: Path) -> tuple[RecordedBlock, ...]:
     """Return the sessions in a study folder and in its folder `sessions`, the oldest first."""
-    places = [place for place in (study, study / "sessions") if place.is_dir()]
-    folders = [path for place in places for path in place.iterdir() if is_session(path)]
-    found = []
-    for folder in folders:
-        manifest = read_manifest(folder)
-        events, _ = read_events(folder / EVENTS) if (folder / EVENTS).is_file() else ([], False)
-        ended = [event for event in events if event["event"] == "epoch_ended"]
-        found.append(
-            RecordedBlock(
-                os.path.relpath(folder, study).replace(os.sep, "/"),
-                str(manifest["created_utc"]),
-                manifest.get("about", {}).get("plan", {}),
-                sum(event["outcome"] == "success" for event in ended),
-                len(manifest["protocol"]),
-                any(event["event"] == "epoch_started" for event in events),
-            )
-        )
-    return tuple(sorted(found, key=lambda one: one.created_utc))
+    scanned = (scan_session(study, folder) for folder in session_folders(study))
+    return tuple(sorted(map(_recorded, scanned), key=lambda one: one.created_utc))
+
+
+def _recorded(one: ScannedSession) -> RecordedBlock:
+    return RecordedBlock(
+        one.path,
+        str(one.manifest["created_utc"]),
+        one.about.get("plan", {}),
+        sum(event["outcome"] == "success" for event in one.of("epoch_ended")),
+        len(one.manifest["protocol"]),
+        bool(one.of("epoch_started")),
+    )
 
 
 def due_block(plan: StudyPlan, recorded: Sequence[RecordedBlock], subject: str) -> DueBlock | None:

@@ -17,6 +17,7 @@ from typing import Any
 from nicegui import ui
 
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.study_files import SESSIONS
 from rigidimeter.rig.console.page.button_words import in_buttons, unfinished_words
 from rigidimeter.rig.console.page.form_values import parse_line
 from rigidimeter.rig.console.page.jobs import Jobs
@@ -26,7 +27,6 @@ from rigidimeter.rig.console.page.session_row import Acts, SessionRow
 from rigidimeter.rig.console.page.sessions_found import (
     OF_STUDY,
     PAGE,
-    SESSIONS,
     FoundEpoch,
     FoundSession,
     exclude,

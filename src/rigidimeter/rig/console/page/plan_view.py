@@ -26,6 +26,7 @@ from rigidimeter.core.study_files import (
     parse_change,
     plan_of,
     plan_rows,
+    recorded_blocks,
     wait_words,
 )
 from rigidimeter.rig.console.page.form_values import parse_line
@@ -58,6 +59,7 @@ class PlanView:
         self._due: DueBlock | None = None
         self._begun: BegunSession | None = None
         self._seen: object = None
+        self._shown_subject = ""
         rig = "the virtual rig" if place.rig is None else place.rig.name
         ui.label(f"Rig: {rig}. Plan: {place.root.name}.").classes("text-lg").mark("what")
         if place.clock_speed != 1.0:
@@ -111,6 +113,8 @@ class PlanView:
 
     def _other(self) -> None:
         """Offer what is due of another subject."""
+        if self._subject.value == self._shown_subject:
+            return
         self._named.value = _DUE
         self._load()
 
@@ -122,14 +126,16 @@ class PlanView:
             self._plan = plan = plan_of(self._state.place.root)
             subjects = list(plan.about.subjects)
             subject = self._subject.value if self._subject.value in subjects else subjects[0]
+            self._shown_subject = subject
             self._subject.set_options(subjects, value=subject)
             self._subject.set_visibility(len(subjects) > 1)
-            rows = plan_rows(plan, subject)
+            recorded = recorded_blocks(plan.folder)
+            rows = plan_rows(plan, subject, recorded)
             names = {f"{row[0]}/{row[1]}": (row[0], int(row[1])) for row in rows}
             chosen = self._named.value if self._named.value in names else _DUE
             self._named.set_options([_DUE, *names], value=chosen)
             self._table.set_content(_table(rows))
-            self._due = next_block(plan, subject, names.get(chosen))
+            self._due = next_block(plan, subject, names.get(chosen), recorded)
             if self._due is not None:
                 self._begun = begun_session(plan, self._due, datetime.now(UTC))
             self._problem.text = ""

@@ -23,14 +23,13 @@ from rigidimeter.core.session import (
     NO_CODE,
     codes_of,
     in_codes,
-    is_session,
     locked,
-    read_events,
-    read_manifest,
     rest_of,
 )
 from rigidimeter.core.study_files import (
+    SESSIONS,
     STUDY_FILE,
+    ScannedSession,
     exclude_epoch,
     excluded_epochs,
     extend_study,
@@ -39,13 +38,13 @@ from rigidimeter.core.study_files import (
     raters_of,
     read_plan,
     read_study_toml,
+    scan_session,
+    session_folders,
 )
 from rigidimeter.rig.console.page.form_values import parse_line, parse_name, parse_number
 from rigidimeter.rig.console.page.server_state import Place
 
 MAX_SESSIONS = 200
-SESSIONS = "sessions"
-"""Below the console's folder: where those of a plan lie."""
 NEVER_S = 1e9
 """When an epoch ended that nobody ended: later than any."""
 
@@ -123,7 +122,7 @@ class FoundSession:
 
 def found_sessions(root: Path) -> tuple[list[FoundSession], list[str]]:
     """Return the sessions of a folder, newest first, and a sentence for each that is not read."""
-    folders = sorted(_folders(root), key=lambda path: path.stat().st_mtime, reverse=True)
+    folders = sorted(session_folders(root), key=lambda path: path.stat().st_mtime, reverse=True)
     problems: list[str] = []
     try:
         excluded = excluded_epochs(root)
@@ -136,12 +135,6 @@ def found_sessions(root: Path) -> tuple[list[FoundSession], list[str]]:
         except (UserError, OSError, KeyError, TypeError) as error:
             problems.append(f"{_name(root, folder)}: {error}")
     return [_with_left(one, root, found) for one in found], problems
-
-
-def _folders(root: Path) -> list[Path]:
-    """Return the session folders of a console's folder, and of its folder `sessions`."""
-    places = [place for place in (root, root / SESSIONS) if place.is_dir()]
-    return [path for place in places for path in place.iterdir() if is_session(path)]
 
 
 def _name(root: Path, folder: Path) -> str:
@@ -203,21 +196,19 @@ def _asked(reason: str, by: str) -> tuple[str, str]:
 
 
 def _session(root: Path, folder: Path, excluded: dict[tuple[str, str], str]) -> FoundSession:
-    manifest = read_manifest(folder)
-    about = manifest.get("about", {})
-    path = folder / EVENTS
-    events, _ = read_events(path)
-    end = next((event for event in events if event["event"] == "session_ended"), {})
+    one = scan_session(root, folder)
+    manifest, about = one.manifest, one.about
+    end: Mapping[str, Any] = next(iter(one.of("session_ended")), {})
     recording = False
     if not end:
         try:
-            with locked(path, ""):
+            with locked(folder / EVENTS, ""):
                 pass
         except UserError:
             recording = True
     plan = manifest["protocol"]
     return FoundSession(
-        _name(root, folder),
+        one.path,
         manifest["created_utc"],
         str(about.get("subject", "")),
         manifest["virtual"],
@@ -225,7 +216,7 @@ def _session(root: Path, folder: Path, excluded: dict[tuple[str, str], str]) -> 
         end.get("reason", "still being recorded" if recording else "it was interrupted"),
         len(plan),
         recording,
-        tuple(_epochs(_name(root, folder), events, excluded, about)),
+        tuple(_epochs(one, excluded)),
         manifest.get("session_id", ""),
         manifest.get("continues", {}).get("session_id", ""),
         tuple(entry["number"] for entry in plan),
@@ -234,33 +225,28 @@ def _session(root: Path, folder: Path, excluded: dict[tuple[str, str], str]) -> 
     )
 
 
-def _epochs(
-    session: str,
-    events: Sequence[dict[str, Any]],
-    excluded: dict[tuple[str, str], str],
-    about: Mapping[str, Any],
-) -> list[FoundEpoch]:
-    codes = codes_of(about)
-    ends = {event["epoch"]: event for event in events if event["event"] == "epoch_ended"}
+def _epochs(one: ScannedSession, excluded: dict[tuple[str, str], str]) -> list[FoundEpoch]:
+    codes = codes_of(one.about)
+    ends = {event["epoch"]: event for event in one.of("epoch_ended")}
     ratings: dict[int, list[str]] = {}
-    for event in events:
-        if event["event"] == "note" and event.get("what") == "rating":
+    for event in one.of("note"):
+        if event.get("what") == "rating":
             ratings.setdefault(event["epoch"], []).append(f"{event['score']:g} ({event['by']})")
+    blinded = one.about.get("blinded")
     return [
         FoundEpoch(
             begun["epoch"],
             begun["label"],
             begun["task"],
-            codes.get(begun["condition"], NO_CODE) if about.get("blinded") else begun["condition"],
+            codes.get(begun["condition"], NO_CODE) if blinded else begun["condition"],
             ends.get(begun["epoch"], {}).get("outcome", ""),
             ends.get(begun["epoch"], {}).get("reason", "not ended"),
             "; ".join(ratings.get(begun["epoch"], ())),
-            excluded.get((session, begun["label"]), ""),
+            excluded.get((one.path, begun["label"]), ""),
             begun["time_s"],
             ends.get(begun["epoch"], {}).get("time_s", NEVER_S),
         )
-        for begun in events
-        if begun["event"] == "epoch_started"
+        for begun in one.of("epoch_started")
     ]
 
 

@@ -11,8 +11,9 @@ from nicegui.page import page
 from tests.small_study import tiny
 
 from rigidimeter.core.files import toml_text
+from rigidimeter.core.session import SessionWriter
 from rigidimeter.core.settings import Settings, dump_settings
-from rigidimeter.core.study_files import add_change, parse_change
+from rigidimeter.core.study_files import add_change, parse_change, session_scan
 from rigidimeter.rig.console.page import Jobs, Place, PlanView, ServerState, StartRequest
 
 NAMES = ("Zebra", "Quagga")
@@ -140,6 +141,17 @@ def test_a_wait_is_cut_short_with_a_reason_alone_and_another_session_can_be_chos
     assert request.folder == "sessions/S01-day-2-1"
     assert request.about["plan"]["wait_cut_short"] == "the subject must leave"
     assert request.about["plan"]["since_change_min"] is None
+
+
+def test_the_folder_is_read_once_for_what_is_due_and_the_table(client, study, monkeypatch):
+    folder = study()
+    writer = SessionWriter(folder / "sessions" / "S01-day-9-1", Settings(), [], {}, virtual=True)
+    writer.close(0.0, "success", "")
+    read = []
+    manifest = session_scan.read_manifest
+    monkeypatch.setattr(session_scan, "read_manifest", lambda at: read.append(at) or manifest(at))
+    Page(client, folder)
+    assert len(read) == 1
 
 
 def test_a_blinded_page_names_no_condition_and_takes_no_change(client, study):
