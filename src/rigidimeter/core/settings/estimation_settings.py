@@ -93,7 +93,7 @@ class DiagnosticLevels(create_model("Levels", __base__=Section, **_LEVELS)):  # 
 
 
 class DiagnosticsSettings(Section):
-    """Thresholds of the checks. `min_` and `max_` are the ends of what is taken as sound.
+    """Thresholds of the checks. `min_` and `max_` are the ends of what is accepted.
 
     `axis` is how the joint's axis stands. About a vertical axis K includes nothing of the limb's
     weight. `gravity_nm` is m g l, the moment of the limb's weight about the axis when the limb is

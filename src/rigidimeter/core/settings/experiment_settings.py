@@ -134,7 +134,7 @@ class OptimiseSettings(Section):
 
 
 class MultisineSettings(Section):
-    """A multisine in place of the PRBS: equal lines at whole multiples of 1 / `period_s`.
+    """A multisine in place of the PRBS: equal lines at multiples of 1 / `period_s`.
 
     It lies in the wanted band of `[prbs]`, lasts as long, and has the same peak torque. Without
     `period_s`, which is 0, its period is that of the epoch.
