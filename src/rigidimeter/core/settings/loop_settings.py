@@ -43,7 +43,7 @@ class ControllerSettings(Section):
 class GuardSettings(Section):
     """Limits that hold whatever the controller asks for.
 
-    `reaction_time_s` is how long the drive may take to have done what was commanded, plus how far the
+    `reaction_time_s` is how long the drive may take to have followed a command, plus how far the
     stamp of an angle reading may be wrong; braking for the position limit begins that much earlier.
 
     Above `torque_limit_nm` or `power_limit_w` the rig holds still and the operator may go on. It
