@@ -1,11 +1,17 @@
 """EMG of the virtual subject: noise in 20–450 Hz whose amplitude follows the torque it makes.
 
-The EMG of a muscle is, with w and n white in their band and of unit variance,
+The EMG of a muscle is, with w Gaussian, confined to 20–450 Hz and of unit variance, and n white,
 
-    emg(t) = a · max(±M_sub(t), 0) · w(t) + b · n(t) + h · sin(2π · 50 Hz · t + φ)
+    emg(t) = a · max(±M(t + d), 0) · w(t) + b · n(t) + h · sin(2π · 50 Hz · t + φ)
 
-with + for muscles that drive the joint toward positive angles. The torque comes before the joint,
-so a muscle is active in proportion to what the subject does, not to how the joint answers.
+with + for muscles that drive the joint toward positive angles. M is the torque of the muscles, be
+it voluntary, tremor or reflex; it comes the electromechanical delay d after the EMG. M comes before
+the joint, so a muscle is active in proportion to what the subject does, not to how the joint
+answers.
+
+Surface EMG as Gaussian noise whose SD is the muscle's activation: Hogan and Mann, IEEE Trans Biomed
+Eng 27:382 (1980). An electromechanical delay of 50 ms at the elbow: Cavanagh and Komi, Eur J Appl
+Physiol 42:159 (1979).
 """
 
 from __future__ import annotations
@@ -54,13 +60,30 @@ class VirtualEmg:
         for muscle in range(len(self._rngs)):  # let the filter settle
             self._noise(muscle, round(0.2 * settings.rate_hz))
 
+    def until(self, time_s: Array, torque_nm: Array) -> Array:
+        """Return the next samples whose torque is known, shape (n, muscles).
+
+        Sample k was taken at k / `rate_hz`; the last is `virtual_delay_s` before the last torque.
+
+        Parameters
+        ----------
+        time_s : array, shape (m,)
+            Of each torque, from where the last call ended, or 0.
+        torque_nm : array, shape (m,)
+            Of the muscles, toward positive angles.
+        """
+        rate_hz, delay_s = self._settings.rate_hz, self._settings.virtual_delay_s
+        stop = max(math.ceil((time_s[-1] - delay_s) * rate_hz) + 2, self._next)
+        at_s = np.arange(self._next, stop) / rate_hz + delay_s
+        return self.block(np.interp(at_s[at_s <= time_s[-1]], time_s, torque_nm))
+
     def block(self, torque_nm: Array) -> Array:
         """Return the next samples, shape (n, muscles).
 
         Parameters
         ----------
         torque_nm : array, shape (n,)
-            Of the subject itself, at the time of each sample.
+            That each sample makes, `virtual_delay_s` later.
         """
         s, n = self._settings, torque_nm.size
         if not n:
@@ -90,6 +113,7 @@ class VirtualMuscles:
 
     The subject's torque is drawn a second time from the session's seed, so the rig does nothing
     for it. Sample k was taken at k / `emg.rate_hz` since the session's start.
+    The torque of the ticks shows the EMG up to `emg.virtual_delay_s` before the last of them.
 
     Parameters
     ----------
@@ -106,12 +130,11 @@ class VirtualMuscles:
         self._set_subject(before)
         self._tick, self._epoch = 0, -1
         self._torque_nm = [0.0]  # at the last tick, and before the first
-        self._samples = 0
 
     def take(
         self, tick: NDArray[np.int64], epoch: NDArray[np.int64], of: Mapping[int, str]
     ) -> Array:
-        """Return the EMG up to the last of these ticks, shape (n, muscles).
+        """Return the EMG that these ticks show, shape (n, muscles).
 
         Parameters
         ----------
@@ -134,11 +157,8 @@ class VirtualMuscles:
             self._tick += steps
         torque = np.concatenate(torques)
         self._torque_nm = [float(torque[-1])]
-        rate_hz, tick_rate_hz = self._settings.emg.rate_hz, self._settings.rig.tick_rate_hz
-        until = math.floor(self._tick / tick_rate_hz * rate_hz) + 1
-        at = np.arange(self._samples, until) / rate_hz * tick_rate_hz
-        self._samples = until
-        return self._emg.block(np.interp(at, np.arange(first, self._tick + 1), torque))
+        time_s = np.arange(first, self._tick + 1) / self._settings.rig.tick_rate_hz
+        return self._emg.until(time_s, torque)
 
     def _set_subject(self, subject: SubjectSettings) -> None:
         """Begin a subject as the virtual rig does: one that stays the same goes on."""

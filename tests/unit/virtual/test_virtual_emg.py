@@ -106,6 +106,19 @@ def test_amplitude_follows_the_torque_of_the_subject():
     assert power[inside].sum() > 0.95 * power.sum()
 
 
+def test_a_muscle_is_active_before_its_torque():
+    """By the electromechanical delay; EMG whose torque is still to come is not given."""
+    emg = parse_settings(TABLES).emg.model_copy(
+        update={"virtual_noise_uv": 0.0, "virtual_hum_uv": 0.0, "virtual_delay_s": 0.03}
+    )
+    time_s = np.arange(2001) / 1000.0
+    muscles = VirtualEmg(emg, np.random.default_rng(3))
+    biceps, triceps = muscles.until(time_s, np.where(time_s >= 1.0, 0.5, 0.0)).T
+    assert biceps.size == 1 + round((2.0 - 0.03) * 2000)
+    assert np.flatnonzero(biceps)[0] == pytest.approx(0.97 * 2000, abs=2)
+    assert not triceps.any()
+
+
 def test_baseline_is_noise_and_hum():
     emg = parse_settings(TABLES).emg
     muscles = VirtualEmg(emg, np.random.default_rng(3))
@@ -126,7 +139,9 @@ def test_the_torque_behind_the_emg_is_that_of_the_rig(folder: Path):
     subject_nm = 1.751 * columns["angle_rad"] - columns["torque_nm"]
     still = (columns["velocity_command_rad_s"] == 0.0) & (np.abs(columns["velocity_rad_s"]) < 1e-3)
     still &= (columns["epoch"] < 0) & (np.abs(subject_nm) > 0.05)
-    at = (columns["tick"][still] - 1) * 2  # the sensor is 1 ms late
+    # The sensor is 1 ms late, and the muscle before its torque.
+    at = (columns["tick"][still] - 1) * 2 - round(2000.0 * settings.emg.virtual_delay_s)
+    assert at[0] > 0
     toward = subject_nm[still] > 0.0
     assert still.sum() > 50
     assert emg[at[toward], 0].all()

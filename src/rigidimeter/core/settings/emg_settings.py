@@ -37,6 +37,9 @@ class EmgSettings(Section):
         Of the virtual subject: RMS for each N·m of its own torque in the direction of the muscle,
         RMS of the baseline noise, amplitude of the 50 Hz hum. Odd muscles drive the joint toward
         positive angles, even ones toward negative.
+    virtual_delay_s : float
+        Of the virtual subject: from a muscle's EMG to its torque, 0.05 s at the elbow (Cavanagh and
+        Komi 1979).
     """
 
     source: Literal["none", "lsl", "daq", "virtual"] = "none"
@@ -52,6 +55,7 @@ class EmgSettings(Section):
     virtual_uv_per_nm: float = quantity(200.0, "µV/(N·m)", 0.0, 100000.0)
     virtual_noise_uv: float = quantity(4.0, "µV", 0.0, 10000.0)
     virtual_hum_uv: float = quantity(2.0, "µV", 0.0, 10000.0)
+    virtual_delay_s: float = quantity(0.05, "s", 0.0, 0.2)
 
     @model_validator(mode="after")
     def _complete(self) -> Self:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.muscles import JOINT, epochs_with_emg, with_reflex_emg
+from tests.pushes import JOINT, epochs_with_emg, with_reflex_emg
 from typer.testing import CliRunner
 
 from rigidimeter.analysis.reading import (
@@ -97,7 +97,7 @@ def test_a_relaxed_subject_is_fitted_as_without_emg(relaxed):
 def test_a_reflex_stays_in_and_is_reported(relaxed, seen):
     settings, epochs = relaxed
     rng = np.random.default_rng(2)
-    answered = [seen(with_reflex_emg(one.epoch, 0.2, 0.05, rng)) for one in epochs]
+    answered = [seen(with_reflex_emg(one.epoch, 0.2, 0.1, rng)) for one in epochs]
     analysis = estimate(answered, settings=settings)
     plain = estimate(map(without_emg, answered), settings=settings)
     for fit, same, (finding,) in zip(analysis.fits, plain.fits, found(analysis), strict=True):

@@ -247,7 +247,7 @@ def test_the_virtual_subject_has_the_emg_of_its_ticks(tmp_path: Path):
                 time.sleep(0.08)
         until_s = time.monotonic() + 30.0
         reader = EnvelopeReader(shared.status, 2)
-        while not shown or shown[-1][-1, 0] < 2.97:
+        while not shown or shown[-1][-1, 0] < 2.92:
             assert time.monotonic() < until_s
             shown.append(reader.read())
             shown[:] = [points for points in shown if len(points)]
