@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from rigidimeter.cli.console import require_full_waits
 from rigidimeter.cli.output import echo
@@ -14,10 +16,12 @@ from rigidimeter.cli.progress import Meter
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import in_codes
 from rigidimeter.core.study_files import (
+    ContinuedSession,
     DueBlock,
     StudyPlan,
     add_change,
     begun_session,
+    continued_session,
     due_words,
     extend_study,
     next_block,
@@ -105,32 +109,71 @@ class NextSession:
         UserError
             If the wait has not begun, or the stimulation was changed meanwhile.
         """
-        said, speed = self.said, self.said.speed
-        left = self.due.left_min(datetime.now(UTC), speed)
-        if said.begin_anyway:
-            echo(f"Begun without waiting: {said.begin_anyway}")
-            return self
-        if left is None:
-            raise UserError(
-                f"{wait_words(self.due, datetime.now(UTC))}; enter it with --stimulation "
-                '"on since 10:42", or begin with --begin-anyway REASON'
-            )
-        if left <= 0.0:
-            return self
-        echo(wait_words(self.due, datetime.now(UTC), speed))
-        total_s = 60.0 * left / speed
-        start_s = time.monotonic()
-        with Meter("wait", total_s) as meter:
-            while (gone_s := time.monotonic() - start_s) < total_s:
-                meter.reach(gone_s)
-                time.sleep(min(_TICK_S, total_s - gone_s))
-        _, day, order = self.due.block.key
-        due = next_block(self.plan, self.due.block.subject, (day, order))
-        if due is None or due.part != self.due.part:
-            raise UserError("the session was recorded by another program during the wait")
-        if due.wait_from != self.due.wait_from:
-            raise UserError("the stimulation was changed during the wait; begin the wait again")
-        return replace(self, due=due)
+        said = self.said
+        return replace(self, due=_after_wait(self.plan, self.due, said.begin_anyway, said.speed))
+
+
+def _after_wait(plan: StudyPlan, due: DueBlock, begin_anyway: str, speed: float) -> DueBlock:
+    """Count down to the end of the wait; return the session as it is due then."""
+    left = due.left_min(datetime.now(UTC), speed)
+    if begin_anyway:
+        echo(f"Begun without waiting: {begin_anyway}")
+        return due
+    if left is None:
+        raise UserError(
+            f"{wait_words(due, datetime.now(UTC))}; enter it with --stimulation "
+            '"on since 10:42", or begin with --begin-anyway REASON'
+        )
+    if left <= 0.0:
+        return due
+    echo(wait_words(due, datetime.now(UTC), speed))
+    total_s = 60.0 * left / speed
+    start_s = time.monotonic()
+    with Meter("wait", total_s) as meter:
+        while (gone_s := time.monotonic() - start_s) < total_s:
+            meter.reach(gone_s)
+            time.sleep(min(_TICK_S, total_s - gone_s))
+    _, day, order = due.block.key
+    found = next_block(plan, due.block.subject, (day, order))
+    if found is None or found.part != due.part:
+        raise UserError("the session was recorded by another program during the wait")
+    if found.wait_from != due.wait_from:
+        raise UserError("the stimulation was changed during the wait; begin the wait again")
+    return found
+
+
+def continued(
+    resume: Path, about: Mapping[str, Any], said: SaidOfSession
+) -> ContinuedSession | None:
+    """Return the session of a plan that is continued; None where it is of none.
+
+    Raises
+    ------
+    UserError
+        If something was said that has a meaning with a plan alone, or is wrong.
+    """
+    found = continued_session(resume, about)
+    refuse_without_next(said, continued=found is not None)
+    if found is not None and said.stimulation:
+        subject, now = found.due.block.subject, datetime.now(UTC)
+        add_change(found.plan.folder, parse_change(said.stimulation, subject, now, said.operator))
+        return continued_session(resume, about)
+    return found
+
+
+def continued_place(session: ContinuedSession, begin_anyway: str) -> dict[str, Any]:
+    """Wait where the stimulation was changed; return `about.plan` of the part that begins then.
+
+    Raises
+    ------
+    UserError
+        If the wait has not begun, or the stimulation was changed meanwhile.
+    """
+    if words := session.words(datetime.now(UTC)):
+        echo(words)
+        due = _after_wait(session.plan, session.due, begin_anyway, session.speed)
+        session = replace(session, due=due)
+    return session.facts(datetime.now(UTC), begin_anyway)
 
 
 def next_session(study: Path, said: SaidOfSession, *, virtual: bool) -> NextSession:
@@ -199,8 +242,8 @@ def refuse_with_next(
             raise UserError(f"{option} does not go with --next: the plan of the study says it")
 
 
-def refuse_without_next(said: SaidOfSession) -> None:
-    """Refuse what has a meaning with a plan alone.
+def refuse_without_next(said: SaidOfSession, *, continued: bool = False) -> None:
+    """Refuse what has a meaning with a plan alone; the wait also where one of it is continued.
 
     Raises
     ------
@@ -208,14 +251,16 @@ def refuse_without_next(said: SaidOfSession) -> None:
         Naming the option.
     """
     given = {
-        "--stimulation": said.stimulation,
+        "--stimulation": said.stimulation and not continued,
+        "--begin-anyway": said.begin_anyway and not continued,
         "--block": said.block,
-        "--begin-anyway": said.begin_anyway,
         "--clock-speed": said.speed != 1.0,
     }
     for option, there in given.items():
         if there:
-            raise UserError(f"{option} goes with --next STUDY alone")
+            resumed = option in ("--stimulation", "--begin-anyway")
+            more = ", or with --resume of a session of its plan" if resumed else ""
+            raise UserError(f"{option} goes with --next STUDY alone{more}")
 
 
 def _named(plan: StudyPlan, subject: str, text: str) -> DueBlock:

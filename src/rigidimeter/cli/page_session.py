@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from rigidimeter.cli.planned_session import (
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import codes_of, count_epochs, in_codes, rest_of
 from rigidimeter.core.settings import changed_settings
-from rigidimeter.core.study_files import next_words, plan_of
+from rigidimeter.core.study_files import continued_session, next_words, plan_of
 from rigidimeter.rig.acquisition.processes import Ended, EndedEarly, Realtime, SessionMemory
 from rigidimeter.rig.console import StopKeys, stop_keys
 from rigidimeter.rig.console.page import (
@@ -190,6 +191,9 @@ def _planned(state: ServerState, request: StartRequest) -> PlannedSession:
         virtual = state.place.rig is None
         folder = state.place.root / request.resume
         planned = rest_of_session(folder, virtual=virtual, epoch=request.epoch, left=request.left)
+        if (rest := continued_session(folder, planned.about)) is not None:
+            place = rest.facts(datetime.now(UTC), request.begin_anyway)
+            planned = planned.with_about({"plan": place})
     else:
         source = request.source or state.place.settings_path
         planned = new_session(request.settings, request.about, source)

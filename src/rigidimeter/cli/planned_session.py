@@ -101,7 +101,11 @@ class PlannedSession:
         if entered is None:
             return self
         entered = replace(entered, subject=str(self.about.get("subject", "")))
-        return replace(self, about={**self.about, "range": entered.facts()})
+        return self.with_about({"range": entered.facts()})
+
+    def with_about(self, more: Mapping[str, Any]) -> PlannedSession:
+        """Return the session with more that is said of it; what was entered before stays."""
+        return replace(self, about={**self.about, **more})
 
     @property
     def dose_before(self) -> Dose:
@@ -114,7 +118,7 @@ class PlannedSession:
             return self
         names = [epoch.condition for epoch in self.protocol.epochs]
         codes = drawn_codes(names, random.SystemRandom())
-        return replace(self, about={**self.about, "blinded": True, "codes": codes})
+        return self.with_about({"blinded": True, "codes": codes})
 
 
 def new_session(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 from rigidimeter.cli.console import HOST, NO_TOKEN, PORT, TOKEN_FILE, require_page
@@ -43,11 +42,11 @@ def run(
     note: str = RUN.further("--note TEXT", "Note on the session.", ""),
     stimulation: str = RUN.option(
         "--stimulation TEXT",
-        "With --next: on, off, or since when on the clock, as `off since 10:42`.",
+        "Of a planned session: on, off, or since when on the clock, as `off since 10:42`.",
         "",
     ),
     begin_anyway: str = RUN.further(
-        "--begin-anyway REASON", "With --next: begin before the wait is over. Recorded.", ""
+        "--begin-anyway REASON", "Begin a planned session before its wait is over. Recorded.", ""
     ),
     clock_speed: float = RUN.further(
         "--clock-speed X",
@@ -110,6 +109,8 @@ def run(
     from rigidimeter.cli.next_session import (
         SaidOfSession,
         added,
+        continued,
+        continued_place,
         next_session,
         refuse_with_next,
         refuse_without_next,
@@ -131,15 +132,18 @@ def run(
     said = SaidOfSession(
         subject, operator, note, stimulation, block, begin_anyway, clock_speed, day
     )
-    due = None
+    due = rest = None
     if study is not None:
         refuse_with_next(out, protocol, resume, seed, day, page=page, blinded=blinded)
         due = next_session(study, said, virtual=rig is None)
         planned, out = due.planned(), due.folder
     else:
-        refuse_without_next(said)
+        if resume is None:
+            refuse_without_next(said)
         planned = planned_session(protocol, resume, seed, virtual=rig is None)
-        planned = replace(planned, about={**planned.about, **said.facts()})
+        if resume is not None:
+            rest = continued(resume, planned.about, said)
+        planned = planned.with_about(said.facts())
     if out is None:
         raise UserError("--out is needed: name a new folder for the session")
     require_packages(planned.settings)
@@ -177,7 +181,9 @@ def run(
     planned = checked_rig(planned, rig)
     if due is not None:
         due = due.waited()
-        planned = replace(planned, about=due.planned().about)
+        planned = planned.with_about(due.planned().about)
+    if rest is not None:
+        planned = planned.with_about({"plan": continued_place(rest, begin_anyway)})
     attended, confirmed = attendance(rig, unattended=unattended, confirm=confirm)
     shown = planned.shown(virtual=rig is None)
     realtime = Realtime(priority=priority, cpu=cpu, attended=attended, confirmed=confirmed)

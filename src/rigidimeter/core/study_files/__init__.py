@@ -1,5 +1,6 @@
 """The files of a study: `study.toml`, and its tables of sessions, ratings and exclusions."""
 
+from rigidimeter.core.study_files.continued_session import ContinuedSession, continued_session
 from rigidimeter.core.study_files.day_plan import (
     PLAN_FILE,
     PLAN_SCHEMA,

@@ -147,14 +147,12 @@ def begun_session(
         settings = _settings(plan, due)
     except UserError as error:
         raise UserError(*(in_codes(line, plan.about.codes) for line in error.lines)) from None
-    block, since = due.block, due.since_min(now, speed)
-    change = due.change if since is not None else None
+    block = due.block
     place = {
         "sha256": plan.sha256,
         **asdict(block),
         "stimulation": due.stimulation,
-        "stimulation_changed_utc": change.changed_utc.isoformat() if change else None,
-        "since_change_min": None if since is None else round(since, 2),
+        **change_facts(due, now, speed),
         "clock_speed": speed,
         "wait_cut_short": "" if due.left_min(now, speed) == 0.0 else reason,
     }
@@ -168,6 +166,16 @@ def begun_session(
         **({"blinded": True, "codes": plan.about.codes} if plan.blinded else {}),
     }
     return BegunSession(plan.folder / due.folder, settings, about, plan.folder / block.protocol)
+
+
+def change_facts(due: DueBlock, now: datetime, speed: float = 1.0) -> dict[str, Any]:
+    """Return when the stimulation was set for a session and the minutes since; None if unknown."""
+    since = due.since_min(now, speed)
+    change = due.change if since is not None else None
+    return {
+        "stimulation_changed_utc": change.changed_utc.isoformat() if change else None,
+        "since_change_min": None if since is None else round(since, 2),
+    }
 
 
 def _settings(plan: StudyPlan, due: DueBlock) -> Settings:

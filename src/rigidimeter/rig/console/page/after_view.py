@@ -21,6 +21,7 @@ from rigidimeter.core.study_files import SESSIONS
 from rigidimeter.rig.console.page.button_words import in_buttons, unfinished_words
 from rigidimeter.rig.console.page.form_values import parse_line
 from rigidimeter.rig.console.page.jobs import Jobs
+from rigidimeter.rig.console.page.question import Question, ask
 from rigidimeter.rig.console.page.recorded_traces import epoch_panes
 from rigidimeter.rig.console.page.server_state import ServerState, StartRequest
 from rigidimeter.rig.console.page.session_row import Acts, SessionRow
@@ -29,6 +30,7 @@ from rigidimeter.rig.console.page.sessions_found import (
     PAGE,
     FoundEpoch,
     FoundSession,
+    continued_words,
     exclude,
     extended,
     found_sessions,
@@ -168,11 +170,36 @@ class AfterView:
             self._run(session.name, left=left)
 
     def _run(self, session: str, **what: Any) -> None:
+        """Continue a session; one of a plan, if it has to wait again, after asking for a reason."""
         # The name of a planned session ends with its number, that of any other with its time.
         planned = session.startswith(f"{SESSIONS}/")
         stem = session if planned else session.rpartition("-")[0] or session
         folder = f"{stem}-{time.strftime('%H%M%S')}"
-        self._state.ask(StartRequest(folder, resume=session, **what))
+
+        def run(reason: str = "") -> None:
+            self._state.ask(StartRequest(folder, resume=session, begin_anyway=reason, **what))
+
+        try:
+            words = continued_words(self._root, session)
+        except UserError as error:
+            ui.notify(str(error))
+            return
+        if words:
+            self._ask_anyway(words, run)
+        else:
+            run()
+
+    def _ask_anyway(self, words: str, run: Callable[[str], None]) -> None:
+        """Ask why a session is continued before its wait is over."""
+
+        def anyway(text: str) -> None:
+            reason = parse_line(text, "reason")
+            if not reason:
+                raise UserError("to begin before the wait is over write the reason")
+            run(reason)
+
+        field = "continue_anyway", "Reason to begin before the wait is over", 200
+        ask(self._dialogs, Question(words, [field], "Begin anyway"), self._may_act, anyway)
 
     def _leave_out(self, session: FoundSession, epoch: FoundEpoch) -> None:
         """Leave an epoch out, after asking for a reason and a name."""
@@ -221,26 +248,12 @@ class AfterView:
         session: FoundSession,
         epoch: FoundEpoch,
     ) -> None:
-        with self._dialogs, ui.dialog() as dialog, ui.card():
-            ui.label(words)
-            reason = ui.input("Reason").props("maxlength=200 data-field=reason")
-            by = ui.input("Your name").props("maxlength=40 data-field=by")
+        def confirm(reason: str, by: str) -> None:
+            act(self._root, session.name, epoch.label, reason, by)
+            self._update()
 
-            def confirm() -> None:
-                if not self._may_act():
-                    return
-                try:
-                    act(self._root, session.name, epoch.label, reason.value, by.value)
-                except UserError as error:
-                    ui.notify(str(error))
-                    return
-                dialog.close()
-                self._update()
-
-            with ui.row():
-                ui.button("Cancel", on_click=dialog.close)
-                ui.button(button, on_click=confirm)
-        dialog.open()
+        fields = ("reason", "Reason", 200), ("by", "Your name", 40)
+        ask(self._dialogs, Question(words, fields, button), self._may_act, confirm)
 
     async def _recover(self, session: FoundSession) -> None:
         """Close the record of an interrupted session."""

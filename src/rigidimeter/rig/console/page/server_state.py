@@ -146,6 +146,8 @@ class StartRequest:
         The planned epochs that are left, by number; empty for those that this session lacks.
     source : Path or None
         The file of the settings, where it is not that of the form.
+    begin_anyway : str
+        Why a session of a plan is continued before its wait is over.
     """
 
     folder: str
@@ -155,6 +157,7 @@ class StartRequest:
     epoch: int | None = None
     left: tuple[int, ...] = ()
     source: Path | None = None
+    begin_anyway: str = ""
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +25,14 @@ from rigidimeter.core.session import (
     codes_of,
     in_codes,
     locked,
+    read_manifest,
     rest_of,
 )
 from rigidimeter.core.study_files import (
     SESSIONS,
     STUDY_FILE,
     ScannedSession,
+    continued_session,
     exclude_epoch,
     excluded_epochs,
     extend_study,
@@ -248,6 +251,13 @@ def _epochs(one: ScannedSession, excluded: dict[tuple[str, str], str]) -> list[F
         )
         for begun in one.of("epoch_started")
     ]
+
+
+def continued_words(root: Path, session: str) -> str:
+    """Return why a session of a plan has to wait before it is continued; empty for any other."""
+    about = read_manifest(root / session).get("about", {})
+    found = continued_session(root / session, about)
+    return found.words(datetime.now(UTC)) if found is not None else ""
 
 
 def extended(place: Place) -> list[str]:
