@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from tests.docs.command_help import command_help
+from tests.docs.conformance_table import drive_rules, sensor_rules
 from tests.docs.findings_table import findings_table
 from tests.docs.markdown import ROOT
 from tests.docs.settings_tables import (
@@ -27,6 +28,7 @@ BLOCKS: Mapping[Path, Mapping[str, Callable[[], str]]] = {
     REFERENCE / "commands.md": {"options": command_help},
     REFERENCE / "settings.md": {"settings": settings_tables},
     REFERENCE / "rig-file.md": {"drivers": rig_tables},
+    REFERENCE / "drivers.md": {"sensor": sensor_rules, "drive": drive_rules},
     REFERENCE / "study-files.md": {
         "study": study_tables,
         "plan": plan_tables,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import runpy
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -34,6 +35,7 @@ from rigidimeter.testing import (
 
 JOINT = JointDynamics(0.08, 0.5, 2.0)
 CHANNEL = count()
+SKELETONS = Path(__file__).parents[2] / "examples" / "drivers"
 
 
 class FakeReader:
@@ -160,13 +162,24 @@ def cia402_on_another_stack() -> Iterator[DriveFixture]:
         node.close()
 
 
-SENSORS = {"ati-analogue": analogue, "ati-rdt": rdt}
+@contextmanager
+def skeleton(name: str) -> Iterator[Any]:
+    """The example that people copy."""
+    yield runpy.run_path(str(SKELETONS / f"{name}_skeleton.py"))["fixture"]()
+
+
+SENSORS = {
+    "ati-analogue": analogue,
+    "ati-rdt": rdt,
+    "skeleton": lambda: skeleton("sensor"),
+}
 DRIVES = {
     "ascii-moves": lambda: ascii_fixture("moves"),
     "ascii-velocity": lambda: ascii_fixture("velocity"),
     "ascii-torque": lambda: ascii_fixture("moves", torque_nm_per_a=1.0),
     "cia402": cia402,
     "cia402-durand": cia402_on_another_stack,
+    "skeleton": lambda: skeleton("drive"),
 }
 
 
