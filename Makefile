@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 OUT ?= demo-study
 
-.PHONY: install demo test check docs bench bench-loop hazards mutation golden fuzz docs-pictures clean
+.PHONY: install demo test check docs bench bench-loop hazards mutation golden fuzz docs-pictures example-data clean
 
 install: $(STAMP)
 
@@ -70,6 +70,10 @@ golden: install
 # Also the output that the tutorials show; it needs Chromium. Look at them before you commit them.
 docs-pictures: install
 	$(BIN)/python -m tests.docs.pictures
+
+# The recordings that `rm.data` returns.
+example-data: install
+	$(BIN)/python -m tests.example_data
 
 SEED ?= 1
 CASES ?= 4000

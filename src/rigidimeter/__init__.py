@@ -8,7 +8,7 @@ From arrays, one estimate:
 
 From files, everything that the command line does:
 
-    recording = rm.read("demo-study/elbow.csv", column={"epoch": "trial"})
+    recording = rm.read("elbow.csv")  # or rm.data("elbow"), an example
     estimates = rm.estimate(recording)
     rm.report(estimates, "report")
 
@@ -27,7 +27,7 @@ from rigidimeter.core.version import __version__
 if TYPE_CHECKING:
     from rigidimeter.analysis.batch import batch
     from rigidimeter.analysis.estimation import identify
-    from rigidimeter.analysis.reading import read
+    from rigidimeter.analysis.reading import data, read
     from rigidimeter.analysis.report import report
     from rigidimeter.analysis.study import compare, estimate
     from rigidimeter.planning import design
@@ -37,6 +37,7 @@ __all__ = [
     "__version__",
     "batch",
     "compare",
+    "data",
     "design",
     "estimate",
     "identify",
@@ -48,6 +49,7 @@ __all__ = [
 _ROOMS = {
     "identify": "rigidimeter.analysis.reading",
     "read": "rigidimeter.analysis.reading",
+    "data": "rigidimeter.analysis.reading",
     "estimate": "rigidimeter.analysis.study",
     "compare": "rigidimeter.analysis.study",
     "simulate": "rigidimeter.virtual",

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.analysis.export.document_tables import columns_of, document_tables, sample_labels
 from rigidimeter.analysis.export.exported_sessions import ExportedSession
+from rigidimeter.analysis.reading.formats.arrow_file import VIRTUAL
 from rigidimeter.analysis.reading.formats.clocked_table import Stream
 from rigidimeter.core.files import csv_text, json_text, write_json, write_text
 
@@ -68,7 +69,8 @@ def _stream_table(stream: Stream, about: Mapping[str, Any]) -> pa.Table:
     for name, texts in sample_labels(stream, about).items():
         arrays.append(pa.array(texts, pa.string(), mask=texts == ""))
         fields.append(pa.field(name, pa.string()))
-    return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
+    virtual = {VIRTUAL: b"true" if about["virtual"] else b"false"}
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=virtual))
 
 
 def write_mat(session: ExportedSession, path: Path) -> None:

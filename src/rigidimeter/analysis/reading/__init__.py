@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         write_estimates_csv,
         write_estimates_json,
     )
+    from rigidimeter.analysis.reading.example_data import data
     from rigidimeter.analysis.reading.formats import ReadOptions, read_recording
     from rigidimeter.analysis.reading.from_arrays import identify
     from rigidimeter.analysis.reading.recording import Recording, read
@@ -25,6 +26,7 @@ __all__ = [
     "ESTIMATES_SCHEMA",
     "ReadOptions",
     "Recording",
+    "data",
     "estimates_document",
     "identify",
     "read",
@@ -45,6 +47,7 @@ __getattr__ = lazy_names(
             "write_estimates_csv",
             "write_estimates_json",
         ),
+        "example_data": ("data",),
         "from_arrays": ("identify",),
         "formats": ("ReadOptions", "read_recording"),
         "recording": ("Recording", "read"),

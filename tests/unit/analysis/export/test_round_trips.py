@@ -61,6 +61,7 @@ def test_epochs_and_estimates(recording: Recording, tmp_path: Path, to: str) -> 
     assert len(found.epochs) == len(recording.epochs) == 2
     for one, other in zip(found.epochs, recording.epochs, strict=True):
         assert (one.label, one.condition, one.task) == (other.label, "DBS", other.task)
+        assert one.virtual == (to == "parquet")
         for name, whole in other.channels.items():
             ours, theirs = in_common(one.channels[name], whole)
             np.testing.assert_allclose(ours.time_s, theirs.time_s, rtol=0, atol=1e-9)

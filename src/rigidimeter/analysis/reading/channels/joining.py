@@ -144,7 +144,8 @@ def _union(parts: Sequence[_Part]) -> Table:
         labels = (n for n in part.table.scalars if n in LABELS)
         scalars |= {name: part.table.scalars[name] for name in labels}
     source = " + ".join(part.table.source for part in parts)
-    return Table(source, columns, scalars, units=units)
+    virtual = any(part.table.virtual for part in parts)
+    return Table(source, columns, scalars, units=units, virtual=virtual)
 
 
 def _found(parts: Sequence[_Part], options: ReadOptions) -> Offset:

@@ -1,4 +1,7 @@
-"""Parquet and Arrow files: columns, with units where the schema states them."""
+"""Parquet and Arrow files: columns, with units where the schema states them.
+
+A schema whose metadata has ``virtual = true`` is that of a simulated recording.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,9 @@ from numpy.typing import NDArray
 from rigidimeter.analysis.reading.formats.stored_arrays import Expansion, check_count
 from rigidimeter.analysis.reading.formats.table import Table
 from rigidimeter.core.files import RECORDING_BYTES, open_regular, printable
+
+VIRTUAL = b"virtual"
+"""The key, in the metadata of a schema, of whether the recording was simulated: true or false."""
 
 _FILE = b"ARROW1"
 
@@ -61,7 +67,8 @@ def read_arrow(path: Path) -> Table:
             columns[printable(name)] = _texts(table[name])
         else:
             others[printable(name)] = f"a column of {kind}"
-    return Table(str(path), columns, others=others, units=units)
+    virtual = (table.schema.metadata or {}).get(VIRTUAL) == b"true"
+    return Table(str(path), columns, others=others, units=units, virtual=virtual)
 
 
 def _check_first(start: bytes, file_bytes: int) -> None:

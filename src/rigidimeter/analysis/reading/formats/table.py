@@ -44,6 +44,8 @@ class Table:
         The line of the file that each row came from; None for files without lines.
     units : mapping of str to str
         By column, where the file states them apart from the names.
+    virtual : bool
+        Whether the file says that it was simulated.
     """
 
     source: str
@@ -52,6 +54,7 @@ class Table:
     others: Mapping[str, str] = field(default_factory=dict)
     lines: NDArray[np.int64] | None = None
     units: Mapping[str, str] = field(default_factory=dict)
+    virtual: bool = False
 
     def where(self, row: int) -> str:
         """Name a row, counted from 0, as the user would find it in the file."""

@@ -83,7 +83,9 @@ def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], 
         notices += more
         _check_epochs(table.source, len(epochs) + len(pieces))
         epochs += [
-            Epoch(table.source, label, channels, condition=condition, task=task)
+            Epoch(
+                table.source, label, channels, condition=condition, task=task, virtual=table.virtual
+            )
             for label, channels in pieces
         ]
     for name, by_epoch in losses.items():
