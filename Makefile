@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 OUT ?= demo-study
 
-.PHONY: install demo test check docs bench bench-loop hazards mutation golden fuzz docs-pictures example-data clean
+.PHONY: install demo test check docs bench bench-loop hazards mutation golden matrix fuzz docs-pictures example-data clean
 
 install: $(STAMP)
 
@@ -74,6 +74,10 @@ docs-pictures: install
 # The recordings that `rm.data` returns.
 example-data: install
 	$(BIN)/python -m tests.example_data
+
+# Each Python that is here, with the core, each extra and all; with the oldest packages also the golden answers. Some 15 min.
+matrix: install
+	$(BIN)/python -m tests.matrix
 
 SEED ?= 1
 CASES ?= 4000

@@ -1,17 +1,16 @@
 """Every command of a wheel that is installed with the core's packages alone.
 
-`python -m tests.core_install` builds the wheel, installs it into an empty environment, makes the
-demo there and runs the help of each command and the examples in it. The table has what was run, its
-exit status and the first line that it printed. What takes longer than `LIMIT_S`, as a session in
-real time does, is interrupted; examples that read what it would have made are left out. The status
-is 1 if one ended in a traceback, or a command that needs neither a rig nor an extra did not end
-with success. The examples of `study`, which take half of the time, run beside the others in a copy
-of the demo's folder.
+`python -m tests.core_install` builds the source distribution and from that the wheel, installs it
+into an empty environment, makes the demo there and runs the help of each command and the examples
+in it. The table has what was run, its exit status and the first line that it printed. What takes
+longer than `LIMIT_S`, as a session in real time does, is interrupted; examples that read what it
+would have made are left out. The status is 1 if one ended in a traceback, or a command that needs
+neither a rig nor an extra did not end with success. The examples of `study`, which take half of the
+time, run beside the others in a copy of the demo's folder.
 """
 
 from __future__ import annotations
 
-import os
 import shlex
 import shutil
 import signal
@@ -19,25 +18,22 @@ import subprocess
 import sys
 import tempfile
 import time
-import venv
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tests.packages import ENVIRONMENT, ROOT, built, environment
 from typer.main import get_command
 
 from rigidimeter.cli.main import app
 
-ROOT = Path(__file__).parents[1]
 LIMIT_S = 60.0
 """What takes longer is interrupted, as by Ctrl-C; the demo, which the others read, is not."""
 
 DEMO = "demo-study/"
 """Where `make demo` writes."""
-
-ENVIRONMENT = {name: text for name, text in os.environ.items() if name != "PYTHONPATH"}
 
 MAY_REFUSE = {
     "run": "a terminal, and a rig",
@@ -93,23 +89,6 @@ def examples(command: Any) -> list[list[str]]:
     return [shlex.split(line)[1:] for line in joined.splitlines() if line.strip()]
 
 
-def installed(folder: Path) -> Path:
-    """Build the wheel, install it with the core's packages, and return the program."""
-    source = folder / "source"  # a build leaves files beside what it builds
-    leave = shutil.ignore_patterns("__pycache__", "*.egg-info")
-    shutil.copytree(ROOT / "src", source / "src", ignore=leave)
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
-        shutil.copy(ROOT / name, source)
-    pip = ["-m", "pip", "--quiet", "--disable-pip-version-check"]
-    build = [*pip, "wheel", "--no-deps", "--wheel-dir", str(folder), str(source)]
-    subprocess.run([sys.executable, *build], check=True, env=ENVIRONMENT)
-    (wheel,) = folder.glob("*.whl")
-    venv.create(folder / "core", with_pip=True)
-    install = [*pip, "install", "--constraint", str(ROOT / "constraints.txt"), str(wheel)]
-    subprocess.run([str(folder / "core/bin/python"), *install], check=True, env=ENVIRONMENT)
-    return folder / "core/bin/rigidimeter"
-
-
 def run(program: Path, words: list[str], folder: Path, limit_s: float | None) -> Ran:
     """Run a command line; interrupt it where it does not end within the limit."""
     started = subprocess.Popen(
@@ -151,24 +130,31 @@ def tried(program: Path, lines: list[list[str]], folder: Path) -> list[Ran]:
     return failed
 
 
+def beside(program: Path, lists: list[list[list[str]]], folders: list[Path]) -> list[Ran]:
+    """Run lists of lines beside each other, each in its folder, and return what failed."""
+    with ThreadPoolExecutor(len(lists)) as pool:
+        done = pool.map(lambda lines, folder: tried(program, lines, folder), lists, folders)
+        return [ran for failed in done for ran in failed]
+
+
 def main() -> int:
     """Print the table; return 1 if a command failed."""
     with tempfile.TemporaryDirectory() as place:
-        program = installed(Path(place))
+        wheel = built(Path(place))
+        pinned = ["--constraint", ROOT / "constraints.txt"]
+        program = environment(Path(place) / "core", wheel, *pinned) / "rigidimeter"
         folders = [Path(place) / "tried", Path(place) / "studies"]
         shutil.copytree(ROOT / "examples", folders[0] / "examples")
         every = [*commands()]
         helps = [[*words, "--help"] for words, _ in every]
-        lines: tuple[list[list[str]], list[list[str]]] = ([], [])
+        lines: list[list[list[str]]] = [[], []]
         for words, command in every:
             lines[words[0] == "study"].extend(examples(command))
         print("status  s      command: first line", flush=True)
-        first = [["demo"], ["run", "--console", "--out", "led"], *helps]
-        failed = tried(program, first, folders[0])
+        failed = beside(program, [[["demo"]], helps], [folders[0], folders[0]])
+        failed += tried(program, [["run", "--console", "--out", "led"]], folders[0])
         shutil.copytree(*folders)
-        with ThreadPoolExecutor(2) as both:
-            for ran in both.map(lambda each, folder: tried(program, each, folder), lines, folders):
-                failed += ran
+        failed += beside(program, lines, folders)
     for each in failed:
         print(
             f"\nfailed, with status {each.status}: {shlex.join(each.words)}\n{each.out}{each.err}"

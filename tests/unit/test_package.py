@@ -1,0 +1,58 @@
+"""Version, authors and addresses stand in one place; the other files agree with it."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import yaml
+
+from rigidimeter import __version__
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+CITATION = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
+AUTHORS = [author["name"] for author in CITATION["authors"]]
+
+
+def test_the_version_stands_once_in_the_source() -> None:
+    assert "version" in PROJECT["dynamic"]
+    sources = (ROOT / "src").rglob("*.py")
+    holding = [path.name for path in sources if f'"{__version__}"' in path.read_text("utf-8")]
+    assert holding == ["version.py"]
+
+
+def test_citation_and_changelog_have_the_version() -> None:
+    assert CITATION["version"] == __version__
+    changelog = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    first = re.search(r"^## \[(.+?)\](?:: (\S+))?", changelog, re.M)
+    assert first is not None
+    assert __version__ in first.groups()
+
+
+def test_the_citation_invents_nothing() -> None:
+    assert CITATION["title"] == PROJECT["name"]
+    assert CITATION["message"]
+    assert "doi" not in CITATION
+    assert "identifiers" not in CITATION
+
+
+def test_the_licence_is_that_of_the_package() -> None:
+    assert (ROOT / "LICENSE").read_text("utf-8").startswith("BSD 3-Clause License")
+    assert CITATION["license"] == PROJECT["license"].split()[0]
+
+
+def test_the_authors_are_those_of_the_citation() -> None:
+    assert [author["name"] for author in PROJECT["authors"]] == AUTHORS
+    assert AUTHORS[0] in (ROOT / "LICENSE").read_text("utf-8")
+    assert f'"{AUTHORS[0]}"' in (ROOT / "docs" / "conf.py").read_text("utf-8")
+
+
+def test_the_hosting_address_is_that_of_the_citation() -> None:
+    """While it has none, no other file names one."""
+    address = CITATION.get("repository-code")
+    assert set(PROJECT.get("urls", {}).values()) <= {address}
+    for name in ("README.md", "docs/conf.py"):
+        named = re.findall(
+            r"https?://(?:github|gitlab)[^\s)\"]*rigidimeter\S*", (ROOT / name).read_text("utf-8")
+        )
+        assert set(named) <= {address}
