@@ -4,7 +4,7 @@ A documented experiment on the virtual rig, per-degree controller, from fixed se
 
     python -m benchmarks.accuracy
 
-about half an hour on a busy core; the tables go to `docs/reference/accuracy.md`.
+about half an hour on a busy core; the tables go to `docs/development/accuracy.md`.
 
     python -m benchmarks.accuracy --share 0.1               # fewer runs; writes nothing
     python -m benchmarks.accuracy --only relaxed delay      # these sections of the page alone
@@ -34,7 +34,7 @@ from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE, Settings
 from rigidimeter.planning import prbs_nm, predicted_precision
 from rigidimeter.virtual import PAPER_RATES
 
-TABLE = Path(__file__).parent.parent / "docs" / "reference" / "accuracy.md"
+TABLE = Path(__file__).parent.parent / "docs" / "development" / "accuracy.md"
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:

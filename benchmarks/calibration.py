@@ -4,7 +4,7 @@ A documented experiment on invented scores, from fixed seeds. Run by hand,
 
     python -m benchmarks.calibration
 
-some minutes; it prints the tables of `docs/explanation/ratings-and-effects.md`. With a number it
+some minutes; it prints the tables of `docs/development/calibration.md`. With a number it
 takes that fraction of the runs.
 """
 

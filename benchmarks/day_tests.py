@@ -8,7 +8,7 @@ alone, are slow: they get fewer draws.
 
     python -m benchmarks.day_tests 4000 100     # draws, those of the mixed models; three minutes
 
-The table is in `docs/explanation/days-not-epochs.md`.
+The table is in `docs/development/day-tests.md`.
 
     python -m benchmarks.day_tests plan 2000    # studies a row; one minute
 
