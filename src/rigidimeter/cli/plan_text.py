@@ -16,14 +16,18 @@ _SHOWN = 12
 
 def show_plan(plan: StudyPlan) -> None:
     """Show the plan of each subject, what was recorded of it, and what is due."""
-    from rigidimeter.core.study_files import PLAN_COLUMNS, next_words, plan_rows, recorded_blocks
+    from rigidimeter.core.study_files import (
+        PLAN_COLUMNS,
+        next_words,
+        plan_rows,
+        plan_words,
+        recorded_blocks,
+    )
 
-    waits = sum(block.wait_min for block in plan.blocks) / 60.0
     edited = " Edited after it was drawn." if plan.edited else ""
     show(
         [
-            f"{plan.folder}: {len(plan.blocks)} sessions on {plan.about.days} days, "
-            f"{waits:.0f} h of waits, order {plan.about.order}, seed {plan.about.seed}.{edited}",
+            f"{plan.folder}: {plan_words(plan)}.{edited}",
             "",
         ]
     )

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import random
-from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 
@@ -16,10 +13,6 @@ from rigidimeter.cli.output import echo
 from rigidimeter.cli.plan_text import show_plan, show_switches
 from rigidimeter.cli.progress import Meter
 from rigidimeter.core.errors import UserError
-
-if TYPE_CHECKING:
-    from rigidimeter.core.settings import Settings
-    from rigidimeter.planning import StudyDays
 
 
 def plan_days(
@@ -65,6 +58,11 @@ def plan_days(
     sinusoid_epochs: int = OPTIONS.further(
         "--sinusoid-epochs N", "Sinusoidal epochs of a session.", 3, min=0, max=500
     ),
+    rests: str = OPTIONS.further(
+        "--rests S,S",
+        "Rests between epochs (s); several are drawn from. Default: those of the settings.",
+        "",
+    ),
     raters: str = OPTIONS.further("--raters A,B", "Examiners who rate in each session.", ""),
     blinded: bool = OPTIONS.flag(
         "--blinded", "Show codes in place of conditions wherever an examiner may look."
@@ -90,8 +88,14 @@ def plan_days(
       rigidimeter run --next winter
     """
     from rigidimeter.core.settings import load_settings
-    from rigidimeter.core.study_files import PlanToml, is_study, read_plan, write_plan
-    from rigidimeter.planning import StudyDays, draw_days
+    from rigidimeter.core.study_files import read_plan
+    from rigidimeter.planning import (
+        PlanValues,
+        days_of_design,
+        draw_plan,
+        plan_days_of,
+        plan_names,
+    )
 
     there = read_plan(folder)
     if not subjects:
@@ -99,50 +103,28 @@ def plan_days(
             raise UserError(f"{folder}: has no plan yet; draw one with --subjects S01,S02")
         show_plan(there)
         return
-    names = _names(conditions, "--conditions")
     base = load_settings(settings)
     if design is not None:
         days, prbs_epochs = days_of_design(design)
-    given = () if order in ("balanced", "drawn") else tuple(_names(order, "--order"))
-    codes = _codes(names, seed) if blinded else {}
-    spec = StudyDays(
-        subjects=tuple(_names(subjects, "--subjects")),
-        conditions=tuple(names),
+    values = PlanValues(
+        subjects=plan_names(subjects, "subjects"),
         days=days,
-        stimulated=tuple(names[1:] if stimulated == "*" else _names(stimulated, "--stimulated")),
-        days_of=_days_of(days_of or []),
-        sessions_a_day=sessions,
-        order=given,
-        balanced=order != "drawn",
-        wait_after_on_min=wait_on_min,
-        wait_after_off_min=wait_off_min,
-        task=" ".join(
-            name for name, n in (("prbs", prbs_epochs), ("sinusoid", sinusoid_epochs)) if n
-        ),
-        raters=tuple(_names(raters, "--raters")) if raters else (),
-        codes=codes,
-    )
-    about = PlanToml(
-        subjects=list(spec.subjects),
-        days=spec.days,
-        conditions=names,
-        stimulated=list(spec.stimulated),
-        order="given" if given else "balanced" if spec.balanced else "drawn",
+        conditions=plan_names(conditions, "conditions"),
+        stimulated=None if stimulated == "*" else plan_names(stimulated, "stimulated"),
+        days_of=plan_days_of(days_of or []),
+        sessions=sessions,
+        order="balanced" if order == "balanced" else "drawn" if order == "drawn" else "given",
+        given=() if order in ("balanced", "drawn") else plan_names(order, "order"),
+        wait_after_on=wait_on_min,
+        wait_after_off=wait_off_min,
+        prbs_epochs=prbs_epochs,
+        sinusoid_epochs=sinusoid_epochs,
+        rests_s=_rests(rests),
+        raters=plan_names(raters, "raters") if raters else (),
+        blinded=blinded,
         seed=seed,
-        wait_after_on_min=wait_on_min,
-        wait_after_off_min=wait_off_min,
-        raters=list(spec.raters),
-        codes=codes,
     )
-    protocols = {
-        spec.protocol_of(name): _protocol(base, name, prbs_epochs, sinusoid_epochs)
-        for name in names
-    }
-    blocks = draw_days(spec, seed)
-    if not is_study(folder):
-        _describe(folder, spec)
-    written = write_plan(folder, about, blocks, protocols)
-    show_plan(written)
+    show_plan(draw_plan(values, base).write(folder))
 
 
 def stimulation(
@@ -230,79 +212,10 @@ def add_plan_commands(study: typer.Typer) -> None:
     study.command("stimulation", cls=HelpCommand)(stimulation)
 
 
-def days_of_design(path: Path) -> tuple[int, int]:
-    """Return the days and PRBS epochs a day that a design asks for.
+def _rests(text: str) -> tuple[float, ...]:
+    from rigidimeter.planning import WrongValue
 
-    Raises
-    ------
-    UserError
-        If the file is no design with a difference to detect.
-    """
-    from rigidimeter.core.files import read_json
-    from rigidimeter.planning import DESIGN_SCHEMA
-
-    document = read_json(path)
-    if not isinstance(document, dict) or document.get("schema") != DESIGN_SCHEMA:
-        raise UserError(f"{path}: is not the JSON of rigidimeter design --json")
-    found = [one.get("planned") or {} for one in document.get("detection", [])]
-    days = [one["days_needed"] for one in found if one.get("days_needed")]
-    if not days:
-        raise UserError(
-            f"{path}: names no days; run design with --detect and a protocol that has epochs of "
-            "two conditions"
-        )
-    return max(days), max(max(one["epochs_a_day"]) for one in found if one)
-
-
-def _protocol(base: Settings, condition: str, prbs: int, sinusoid: int) -> str:
-    """Return the settings file of the sessions of a condition."""
-    from rigidimeter.core.files import toml_text
-    from rigidimeter.core.settings import changed_settings
-
-    counts = {"prbs": prbs, "sinusoid": sinusoid}
-    blocks = [
-        {"task": task, "condition": condition, "epochs": count}
-        for task, count in counts.items()
-        if count
-    ]
-    if not blocks:
-        raise UserError("--prbs-epochs 0 and --sinusoid-epochs 0: a session needs an epoch")
-    first = next(iter(base.subject.values())).model_dump(mode="json", exclude_unset=True)
-    joints = {condition: first} if condition not in base.subject else {}
-    made = changed_settings(
-        base, {"subject": joints, "protocol": {"blocks": blocks}}, f"condition {condition}"
-    )
-    return toml_text(made.model_dump(mode="json", exclude_unset=True))
-
-
-def _describe(folder: Path, spec: StudyDays) -> None:
-    """Write `study.toml` and its empty tables for the conditions of the plan."""
-    from rigidimeter.core.study_files import ConditionTable, write_new_study
-
-    waits = dict.fromkeys(spec.stimulated, spec.wait_after_on_min)
-    tables = {name: ConditionTable(wash_in_min=waits.get(name)) for name in spec.conditions}
-    if len(tables) > 1:
-        write_new_study(folder, planned=tables)
-
-
-def _codes(conditions: Sequence[str], seed: int) -> dict[str, str]:
-    from rigidimeter.core.session import drawn_codes
-
-    return drawn_codes(conditions, random.Random(f"codes {seed}"))
-
-
-def _names(text: str, option: str) -> list[str]:
-    names = [name.strip() for name in text.split(",") if name.strip()]
-    if not names or len(set(names)) < len(names):
-        raise UserError(f"{option} {text}: write different names with commas between, such as A,B")
-    return names
-
-
-def _days_of(texts: Sequence[str]) -> dict[str, int]:
-    found = {}
-    for text in texts:
-        name, _, count = text.partition("=")
-        if not count.strip().isdigit():
-            raise UserError(f"--days-of {text}: write a condition and its days, such as DBS=4")
-        found[name.strip()] = int(count)
-    return found
+    try:
+        return tuple(float(one) for one in text.split(",") if one.strip())
+    except ValueError:
+        raise WrongValue("rests", "write times in s, such as 10 or 10,20", text) from None

@@ -24,6 +24,16 @@ from rigidimeter.planning.dose import (
     dose_reached,
     dose_words,
 )
+from rigidimeter.planning.drawn_plan import (
+    BOUNDS,
+    DrawnPlan,
+    PlanValues,
+    day_settings,
+    days_of_design,
+    draw_plan,
+    plan_days_of,
+    plan_names,
+)
 from rigidimeter.planning.joint_bandwidth import (
     APPENDIX_A,
     CONTROLLER_INERTIA_KG_M2,
@@ -90,4 +100,4 @@ from rigidimeter.planning.search import (
     prbs_toml,
     strongest_amplitude_nm,
 )
-from rigidimeter.planning.study_days import StudyDays, draw_days
+from rigidimeter.planning.study_days import StudyDays, WrongValue, draw_days

@@ -15,6 +15,7 @@ wait precedes every session, for its length would give the condition away.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -30,7 +31,27 @@ _ORDERS = 0
 """The stream of the seed from which orders are drawn."""
 
 _MOST_SESSIONS = 12
-"""A day; so many orders can still be listed."""
+"""A day."""
+
+_MOST_ORDERS = 120_000
+"""So many orders of a day can still be listed."""
+
+
+class WrongValue(UserError):
+    """A value of a plan that is wrong: which one, and what would be right.
+
+    Attributes
+    ----------
+    key : str
+        The option of `study plan`, with ``_`` in place of ``-``.
+    sentence : str
+        Without the option.
+    """
+
+    def __init__(self, key: str, sentence: str, text: str | None = None) -> None:
+        where = "" if text is None else f"--{key.replace('_', '-')} {text}: "
+        super().__init__(f"{where}{sentence}")
+        self.key, self.sentence = key, sentence
 
 
 @dataclass(frozen=True)
@@ -78,22 +99,39 @@ class StudyDays:
     def __post_init__(self) -> None:
         for name, count in self.days_of.items():
             if name not in self.conditions:
-                raise UserError(f"condition {name}: is not one of {', '.join(self.conditions)}")
+                raise WrongValue(
+                    "days_of", f"condition {name}: is not one of {', '.join(self.conditions)}"
+                )
             if not 1 <= count <= self.days:
-                raise UserError(
+                raise WrongValue(
+                    "days_of",
                     f"condition {name} on {count} days: must be from 1 to the {self.days} days of "
-                    "the study"
+                    "the study",
                 )
         if self.order and sorted(self.order) != sorted(self.conditions):
-            raise UserError(
+            raise WrongValue(
+                "order",
                 f"order {', '.join(self.order)}: must name each of the conditions "
-                f"{', '.join(self.conditions)} once"
+                f"{', '.join(self.conditions)} once",
             )
         if self.sessions_a_day * len(self.conditions) > _MOST_SESSIONS:
-            raise UserError(
+            raise WrongValue(
+                "sessions",
                 f"{self.sessions_a_day} sessions a day of {len(self.conditions)} conditions: at "
-                f"most {_MOST_SESSIONS} sessions a day can be planned"
+                f"most {_MOST_SESSIONS} sessions a day can be planned",
             )
+        if not self.order and self._order_count() > _MOST_ORDERS:
+            raise WrongValue(
+                "order",
+                f"{self.sessions_a_day} sessions a day of {len(self.conditions)} conditions have "
+                "too many orders to draw one; give the order, such as "
+                f"{','.join(self.conditions)}",
+            )
+
+    def _order_count(self) -> int:
+        """Return how many orders a day with all conditions has, alike ones in a row included."""
+        k, n = self.sessions_a_day, len(self.conditions)
+        return math.factorial(k * n) // int(math.factorial(k) ** n)
 
     def protocol_of(self, condition: str) -> str:
         """Return the settings file of a condition, whose name tells a blinded examiner nothing."""

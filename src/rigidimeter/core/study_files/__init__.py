@@ -39,6 +39,7 @@ from rigidimeter.core.study_files.next_session import (
     next_words,
     plan_of,
     plan_rows,
+    plan_words,
     subject_of,
     wait_words,
 )

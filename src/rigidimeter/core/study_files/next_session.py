@@ -193,6 +193,15 @@ def _settings(plan: StudyPlan, due: DueBlock) -> Settings:
     return settings
 
 
+def plan_words(plan: StudyPlan) -> str:
+    """Return how large a plan is and how it was drawn."""
+    waits = sum(block.wait_min for block in plan.blocks) / 60.0
+    return (
+        f"{len(plan.blocks)} sessions on {plan.about.days} days, {waits:.0f} h of waits, order "
+        f"{plan.about.order}, seed {plan.about.seed}"
+    )
+
+
 def plan_rows(
     plan: StudyPlan, subject: str, recorded: Sequence[RecordedBlock]
 ) -> list[tuple[str, ...]]:

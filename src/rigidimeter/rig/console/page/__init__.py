@@ -13,6 +13,7 @@ from rigidimeter.rig.console.page.access import (
 from rigidimeter.rig.console.page.after_view import AfterView
 from rigidimeter.rig.console.page.before_view import protocol_names, read_protocol
 from rigidimeter.rig.console.page.button_words import in_buttons, next_buttons, unfinished_words
+from rigidimeter.rig.console.page.draw_view import DrawView
 from rigidimeter.rig.console.page.form_values import (
     parse_integer,
     parse_line,
@@ -31,6 +32,12 @@ from rigidimeter.rig.console.page.page_messages import (
     session_state,
 )
 from rigidimeter.rig.console.page.page_token import new_token, require_token, token_in
+from rigidimeter.rig.console.page.plan_form import (
+    EnteredPlan,
+    empty_plan_form,
+    read_plan_form,
+    wait_leaves,
+)
 from rigidimeter.rig.console.page.plan_view import PlanView
 from rigidimeter.rig.console.page.prediction import detected, dry_run_lines, prediction_lines
 from rigidimeter.rig.console.page.recorded_traces import amplitude_densities, as_json, epoch_panes

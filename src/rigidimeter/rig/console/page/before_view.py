@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -12,10 +11,11 @@ from typing import Any
 from nicegui import ui
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import read_json, read_toml, toml_text, write_json
+from rigidimeter.core.files import read_json, read_toml, write_json
 from rigidimeter.core.session import count_epochs
-from rigidimeter.core.settings import Settings, dump_settings, load_settings
+from rigidimeter.core.settings import Settings, load_settings
 from rigidimeter.core.study_files import STUDY_FILE, PrimaryTable
+from rigidimeter.rig.console.page.computed import computed
 from rigidimeter.rig.console.page.jobs import Jobs
 from rigidimeter.rig.console.page.prediction import detected, dry_run_lines, prediction_lines
 from rigidimeter.rig.console.page.primary_view import PrimaryView
@@ -284,18 +284,7 @@ class BeforeView:
             ui.notify("first put right what is wrong in the form")
             return
         self._answer.set_content("<p>computing …</p>")
-        with tempfile.TemporaryDirectory(prefix="rigidimeter-form-") as name:
-            folder = Path(name)
-            path = folder / "protocol.toml"
-            path.write_text(toml_text(dump_settings(settings)), encoding="utf-8")
-            answer = await self._jobs.command(
-                *command, "--settings", str(path), *options, folder=folder
-            )
-            try:
-                texts = lines(folder, settings)
-            except UserError as error:
-                texts = [str(error)]
-        self._answer.set_content(answer.html(name, texts))
+        self._answer.set_content(await computed(self._jobs, settings, command, options, lines))
 
 
 def _stored(path: Path) -> Any:

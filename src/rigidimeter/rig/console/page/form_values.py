@@ -43,6 +43,26 @@ def parse_number(text: str, what: str) -> float:
     return value
 
 
+def parse_numbers(text: str, what: str) -> list[float]:
+    """Return the times that were entered, with semicolons between them.
+
+    Raises
+    ------
+    UserError
+        If there is none, one is no number, or a comma may be a point or a semicolon.
+    """
+    parts = [part for part in text.split(";") if part.strip()]
+    if not parts:
+        raise UserError(f"{what}: write times in s, such as 10; 20")
+    before, comma, behind = text.strip().partition(",")
+    if comma and len(parts) == 1 and len(behind) > 1:
+        raise UserError(
+            f"{what}: {text.strip()} may be one time, {before}.{behind}, or two, "
+            f"{before}; {behind}; write it with a point or a semicolon"
+        )
+    return [parse_number(part, what) for part in parts]
+
+
 def parse_integer(text: str, what: str) -> int:
     """Return the whole number that was entered.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from datetime import UTC, datetime
-from html import escape
 from typing import Any
 
 from nicegui import ui
@@ -12,7 +11,6 @@ from nicegui import ui
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.study_files import (
-    PLAN_COLUMNS,
     PLAN_FILE,
     PLAN_TABLE,
     STIMULATION_TABLE,
@@ -32,6 +30,7 @@ from rigidimeter.core.study_files import (
 from rigidimeter.rig.console.page.form_values import parse_line
 from rigidimeter.rig.console.page.jobs import Jobs
 from rigidimeter.rig.console.page.page_messages import duration
+from rigidimeter.rig.console.page.plan_table import plan_table
 from rigidimeter.rig.console.page.rig_steps import start_refusal
 from rigidimeter.rig.console.page.rig_view import RigView
 from rigidimeter.rig.console.page.server_state import ServerState, StartRequest
@@ -134,7 +133,7 @@ class PlanView:
             names = {f"{row[0]}/{row[1]}": (row[0], int(row[1])) for row in rows}
             chosen = self._named.value if self._named.value in names else _DUE
             self._named.set_options([_DUE, *names], value=chosen)
-            self._table.set_content(_table(rows))
+            self._table.set_content(plan_table(rows))
             self._due = next_block(plan, subject, names.get(chosen), recorded)
             if self._due is not None:
                 self._begun = begun_session(plan, self._due, datetime.now(UTC))
@@ -282,11 +281,3 @@ class PlanView:
         if errors:
             raise UserError(*errors.values())
         return {"range": found}
-
-
-def _table(rows: list[tuple[str, ...]]) -> str:
-    """Return the plan of a subject as a table of the page."""
-    heads = "".join(f"<th>{escape(name)}</th>" for name in PLAN_COLUMNS)
-    cells = ("".join(f"<td>{escape(cell)}</td>" for cell in row) for row in rows)
-    lines = "".join(f"<tr>{row}</tr>" for row in cells)
-    return f"<table><thead><tr>{heads}</tr></thead><tbody>{lines}</tbody></table>"

@@ -26,6 +26,7 @@ from rigidimeter.core.version import __version__
 from rigidimeter.rig.console.page.access import AccessCheck, bound_connections, in_url
 from rigidimeter.rig.console.page.after_view import AfterView
 from rigidimeter.rig.console.page.before_view import BeforeView
+from rigidimeter.rig.console.page.draw_view import DrawView
 from rigidimeter.rig.console.page.jobs import Jobs
 from rigidimeter.rig.console.page.live_socket import LiveSockets
 from rigidimeter.rig.console.page.page_token import require_token
@@ -203,7 +204,13 @@ def show_page(state: ServerState, jobs: Jobs, secret: str) -> None:
     ui.html(_during(), sanitize=False).classes("rig")
     with ui.element("section").classes("view").props("id=view-before"):
         unfinished = ui.label("").classes("problem").props('role="status"')
-        (PlanView if state.place.planned else BeforeView)(state, jobs, in_control)
+        if state.place.planned:
+            PlanView(state, jobs, in_control)
+        else:
+            if not state.place.one_session:
+                with ui.expansion("Plan the days").classes("w-full").props("dense"):
+                    DrawView(state, jobs, in_control)
+            BeforeView(state, jobs, in_control)
     with ui.element("section").classes("view").props("id=view-after"):
         AfterView(state, jobs, in_control, unfinished)
 

@@ -23,6 +23,7 @@ from rigidimeter.rig.console.page.form_values import (
     parse_line,
     parse_name,
     parse_number,
+    parse_numbers,
 )
 from rigidimeter.rig.devices import MotionRange
 
@@ -200,7 +201,7 @@ def read_form(form: Mapping[str, str], base: Settings) -> EnteredSession:
         blocks.append({"task": form[f"task{k}"], "condition": condition, "epochs": epochs})
     changes.setdefault("protocol", {})["blocks"] = blocks
     if form.get("rests", "").strip() != shown["rests"]:
-        changes["protocol"]["rests_s"] = read("rests", _numbers, "rests")
+        changes["protocol"]["rests_s"] = read("rests", parse_numbers, "rests")
     about: dict[str, Any] = {
         "subject": read("subject", parse_name, "subject"),
         "operator": read("operator", _needed, "operator"),
@@ -256,19 +257,6 @@ def _placed(text: str, fields: Sequence[Field]) -> dict[str, str]:
         key = next((places[path] for path in places if path in part), key)
         found.setdefault(key, []).append(part)
     return {key: "; ".join(parts) for key, parts in found.items()}
-
-
-def _numbers(text: str, what: str) -> list[float]:
-    parts = [part for part in text.split(";") if part.strip()]
-    if not parts:
-        raise UserError(f"{what}: write times in s, such as 10; 20")
-    before, comma, behind = text.strip().partition(",")
-    if comma and len(parts) == 1 and len(behind) > 1:
-        raise UserError(
-            f"{what}: {text.strip()} may be one time, {before}.{behind}, or two, "
-            f"{before}; {behind}; write it with a point or a semicolon"
-        )
-    return [parse_number(part, what) for part in parts]
 
 
 def read_range(
