@@ -17,7 +17,7 @@ from rigidimeter.analysis.reading import ReadOptions, estimates_document, read_r
 from rigidimeter.cli.main import app
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.findings import Finding
-from rigidimeter.core.records import Analysis, Delay, Fit, Outcome, Score
+from rigidimeter.core.records import Activity, Analysis, Delay, Fit, Outcome, Score
 from rigidimeter.core.session import SAMPLE_UNITS, SessionWriter, read_events, read_manifest
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.study_files import STUDY_SCHEMA
@@ -86,8 +86,10 @@ def test_the_keys_of_the_estimates_are_documented() -> None:
 def test_the_columns_of_a_batch_are_documented() -> None:
     named, columns = list(table(FILES, "Batch table")), list(batch_columns())
     assert named == columns[:10] + columns[-4:]
-    numbers = set(columns[10:-4])
-    assert numbers == {*_analysis().rows()[0], *_analysis().scores[0].row()} - set(columns[:10])
+    emg = Activity((), 0.0, 0.0).row()
+    of_each = {*_analysis().rows()[0], *_analysis().scores[0].row(), *emg}
+    assert set(columns[10:-4]) == of_each - set(columns[:10])
+    assert all(f"`{name}`" in FILES.read_text("utf-8") for name in emg)
 
 
 def test_the_keys_of_the_comparisons_are_documented(tmp_path: Path) -> None:

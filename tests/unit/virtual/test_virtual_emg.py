@@ -12,6 +12,7 @@ from tests.replayed import assert_folder_replayed
 
 import rigidimeter as rm
 from rigidimeter.analysis.export import sessions_of_recording
+from rigidimeter.analysis.export.nwb import write_nwb
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import EMG, EmgLog, read_session_files, recover
 from rigidimeter.core.settings import Settings, dump_settings, parse_settings
@@ -63,6 +64,20 @@ def test_it_is_exported_with_the_session(folder: Path):
     assert list(emg.columns) == ["emg_v", "emg_2_v"]
     assert session.about["units"]["emg_2_v"] == "V"
     assert session.about["settings"]["emg"]["muscles"] == ["biceps", "triceps"]
+
+
+def test_its_nwb_file_is_read_as_the_session(folder: Path, tmp_path: Path):
+    pytest.importorskip("pynwb", reason="pip install 'rigidimeter[nwb]'")
+    (session,) = sessions_of_recording(rm.read(folder), None)
+    write_nwb(session, tmp_path / "session.nwb")
+    found = rm.read(tmp_path / "session.nwb")
+    assert not [notice for notice in found.notices if "EMG" in notice.text]
+    for epoch, own in zip(found.epochs, rm.read(folder).epochs, strict=True):
+        for name in ("emg_v", "emg_2_v"):
+            one, recorded = epoch.channels[name], own.channels[name]
+            at = np.searchsorted(one.time_s, recorded.time_s[5:-5] - 1e-5)
+            np.testing.assert_array_equal(one.values[at], recorded.values[5:-5])
+            np.testing.assert_allclose(one.time_s[at], recorded.time_s[5:-5], atol=1e-6)
 
 
 def test_a_session_without_emg_is_as_before(tmp_path: Path):

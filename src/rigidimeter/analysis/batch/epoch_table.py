@@ -13,11 +13,14 @@ from pathlib import Path
 from rigidimeter.analysis.batch.parts import Row
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import as_read, csv_text, in_place
-from rigidimeter.core.records import AMPLITUDE, Analysis, Fit, Outcome, Score
+from rigidimeter.core.records import AMPLITUDE, Activity, Analysis, Fit, Outcome, Score
 
 ENDINGS = (".parquet", ".csv")
 BATCH_SCHEMA = "rigidimeter.batch/1"
 
+_NO_ACTIVITY = Activity((), math.nan, math.nan)
+_NEWER = frozenset({*AMPLITUDE, *_NO_ACTIVITY.row()})
+"""Columns that older tables lack."""
 _ROWS = 2_000
 """Rows in memory at a time."""
 
@@ -30,7 +33,7 @@ _LAST = ("notices", "sha256", "settings_sha256", "version")
 def columns() -> dict[str, type]:
     """Return every column with the type of its cells, in order."""
     named = "", "", ""
-    fit = Fit(*named, "", Outcome("failed"))
+    fit = Fit(*named, "", Outcome("failed"), activity=_NO_ACTIVITY)
     cells = Analysis("", (fit,), (fit,), math.nan, ()).rows()[0]
     cells |= Score(*named, Outcome("failed")).row()
     types = {name: type(value) for name, value in cells.items() if name not in _FIRST}
@@ -111,12 +114,12 @@ def _read_parquet(path: Path) -> Iterator[Row]:
 def _read_csv(path: Path) -> Iterator[Row]:
     with path.open(encoding="utf-8", newline="") as file:
         reader = csv.DictReader(file, strict=True)
-        named = {name: kind for name, kind in columns().items() if name not in AMPLITUDE}
-        if [name for name in reader.fieldnames or () if name not in AMPLITUDE] != [*named]:
+        named = [name for name in columns() if name not in _NEWER]
+        if [name for name in reader.fieldnames or () if name not in _NEWER] != named:
             raise ValueError("its columns are others")
         for row in reader:
             yield {
                 name: as_read(cell) if kind is str else kind(cell)
                 for name, kind in columns().items()
-                if (cell := row.get(name))  # older tables have no amplitude
+                if (cell := row.get(name))
             }

@@ -10,6 +10,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from tests.known_joint import TRUTH
 from tests.unit.analysis.batch.conftest import write_recording
@@ -38,6 +39,28 @@ def test_rows_are_what_estimate_gives(archive: Path, tmp_path: Path) -> None:
     values = found[[*NUMBERS]].to_numpy()
     errors = found[[f"{name}_se" for name in NUMBERS]].to_numpy()
     assert np.all(np.abs(values - TRUTH) < 5 * errors)
+
+
+@pytest.mark.parametrize("ending", ["parquet", "csv"])
+def test_rows_have_what_the_emg_shows(archive: Path, tmp_path: Path, ending: str) -> None:
+    """Of the one recording with EMG; the others have nothing there."""
+    path = archive / "day-1" / "elbow.csv"
+    head, *lines = path.read_text().splitlines()
+    rng = np.random.default_rng(5)
+    volts = 1e-5 * rng.standard_normal((len(lines), 2))
+    volts[300:500] *= 20.0
+    one_epoch = [line.removesuffix("2") + "1" * line.endswith("2") for line in lines]  # of 12 s
+    with_emg = [f"{line},{one},{two}" for line, (one, two) in zip(one_epoch, volts, strict=True)]
+    path.write_text("\n".join([f"{head},emg_v,emg_2_v", *with_emg]) + "\n")
+    found = rm.batch(archive, tmp_path / f"out.{ending}").table()
+    own, others = found[found["input"] == str(path)], found[found["input"] != str(path)]
+    for row, fit in zip(own.to_dict("records"), rm.estimate(rm.read(path)).fits, strict=True):
+        for name, value in fit.activity.row().items():
+            assert row[name] == value or (not value and pd.isna(row[name])), name
+    assert own["active_left_out_percent"].tolist()[0] > 8
+    assert own["cocontraction_percent"].min() > 0
+    assert "emg_2_v" in own["active_stretches"].tolist()[0]
+    assert others["active_percent"].isna().all()
 
 
 def test_two_processes_write_the_same_bytes(archive: Path, tmp_path: Path) -> None:

@@ -46,7 +46,7 @@ from rigidimeter.analysis.reading.formats.cutting import unused_labels
 from rigidimeter.analysis.reading.formats.read_options import ReadOptions
 from rigidimeter.analysis.reading.formats.table import Table
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.records import Notice
+from rigidimeter.core.records import EMG_CHANNELS, Notice
 
 Array = NDArray[np.float64]
 
@@ -212,15 +212,17 @@ def may_be_ticks(raw: Mapping[str, Array]) -> bool:
 
 
 def _about_emg(table: Table, values: Mapping[str, Array]) -> list[Notice]:
-    emg = np.abs(values.get("emg_v", np.empty(0)))
-    largest = float(np.max(emg, initial=0.0, where=np.isfinite(emg)))
-    if largest <= LARGEST_EMG_V:
-        return []
-    text = (
-        f"{table.source}: emg_v reaches {largest:.4g} V, which looks like microvolts: say --unit "
-        "emg=uV"
-    )
-    return [Notice("warning", text)]
+    notices = []
+    for standard in (name for name in EMG_CHANNELS if name in values):
+        emg = np.abs(values[standard])
+        largest = float(np.max(emg, initial=0.0, where=np.isfinite(emg)))
+        if largest > LARGEST_EMG_V:
+            text = (
+                f"{table.source}: {standard} reaches {largest:.4g} V, which looks like microvolts: "
+                f"say --unit {BY_STANDARD[standard].name}=uV"
+            )
+            notices.append(Notice("warning", text))
+    return notices
 
 
 def _time(

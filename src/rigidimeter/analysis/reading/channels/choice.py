@@ -10,9 +10,10 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from rigidimeter.analysis.reading.channels.conversion import EXAMPLE_ARM, Conversion, conversion
+from rigidimeter.analysis.reading.channels.emg_columns import emg_columns, of_every_muscle
 from rigidimeter.analysis.reading.channels.headers import Header, fits, read_header
 from rigidimeter.analysis.reading.channels.lever_arm import lever_arm
 from rigidimeter.analysis.reading.channels.quantities import BY_STANDARD, QUANTITIES
@@ -20,6 +21,7 @@ from rigidimeter.analysis.reading.channels.stated_scale import stated_scale
 from rigidimeter.analysis.reading.channels.unit_text import expression, ratio
 from rigidimeter.analysis.reading.formats.table import Table, alike, nearest
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.records import EMG_CHANNELS
 
 LABELS = ("epoch", "condition", "task")
 MOTION = ("velocity_rad_s", "angle_rad")
@@ -118,13 +120,33 @@ def choose(table: Table, said: Said, has_rate: bool = False) -> Choice:
             choice.taken[label] = Taken(label, name)
     used = set(said.columns.values())
     for quantity in QUANTITIES:
+        if quantity.standard in EMG_CHANNELS:
+            continue
         candidates = _candidates(table, quantity.standard, headers, said, used)
         if len(candidates) > 1:
             choice.several[quantity.standard] = candidates
         elif candidates:
             _take(table, choice, quantity.standard, candidates[0], headers[candidates[0]], said)
+    _take_emg(table, choice, headers, said, used)
     _settle(table, choice, said, has_rate)
     return choice
+
+
+def _take_emg(
+    table: Table, choice: Choice, headers: Mapping[str, Header], said: Said, used: set[str]
+) -> None:
+    said = replace(
+        said,
+        units=of_every_muscle(said.units),
+        scales=of_every_muscle(said.scales),
+        offsets=of_every_muscle(said.offsets),
+    )
+    known = frozenset({*used, *STANDARD, *OF_THE_DRIVE})
+    stated = frozenset({*said.units, *said.scales})
+    columns, unused = emg_columns(table, headers, said.columns, known, stated)
+    choice.unused += unused
+    for standard, column in columns.items():
+        _take(table, choice, standard, column, headers[column], said)
 
 
 def _candidates(
@@ -207,7 +229,7 @@ def _several(table: Table, standard: str, candidates: list[str]) -> str:
 def _not_needed(choice: Choice, has_rate: bool) -> set[str]:
     """Return the quantities that an estimate can do without, given the others."""
     stated = {name for name, taken in choice.taken.items() if taken.to_si is not None}
-    free = {"velocity_command_rad_s", "perturbation_nm", "emg_v"}
+    free = {"velocity_command_rad_s", "perturbation_nm", *EMG_CHANNELS}
     if stated & set(MOTION):
         free |= set(MOTION)
     return free | ({"time_s"} if has_rate else set())

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from rigidimeter.analysis.reading.formats.table import nearest
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.records import EMG_CHANNELS
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,10 @@ QUANTITIES = (
     Quantity("velocity", "velocity_rad_s", "radian/second", ("rad/s", "deg/s")),
     Quantity("velocity_command", "velocity_command_rad_s", "radian/second", ("rad/s", "deg/s")),
     Quantity("perturbation", "perturbation_nm", "newton*meter", ("Nm",)),
-    Quantity("emg", "emg_v", "volt", ("V", "mV")),
+    *(
+        Quantity("emg" if muscle == 1 else f"emg_{muscle}", standard, "volt", ("V", "mV"))
+        for muscle, standard in enumerate(EMG_CHANNELS, start=1)
+    ),
 )
 BY_STANDARD: Mapping[str, Quantity] = {one.standard: one for one in QUANTITIES}
 
