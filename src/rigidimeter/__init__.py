@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rigidimeter.analysis.batch import batch
     from rigidimeter.analysis.estimation import identify
     from rigidimeter.analysis.reading import data, read
-    from rigidimeter.analysis.report import report
+    from rigidimeter.analysis.report import plot, report
     from rigidimeter.analysis.study import compare, estimate
     from rigidimeter.planning import design
     from rigidimeter.virtual import simulate
@@ -41,6 +41,7 @@ __all__ = [
     "design",
     "estimate",
     "identify",
+    "plot",
     "read",
     "report",
     "simulate",
@@ -54,6 +55,7 @@ _ROOMS = {
     "compare": "rigidimeter.analysis.study",
     "simulate": "rigidimeter.virtual",
     "design": "rigidimeter.planning",
+    "plot": "rigidimeter.analysis.report",
     "report": "rigidimeter.analysis.report",
     "batch": "rigidimeter.analysis.batch",
 }

@@ -15,9 +15,8 @@ from pydantic_core import PydanticUndefined
 
 from rigidimeter.analysis.reading.channels.mapping_file import MappingToml
 from rigidimeter.core.settings import Settings
-from rigidimeter.core.study_files.day_plan import PlanToml
-from rigidimeter.core.study_files.study_toml import StudyToml
-from rigidimeter.rig.devices.rigfile import DRIVERS
+from rigidimeter.core.study_files import PlanToml, StudyToml
+from rigidimeter.rig.devices import DRIVERS
 
 HEAD = "| key | unit | allowed | default |\n| --- | --- | --- | --- |\n"
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+import rigidimeter
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import PARAMETERS, readonly
 from rigidimeter.core.session import Protocol
@@ -47,8 +48,7 @@ from rigidimeter.planning.search import Candidate, assess, check_criterion, opti
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from rigidimeter.core.drawing import Axes
+    from matplotlib.axes import Axes
 
 _METHODS = ("bound", "iv", "least_squares")
 
@@ -162,9 +162,7 @@ class Design:
         -------
         array of matplotlib Axes, shape (3,)
         """
-        from rigidimeter.core.drawing import plots
-
-        return plots.plot_design(self, axes)
+        return rigidimeter.plot(self, axes=axes)
 
     def __repr__(self) -> str:
         """Return the perturbation and what one epoch will tell, as one line."""

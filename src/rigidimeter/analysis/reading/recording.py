@@ -11,6 +11,7 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
+import rigidimeter
 from rigidimeter.analysis.reading.channels.joining import join_tables, joined_options, offset_notice
 from rigidimeter.analysis.reading.channels.mapping_file import merged, read_mapping
 from rigidimeter.analysis.reading.formats import (
@@ -28,9 +29,8 @@ from rigidimeter.core.settings import Settings, load_settings, settings_from
 from rigidimeter.core.words import html_table, one_line, plural, short_names
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from numpy.typing import NDArray
-
-    from rigidimeter.core.drawing import Axes
 
 _RECORDED_WITH = ("controller", "guard", "prbs", "sinusoid", "rig")
 _ANALYSED_WITH = ("estimation", "scores")
@@ -97,9 +97,7 @@ class Recording:
         IndexError
             If there is no such epoch.
         """
-        from rigidimeter.core.drawing import plots
-
-        return plots.plot_recording(self, epoch, span_s, axes)
+        return rigidimeter.plot(self, epoch=epoch, span_s=span_s, axes=axes)
 
     def __repr__(self) -> str:
         """Return what was read as one line."""

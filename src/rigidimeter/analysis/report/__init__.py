@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from rigidimeter.analysis.report.contents import Figure, Section, paragraph
     from rigidimeter.analysis.report.make_report import report
     from rigidimeter.analysis.report.page import shown_tables, source_names
+    from rigidimeter.analysis.report.plots import plot
     from rigidimeter.analysis.report.report_folder import inputs_seen_from, why_not_own
     from rigidimeter.analysis.report.sections import SECTIONS
 
@@ -20,6 +21,7 @@ __all__ = [
     "Section",
     "inputs_seen_from",
     "paragraph",
+    "plot",
     "report",
     "shown_tables",
     "source_names",
@@ -32,6 +34,7 @@ __getattr__ = lazy_names(
         "contents": ("Figure", "Section", "paragraph"),
         "make_report": ("report",),
         "page": ("shown_tables", "source_names"),
+        "plots": ("plot",),
         "report_folder": ("inputs_seen_from", "why_not_own"),
         "sections": ("SECTIONS",),
     },

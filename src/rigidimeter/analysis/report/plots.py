@@ -6,8 +6,8 @@ the page. Nothing else of matplotlib's global state changes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, TypeVar, overload
 
 import matplotlib as mpl
 import numpy as np
@@ -91,7 +91,9 @@ def _draw(
         panels[0].set_title(drawable(title), loc="left")
 
 
-def plot_recording(recording: Recording, epoch: int, span_s: float | None, axes: Any) -> Panels:
+def plot_recording(
+    recording: Recording, epoch: int = 0, span_s: float | None = None, axes: Any = None
+) -> Panels:
     """Draw the channels of an epoch as they were recorded."""
     one = _at(recording.epochs, epoch)
     shown = {name: channel for name, channel in shown_channels(one).items() if len(channel)}
@@ -106,13 +108,13 @@ def plot_recording(recording: Recording, epoch: int, span_s: float | None, axes:
     return _plotted(axes, len(shown), size, *drawing, title=title, sharex=True)
 
 
-def plot_fit(fit: Fit, axes: Any) -> Panels:
+def plot_fit(fit: Fit, axes: Any = None) -> Panels:
     """Draw J, B and K in pairs."""
     _need_numbers(fit)
     return _plotted(axes, 3, (7.4, 2.7), draw_pairs, fit, columns=3)
 
 
-def plot_estimates(analysis: Analysis, axes: Any) -> Panels:
+def plot_estimates(analysis: Analysis, axes: Any = None) -> Panels:
     """Draw each quantity of every epoch."""
     results = analysis.fits or analysis.scores
     if not results:
@@ -123,7 +125,11 @@ def plot_estimates(analysis: Analysis, axes: Any) -> Panels:
 
 
 def plot_torque(
-    analysis: Analysis, recording: Recording, epoch: int, span_s: float | None, axes: Any
+    analysis: Analysis,
+    recording: Recording,
+    epoch: int = 0,
+    span_s: float | None = 7.0,
+    axes: Any = None,
 ) -> Panels:
     """Draw the measured and the modelled torque of an epoch, and the terms of the model."""
     if not isinstance(recording, Recording):
@@ -149,7 +155,9 @@ def plot_torque(
     return _plotted(axes, 5, TORQUE_SIZE, *drawing, title=title, sharex=True, height_ratios=heights)
 
 
-def plot_result(result: StudyResult, measures: Sequence[str] | None, axes: Any) -> Panels:
+def plot_result(
+    result: StudyResult, measures: Sequence[str] | None = None, axes: Any = None
+) -> Panels:
     """Draw every value of each measure by condition."""
     compared = [_compared(result, name) for name in measures or ()] or [
         c for c in result.comparisons if c.measure.origin != "ratings" and c.observations
@@ -161,28 +169,28 @@ def plot_result(result: StudyResult, measures: Sequence[str] | None, axes: Any) 
     return _plotted(axes, len(compared), size, draw_comparisons, *shown, columns=3)
 
 
-def plot_days(result: StudyResult, measure: str, ax: Any) -> Axes:
+def plot_days(result: StudyResult, measure: str = "stiffness_nm_rad", axes: Any = None) -> Axes:
     """Draw a measure day by day."""
     c = _compared(result, measure)
     if not c.day_medians:
         raise ValueError(f"{measure} has no days: they are known of a study folder alone")
     order = [condition_name(name) for name in result.condition_names]
-    axes: Axes = _plotted(ax, 1, (7.4, 2.9), draw_days, c, order)[0]
-    return axes
+    drawn: Axes = _plotted(axes, 1, (7.4, 2.9), draw_days, c, order)[0]
+    return drawn
 
 
-def plot_effects(result: StudyResult, ax: Any) -> Axes:
+def plot_effects(result: StudyResult, axes: Any = None) -> Axes:
     """Draw the effect size of each measure with its interval."""
     found = [(c, c.effects) for c in result.comparisons if c.effects is not None]
     if not found:
         why = next((c.remark for c in result.comparisons if c.remark), "nothing was compared")
         raise ValueError(f"no measure has an effect size: {why}")
     drawing = draw_effects, found, effects_label(result)
-    axes: Axes = _plotted(ax, 1, effects_size(len(found)), *drawing)[0]
-    return axes
+    drawn: Axes = _plotted(axes, 1, effects_size(len(found)), *drawing)[0]
+    return drawn
 
 
-def plot_design(design: Design, axes: Any) -> Panels:
+def plot_design(design: Design, axes: Any = None) -> Panels:
     """Draw the perturbation, its beginning and complete, and its spectrum."""
     prbs, rate_hz = design.settings.prbs, design.settings.rig.tick_rate_hz
     values = design.perturbation_nm
@@ -190,6 +198,55 @@ def plot_design(design: Design, axes: Any) -> Panels:
     shown = channel, 0.0, (prbs.wanted_low_hz, prbs.wanted_high_hz)
     heights = EXCITATION_HEIGHTS
     return _plotted(axes, 3, EXCITATION_SIZE, draw_excitation, *shown, height_ratios=heights)
+
+
+DRAWINGS: Mapping[type, Mapping[str, Callable[..., Any]]] = {
+    Recording: {"": plot_recording},
+    Fit: {"": plot_fit},
+    Analysis: {"": plot_estimates, "torque": plot_torque},
+    StudyResult: {"": plot_result, "days": plot_days, "effects": plot_effects},
+    Design: {"": plot_design},
+}
+"""What can be drawn of what: the first of each is drawn where none is named."""
+
+
+@overload
+def plot(x: Any, what: Literal["days", "effects"], **options: Any) -> Axes: ...
+@overload
+def plot(x: Any, what: Literal["", "torque"] = "", **options: Any) -> Panels: ...
+def plot(x: Any, what: str = "", **options: Any) -> Panels | Axes:
+    """Draw a recording, a fit, estimates, a comparison or a design.
+
+    Parameters
+    ----------
+    x : Recording, Fit, Analysis, StudyResult or Design
+    what : str
+        Of estimates ``"torque"``, of a comparison ``"days"`` or ``"effects"``; by default what the
+        method `plot` of `x` draws.
+    **options
+        Those of the method of `x` that draws the same, such as `plot_days`, and `axes`.
+
+    Returns
+    -------
+    array of matplotlib Axes, or Axes
+        Drawn on those of `axes`, or on those of a new figure.
+
+    Raises
+    ------
+    TypeError
+        If there is no drawing of such an object.
+    ValueError
+        If there is none of this name, or nothing to draw.
+    """
+    drawings = next((one for kind, one in DRAWINGS.items() if isinstance(x, kind)), None)
+    if drawings is None:
+        known = ", ".join(kind.__name__ for kind in DRAWINGS)
+        raise TypeError(f"plot draws {known}; got {type(x).__name__}")
+    if what not in drawings:
+        known = ", ".join(map(repr, drawings))
+        raise ValueError(f"what = {what!r}: of {type(x).__name__} there are {known}")
+    drawn: Panels | Axes = drawings[what](x, **options)
+    return drawn
 
 
 def _at(each: Sequence[_One], place: int) -> _One:

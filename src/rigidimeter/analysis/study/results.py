@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from html import escape
 from typing import TYPE_CHECKING, Any, Literal
 
+import rigidimeter
 from rigidimeter.analysis.estimation.prepared import PreparedEpoch
 from rigidimeter.analysis.statistics import EffectDifference
 from rigidimeter.analysis.study.compared import Comparison, comparison_rows
@@ -20,10 +21,10 @@ from rigidimeter.core.words import html_table, one_line, with_error
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
     from rigidimeter.analysis.study.statements import Statements
-    from rigidimeter.core.drawing import Axes
 
 _READ = (
     *("measure", "unit", "reference", "other", "value_reference", "value_other"),
@@ -333,9 +334,7 @@ class StudyResult:
         ValueError
             If a measure was not compared.
         """
-        from rigidimeter.core.drawing import plots
-
-        return plots.plot_result(self, measures, axes)
+        return rigidimeter.plot(self, measures=measures, axes=axes)
 
     def plot_days(self, measure: str = "stiffness_nm_rad", *, ax: Axes | None = None) -> Axes:
         """Draw a measure day by day: every value a point, and each day's median and quartiles.
@@ -347,9 +346,7 @@ class StudyResult:
         ValueError
             If the measure was not compared, or days are not known, as they are of a study folder.
         """
-        from rigidimeter.core.drawing import plots
-
-        return plots.plot_days(self, measure, ax)
+        return rigidimeter.plot(self, "days", measure=measure, axes=ax)
 
     def plot_effects(self, *, ax: Axes | None = None) -> Axes:
         """Draw the effect size r of each measure with its 95 % interval.
@@ -359,9 +356,7 @@ class StudyResult:
         ValueError
             If no measure was tested.
         """
-        from rigidimeter.core.drawing import plots
-
-        return plots.plot_effects(self, ax)
+        return rigidimeter.plot(self, "effects", axes=ax)
 
     def __repr__(self) -> str:
         """Return the medians of both conditions in each measure as one line."""

@@ -9,6 +9,7 @@ from html import escape
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import rigidimeter
 from rigidimeter.core.findings import SERIOUS_FIRST, Finding
 from rigidimeter.core.records.epochs import Axis
 from rigidimeter.core.records.estimates import (
@@ -35,9 +36,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
+    from matplotlib.axes import Axes
     from numpy.typing import NDArray
-
-    from rigidimeter.core.drawing import Axes
 
 _MAX_SHOWN = 20
 """Epochs shown one by one; of more only the first are."""
@@ -311,9 +311,7 @@ class Analysis:
         ValueError
             If there is no epoch.
         """
-        from rigidimeter.core.drawing import plots
-
-        return plots.plot_estimates(self, axes)
+        return rigidimeter.plot(self, axes=axes)
 
     def plot_torque(
         self,
@@ -347,9 +345,8 @@ class Analysis:
         ValueError
             If the epoch has no numbers, or is not in the recording.
         """
-        from rigidimeter.core.drawing import plots
-
-        return plots.plot_torque(self, recording, epoch, span_s, axes)
+        options = {"recording": recording, "epoch": epoch, "span_s": span_s, "axes": axes}
+        return rigidimeter.plot(self, "torque", **options)
 
     def __repr__(self) -> str:
         """Return how many epochs there are, and what each condition gives, as one line."""

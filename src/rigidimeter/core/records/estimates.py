@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+import rigidimeter
 from rigidimeter.core.findings import Finding, Three
 from rigidimeter.core.records.activity import Activity
 from rigidimeter.core.records.epochs import Outcome, readonly
@@ -19,7 +20,7 @@ from rigidimeter.core.words import html_table, interval_text, number, one_cell, 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from rigidimeter.core.drawing import Axes
+    from matplotlib.axes import Axes
 
 
 class Parameter(NamedTuple):
@@ -258,9 +259,7 @@ class Fit:
         ValueError
             If the fit has no numbers.
         """
-        from rigidimeter.core.drawing import plots
-
-        return plots.plot_fit(self, axes)
+        return rigidimeter.plot(self, axes=axes)
 
     def row(self) -> dict[str, Any]:
         """Return the names and numbers of the fit, as files and tables have them."""

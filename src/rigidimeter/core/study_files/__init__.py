@@ -70,6 +70,7 @@ from rigidimeter.core.study_files.study_toml import (
     STUDY_SCHEMA,
     ConditionTable,
     PrimaryTable,
+    StudyToml,
     SubjectTable,
     is_outside,
     is_own,

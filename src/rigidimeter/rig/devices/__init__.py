@@ -96,5 +96,5 @@ from rigidimeter.rig.devices.motion_range import (
     require_within,
 )
 from rigidimeter.rig.devices.rig_lock import RigLock, lock_path
-from rigidimeter.rig.devices.rigfile import RigFile, load_rig
+from rigidimeter.rig.devices.rigfile import DRIVERS, RigFile, load_rig
 from rigidimeter.rig.devices.simulated import SimulatedRig

@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from tests.unit.analysis.report.cohorts import Design, made_study
 
+import rigidimeter as rm
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.analysis.study import StudyResult
 from rigidimeter.core.records import Analysis, Epoch, Fit, Outcome
@@ -85,6 +86,19 @@ def test_all_draw_on_a_figure_of_pyplot_or_on_the_axes_that_they_are_given(
         for axes, alike in zip(own, np.ravel(given), strict=True):
             assert axes.get_ylabel() == alike.get_ylabel(), name
             assert len(axes.lines) == len(alike.lines), name
+
+
+def test_the_front_door_draws_what_the_methods_draw(
+    study: StudyResult, cohort: StudyResult
+) -> None:
+    labels = [ax.get_ylabel() for ax in rm.plot(study)]
+    assert labels == [ax.get_ylabel() for ax in study.plot()]
+    days = rm.plot(cohort, "days", measure="damping_nm_s_rad")
+    assert marked(days) == marked(cohort.plot_days("damping_nm_s_rad"))
+    with pytest.raises(TypeError, match="plot draws Recording, Fit, Analysis"):
+        rm.plot(3)
+    with pytest.raises(ValueError, match="what = 'hours': of StudyResult there are '', 'days'"):
+        rm.plot(study, "hours")
 
 
 def test_each_axis_says_what_it_shows_and_in_what_unit(
