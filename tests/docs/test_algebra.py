@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.core.settings import parse_settings
-from rigidimeter.model.linear_loop import Loop
+from rigidimeter.model import Loop
 
 J_B_K = np.array([0.0045, 0.1368, 1.751])
 DRAWS = 1000

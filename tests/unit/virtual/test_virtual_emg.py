@@ -11,8 +11,7 @@ import pytest
 from tests.replayed import assert_folder_replayed
 
 import rigidimeter as rm
-from rigidimeter.analysis.export import sessions_of_recording
-from rigidimeter.analysis.export.nwb import write_nwb
+from rigidimeter.analysis.export import format_named, sessions_of_recording
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import EMG, EmgLog, read_session_files, recover
 from rigidimeter.core.settings import Settings, dump_settings, parse_settings
@@ -69,7 +68,7 @@ def test_it_is_exported_with_the_session(folder: Path):
 def test_its_nwb_file_is_read_as_the_session(folder: Path, tmp_path: Path):
     pytest.importorskip("pynwb", reason="pip install 'rigidimeter[nwb]'")
     (session,) = sessions_of_recording(rm.read(folder), None)
-    write_nwb(session, tmp_path / "session.nwb")
+    format_named("nwb").write(session, tmp_path / "session.nwb")
     found = rm.read(tmp_path / "session.nwb")
     assert not [notice for notice in found.notices if "EMG" in notice.text]
     for epoch, own in zip(found.epochs, rm.read(folder).epochs, strict=True):
