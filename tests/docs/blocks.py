@@ -4,8 +4,9 @@
     python -m tests.docs.blocks --write    rewrite what differs
 
 Each document has a folder of its own. In it the blocks ``sh`` are run, and those in a comment,
-``<!-- sh``, which a reader does not see; ``toml NAME`` is written as a file. A block
-``text output`` shows what the commands since the last one printed.
+``<!-- sh``, which a reader does not see (``<!-- sh quiet``: nor what it prints); ``toml NAME`` is
+written as a file. A block ``text output`` shows what the commands since the last one printed. A
+block after ``<!-- not run -->`` needs a rig, or a study of the reader's.
 """
 
 from __future__ import annotations
@@ -28,13 +29,26 @@ from tests.docs.markdown import ROOT
 from rigidimeter.cli.main import main
 
 TUTORIALS = ROOT / "docs" / "tutorials"
-RUN = (TUTORIALS / "first-study.md", TUTORIALS / "operator-day.md")
+HOW_TO = ROOT / "docs" / "how-to"
+RUN = (
+    TUTORIALS / "first-study.md",
+    TUTORIALS / "operator-day.md",
+    HOW_TO / "after-a-change.md",
+    HOW_TO / "count-the-days.md",
+    HOW_TO / "design-an-experiment.md",
+    HOW_TO / "optimise-the-perturbation.md",
+    HOW_TO / "plan-the-days.md",
+    HOW_TO / "undo.md",
+)
+
+NOT_RUN = "<!-- not run -->\n"
 
 _BLOCK = re.compile(r"^(?:```|<!-- (?=sh))([^\n]*)\n(.*?)^(?:```|-->)$", re.DOTALL | re.M)
 _NUMBER = re.compile(r"(?<![\w-])[+−-]?\d+(?:[.,]\d+)?(?![\w.]\d)")
 _TOOK = re.compile(r"(?<=Done in )\d+(?= s)")
 _VARIES = (
     (_TOOK, "…"),
+    (re.compile(r"(?<= in )[\d.]+ s, \d+ times(?= real time)"), "…"),
     (re.compile(r"\d{4}-\d\d-\d\d|\d\d:\d\d(:\d\d)?"), "…"),
 )
 _LAST_PLACES = 5.0
@@ -64,11 +78,14 @@ def run(path: Path, folder: Path) -> Iterator[Shown]:
     RuntimeError
         If a command ends with another status than 0.
     """
-    printed = ""
-    for block in _BLOCK.finditer(path.read_text("utf-8")):
+    printed, text = "", path.read_text("utf-8")
+    for block in _BLOCK.finditer(text):
         kind, _, more = block[1].partition(" ")
+        if text[: block.start()].endswith(NOT_RUN):
+            continue
         if kind == "sh":
-            printed += "".join(_command(line, folder) for line in lines_of(block[2]))
+            said = [_command(line, folder) for line in lines_of(block[2])]
+            printed += "" if more == "quiet" else "".join(said)
         elif kind == "toml" and more:
             (folder / more).write_text(block[2], "utf-8")
         elif block[1] == "text output":

@@ -88,6 +88,8 @@ def test_a_command_line_is_one_that_exists(where: str, words: list[str]) -> None
         assert module.with_suffix(".py").is_file() or (module / "__main__.py").is_file(), where
     elif words[0] == "python":
         assert (ROOT / words[1]).is_file(), where
+    elif words == ["rigidimeter", "--version"]:
+        assert "--version" in help_of()
     elif words[0] == "rigidimeter":
         if words[1] == "--load":  # an option of every command
             assert "--load" in help_of()

@@ -1,12 +1,13 @@
-"""Measure every fault's reaction and write the tables of two pages of `docs/reference`.
+"""Measure every fault's reaction and write the tables of three pages.
 
     python -m tests.faults.measure              runs the tests, about four minutes
     python -m tests.faults.measure LINES.jsonl  takes what a run noted
     python -m tests.faults.measure --pause      only whoever leads a session is gone, two minutes
 
-The faults go to `hazards.md`, every case to `guard-laws.md`; only what stands between the two marks
-of a page is replaced. So is, between two others of `hazards.md`, what follows when whoever leads a
-session is gone, at twenty random moments of it; a simulated clock gives the same numbers each time.
+The faults go to `faults.md`, in short to `hazards.md`, every case to `guard-laws.md`; only what
+stands between the two marks of a page is replaced. So is, between two others of `faults.md`, what
+follows when whoever leads a session is gone, at twenty random moments of it; a simulated clock
+gives the same numbers each time.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import re
 import subprocess
 import sys
 import tempfile
@@ -27,6 +29,7 @@ from tests.faults.torque_faults import table as torque_faults
 
 ROOT = Path(__file__).parents[2]
 HAZARDS = ROOT / "docs" / "reference" / "hazards.md"
+FAULTS_PAGE = ROOT / "docs" / "development" / "faults.md"
 GUARD_LAWS = ROOT / "docs" / "development" / "guard-laws.md"
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 
@@ -78,6 +81,24 @@ FAULTS: dict[int, tuple[str, str, str]] = {
          "guard: single samples far from those around them", "SH"),
 }  # fmt: skip
 """Fault, what detects it, reaction: S0, S1 and SH as in the document."""
+
+IN_SHORT: tuple[tuple[str, str, tuple[int, ...]], ...] = (
+    ("emergency stop pressed", "S0", (18,)),
+    ("a value that is no number; sensor or drive reports an error", "S1", (1, 4, 7)),
+    ("sensor frozen, silent or late", "S1", (2, 3, 5, 27)),
+    ("drive silent", "S1, enable contact opened", (8,)),
+    ("computer hangs, or the program is killed", "the drive's own watchdog", (9,)),
+    ("ticks too late", "S1", (11,)),
+    ("the angle jumps, or the motion is not as commanded", "S1", (14, 15)),
+    ("slow motion that nobody commanded", "S1", (24,)),
+    ("velocity that is not the angle's", "S1", (25,)),
+    ("torque of the wrong sign, gain 0, or 1 s late; relaxed subject", "S1", (26,)),
+    ("spasm, tremor, oscillation: torque, power, energy", "SH or S1 by limit", (16, 17)),
+    ("operator's page or console lost", "S1", (19,)),
+    ("disk full, recorder lost", "S1", (21,)),
+    ("the arm runs into the position limit", "limited; the epoch is excluded", (13,)),
+)
+"""What fails, as a user names it, the reaction, and the faults of the long table."""
 
 VIRTUAL_CANNOT = "the simulated rig runs in the loop's process"
 NOT_CARRIED = {
@@ -141,6 +162,22 @@ def _cell(number: int, rig: str, notes: list[dict[str, Any]]) -> str:
     return "<br>".join(parts) or "<br>".join(dict.fromkeys(note["case"] for note in notes))
 
 
+def in_short(long_table: str) -> str:
+    """Return the table for users: of several faults the slowest, over RDT and CANopen."""
+    of = {}
+    for line in long_table.splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if cells[0].isdigit():
+            of[int(cells[0])] = cells[5]
+    lines = ["| what fails | reaction | at rest within |", "| --- | --- | ---: |"]
+    for words, reaction, faults in IN_SHORT:
+        found = [re.search(r"at rest (?:\d+–)?(\d+) ms", of[fault]) for fault in faults]
+        slowest = max((int(rest[1]) for rest in found if rest), default=None)
+        rest = of[faults[0]] if slowest is None else f"{slowest} ms"
+        lines.append(f"| {words} | {reaction} | {rest} |")
+    return "\n".join(lines)
+
+
 def _ms(least: float, most: float) -> str:
     # Where the fault's own time is nominal, a sample may seem to come before it.
     low, high = max(0, round(1e3 * least)), max(0, round(1e3 * most))
@@ -180,7 +217,7 @@ def measure_pauses() -> None:
                 cases.append(closed(Path(folder), how, phase, at_s))
     found = pause_table(cases)
     print(found)
-    between_the_marks(HAZARDS, found, "operator gone")
+    between_the_marks(FAULTS_PAGE, found, "operator gone")
 
 
 def main() -> None:
@@ -196,7 +233,8 @@ def main() -> None:
     load = os.getloadavg()[0]
     python = f"Python {platform.python_version()}, {os.cpu_count()} processors, load {load:.1f}"
     measured = f"Measured with {python}; {len(notes)} cases."
-    between_the_marks(HAZARDS, f"{measured}\n\n{table(notes)}")
+    between_the_marks(FAULTS_PAGE, f"{measured}\n\n{table(notes)}")
+    between_the_marks(HAZARDS, in_short(table(notes)))
     between_the_marks(GUARD_LAWS, cases(notes))
     between_the_marks(GUARD_LAWS, torque_faults(), "torque faults")
 

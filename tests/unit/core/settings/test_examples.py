@@ -59,7 +59,7 @@ def fits(found: tuple[float, ...], guard: GuardSettings) -> bool:
 
 
 def test_the_guard_leaves_room_for_someone_who_resists(human: Settings) -> None:
-    """The numbers are those of docs/how-to/run-a-session.md."""
+    """The numbers are those of docs/how-to/limit-the-motion.md."""
     arm = human.subject["OFF"]
     relaxed, resisting = peaks(human, arm, 0.0), peaks(human, arm, RESISTS_NM)
     assert relaxed == pytest.approx((3.35, 6.1, 3.1), abs=0.05)
