@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from playwright.sync_api import expect
-from tests.console.opened import STARTS_S, Console, fill, open_page
+from tests.console.opened import STARTS_S, Console, open_page
 from tests.console.operator_day import command, leave_out, opened_session, over
 
 from rigidimeter.core.session import read_manifest
@@ -38,11 +38,15 @@ def test_a_blinded_session_of_a_plan(chromium, tmp_path):
         page.get_by_text("The wait of 60 min has not begun").wait_for()
         start = page.get_by_role("button", name="Start session")
         expect(start).to_be_disabled()
+        page.get_by_text("A session outside the plan").click()
+        page.get_by_role("button", name="Start outside the plan").wait_for()
+        page.get_by_text("write a code of the plan: code-A, code-B").first.wait_for()
         seen.append(page.content())
+        page.get_by_text("A session outside the plan").click()
         # Whoever sets the stimulator is not blinded.
         assert command("study", "stimulation", study, "on").returncode == 0
         page.get_by_text("No wait is left").wait_for()
-        fill(page, "operator", "Kim")
+        page.locator("input[data-field=operator]").first.fill("Kim")
         start.click()
         page.wait_for_function("window.rigDrawnS > 0", timeout=1e3 * STARTS_S)
         expect(page.locator("#examiner")).to_have_attribute("placeholder", "planned: A, B")

@@ -135,7 +135,13 @@ def _planned(plan: StudyPlan, block: PlannedBlock, path: str, kind: str, detail:
 
 def _unplanned(entry: SessionEntry) -> Deviation:
     return Deviation(
-        entry.subject, entry.day, 0, entry.code, entry.path, "not planned", "is in no plan"
+        entry.subject,
+        entry.day,
+        0,
+        entry.code,
+        entry.path,
+        "not planned",
+        "was recorded and was not planned",
     )
 
 

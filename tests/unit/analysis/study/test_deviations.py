@@ -103,3 +103,19 @@ def test_a_rehearsed_plan_has_no_deviation(study: Path, tmp_path: Path) -> None:
     rehearsed = write_plan(folder, plan.about, plan.blocks[:4], protocols)
     assert len(rehearse(rehearsed, BEGIN)) == 4
     assert rm.compare(folder, resamples=0).deviations == ()
+
+
+def test_a_session_outside_of_the_plan_is_listed(study: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "planned"
+    shutil.copytree(study, folder)
+    run_virtual_session(
+        tiny("OFF", 9, epochs=1),
+        folder / "S01-20260108",
+        created_utc=(BEGIN + timedelta(days=3)).isoformat(),
+        about={"subject": "S01", "operator": "Kim", "day": "extra"},
+    )
+    extend_study(folder)
+    found = [one for one in rm.compare(folder, resamples=0).deviations if one.kind == "not planned"]
+    assert [(one.day, one.path, one.detail) for one in found] == [
+        ("extra", "S01-20260108", "was recorded and was not planned")
+    ]

@@ -11,7 +11,7 @@ from rigidimeter.rig.console.page.access import (
     slow_enough,
 )
 from rigidimeter.rig.console.page.after_view import AfterView
-from rigidimeter.rig.console.page.before_view import protocol_names, read_protocol
+from rigidimeter.rig.console.page.before_view import BeforeView, protocol_names, read_protocol
 from rigidimeter.rig.console.page.button_words import in_buttons, next_buttons, unfinished_words
 from rigidimeter.rig.console.page.draw_view import DrawView
 from rigidimeter.rig.console.page.form_values import (
@@ -22,6 +22,7 @@ from rigidimeter.rig.console.page.form_values import (
 )
 from rigidimeter.rig.console.page.jobs import QUESTION, CommandResult, Jobs
 from rigidimeter.rig.console.page.live_socket import LiveSockets, OpenPage
+from rigidimeter.rig.console.page.outside_plan import OutsideView
 from rigidimeter.rig.console.page.page_messages import (
     LEVELS,
     LONGEST_TEXT,

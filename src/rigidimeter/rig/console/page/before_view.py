@@ -12,11 +12,12 @@ from nicegui import ui
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import read_json, read_toml, write_json
-from rigidimeter.core.session import count_epochs
+from rigidimeter.core.session import count_epochs, in_codes
 from rigidimeter.core.settings import Settings, load_settings
 from rigidimeter.core.study_files import STUDY_FILE, PrimaryTable
 from rigidimeter.rig.console.page.computed import computed
 from rigidimeter.rig.console.page.jobs import Jobs
+from rigidimeter.rig.console.page.outside_plan import coded_form, read_coded_form
 from rigidimeter.rig.console.page.prediction import detected, dry_run_lines, prediction_lines
 from rigidimeter.rig.console.page.primary_view import PrimaryView
 from rigidimeter.rig.console.page.rig_steps import start_refusal
@@ -37,7 +38,6 @@ from rigidimeter.rig.console.page.session_form import (
     block_form,
     blocks_of,
     empty_form,
-    read_form,
     restored_form,
 )
 
@@ -57,12 +57,25 @@ class BeforeView:
     jobs : Jobs
     in_control : callable
         Whether the page may act.
+    codes : mapping of str to str
+        Of a blinded plan, what stands for each condition; empty for none.
+    start : str
+        The words of its button.
     """
 
-    def __init__(self, state: ServerState, jobs: Jobs, in_control: Callable[[], bool]) -> None:
+    def __init__(
+        self,
+        state: ServerState,
+        jobs: Jobs,
+        in_control: Callable[[], bool],
+        codes: Mapping[str, str] | None = None,
+        start: str = "Start session",
+    ) -> None:
         self._state, self._jobs, self._in_control = state, jobs, in_control
-        self._base = state.place.settings
+        self._base, self._codes = state.place.settings, codes or {}
         self._form = restored_form(_stored(state.place.root / DRAFT), self._base)
+        if self._codes:
+            self._form = coded_form(self._form, self._codes)
         self._inputs: dict[str, Any] = {}
         self._entered: EnteredSession | None = None
         place = state.place
@@ -91,6 +104,7 @@ class BeforeView:
             self._input(Field("rests", rests, "s"))
             blinded = ui.checkbox("Blinded: show codes for conditions").mark("blinded")
             blinded.value = self._form[BLINDED] == YES
+            blinded.set_visibility(not self._codes)
             blinded.on_value_change(lambda event: self._change(BLINDED, YES if event.value else ""))
             self._primary = PrimaryView(state.place, self._form[PRIMARY], self._change)
         with ui.expansion("Perturbation, controller and limits").classes("w-full").props("dense"):
@@ -98,18 +112,15 @@ class BeforeView:
                 for one in SETTINGS:
                     self._input(one)
             ui.button("Back to the protocol's values", on_click=self._reset)
-        with (
-            ui.expansion("Stimulation (leave empty if there is none)")
-            .classes("w-full")
-            .props("dense"),
-            ui.row().classes("w-full"),
-        ):
+        stimulation = ui.expansion("Stimulation (leave empty if there is none)")
+        stimulation.set_visibility(not self._codes)
+        with stimulation.classes("w-full").props("dense"), ui.row().classes("w-full"):
             for one in STIMULATION:
                 self._input(one)
         self._problem = ui.label("").classes("problem").props('role="alert"')
         self._refused = ui.label("").classes("problem").mark("refused").props('role="alert"')
         with ui.row():
-            self._start = ui.button("Start session", on_click=self._ask).mark("start")
+            self._start = ui.button(start, on_click=self._ask).mark("start")
             self._start.props("size=lg")
             ui.button("Predict precision, margin, days needed", on_click=self._predict)
             ui.button("Dry run on the virtual rig", on_click=self._dry_run)
@@ -128,7 +139,8 @@ class BeforeView:
         try:
             settings = read_protocol(place.protocols, name)
         except UserError as error:
-            self._wrong_file.text = f"{error}. The form is still that of {place.settings_name}."
+            wrong = in_codes(str(error), self._codes)
+            self._wrong_file.text = f"{wrong}. The form is still that of {place.settings_name}."
             return
         path = place.protocols / name
         self._state.place = replace(
@@ -206,7 +218,7 @@ class BeforeView:
 
     def _check(self) -> None:
         """Say under each field what is wrong with it."""
-        self._entered = read_form(self._form, self._base)
+        self._entered = read_coded_form(self._form, self._base, self._codes)
         errors = self._entered.errors
         for key, made in self._inputs.items():
             made.error = errors.get(key)
@@ -284,7 +296,8 @@ class BeforeView:
             ui.notify("first put right what is wrong in the form")
             return
         self._answer.set_content("<p>computing …</p>")
-        self._answer.set_content(await computed(self._jobs, settings, command, options, lines))
+        answer = await computed(self._jobs, settings, command, options, lines)
+        self._answer.set_content(in_codes(answer, self._codes))
 
 
 def _stored(path: Path) -> Any:

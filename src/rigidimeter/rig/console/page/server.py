@@ -29,6 +29,7 @@ from rigidimeter.rig.console.page.before_view import BeforeView
 from rigidimeter.rig.console.page.draw_view import DrawView
 from rigidimeter.rig.console.page.jobs import Jobs
 from rigidimeter.rig.console.page.live_socket import LiveSockets
+from rigidimeter.rig.console.page.outside_plan import OutsideView
 from rigidimeter.rig.console.page.page_token import require_token
 from rigidimeter.rig.console.page.plan_view import PlanView
 from rigidimeter.rig.console.page.server_state import ServerState
@@ -206,6 +207,7 @@ def show_page(state: ServerState, jobs: Jobs, secret: str) -> None:
         unfinished = ui.label("").classes("problem").props('role="status"')
         if state.place.planned:
             PlanView(state, jobs, in_control)
+            OutsideView(state, jobs, in_control, BeforeView)
         else:
             if not state.place.one_session:
                 with ui.expansion("Plan the days").classes("w-full").props("dense"):

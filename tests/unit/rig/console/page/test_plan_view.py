@@ -13,8 +13,16 @@ from tests.small_study import tiny
 from rigidimeter.core.files import toml_text
 from rigidimeter.core.session import SessionWriter
 from rigidimeter.core.settings import Settings, dump_settings
-from rigidimeter.core.study_files import add_change, parse_change, session_scan
-from rigidimeter.rig.console.page import Jobs, Place, PlanView, ServerState, StartRequest
+from rigidimeter.core.study_files import add_change, parse_change, plan_of, session_scan
+from rigidimeter.rig.console.page import (
+    BeforeView,
+    Jobs,
+    OutsideView,
+    Place,
+    PlanView,
+    ServerState,
+    StartRequest,
+)
 
 NAMES = ("Zebra", "Quagga")
 
@@ -35,27 +43,41 @@ class Page:
         self.state.ask = self.asked.append
         with client:
             PlanView(self.state, Steps(), lambda: True)
+            OutsideView(self.state, Steps(), lambda: True, BeforeView)
 
     def named(self, mark: str):
-        (one,) = (e for e in self.client.elements.values() if mark in getattr(e, "_markers", ()))
-        return one
+        return next(e for e in self.client.elements.values() if mark in getattr(e, "_markers", ()))
 
-    def field(self, key: str):
-        return next(
+    def field(self, key: str, outside: bool = False):
+        found = [
             e
             for e in self.client.elements.values()
             if isinstance(e, ui.input) and e.props.get("data-field") == key
-        )
+        ]
+        return found[-1 if outside else 0]
+
+    def outside(self) -> None:
+        """Unfold the form of a session outside of the plan."""
+        with self.client:
+            self.named("outside").value = True
 
     def click(self, mark: str) -> None:
         with self.client:
             for one in self.named(mark)._event_listeners.values():
                 one.handler(None)
 
-    def tick(self) -> None:
-        (timer,) = (e for e in self.client.elements.values() if isinstance(e, ui.timer))
+    def start_outside(self) -> None:
         with self.client:
-            timer.callback()
+            found = [e for e in self.client.elements.values() if isinstance(e, ui.button)]
+            (start,) = (e for e in found if e.text == "Start outside the plan")
+            for one in start._event_listeners.values():
+                one.handler(None)
+
+    def tick(self) -> None:
+        timers = [e for e in self.client.elements.values() if isinstance(e, ui.timer)]
+        with self.client:
+            for timer in timers:
+                timer.callback()
 
     def words(self) -> str:
         """Return all that the page holds, shown or not: text, properties and choices."""
@@ -173,6 +195,46 @@ def test_a_blinded_page_names_no_condition_and_takes_no_change(client, study):
     shown.tick()
     assert "names condition 'code-" in shown.named("refused").text
     assert not any(name in shown.words() for name in NAMES)
+
+
+def test_a_session_outside_of_the_plan_has_no_place_in_it(client, study):
+    shown = Page(client, study())
+    shown.outside()
+    shown.field("subject", outside=True).value = "S01"
+    shown.field("operator", outside=True).value = "Kim"
+    shown.start_outside()
+    (request,) = shown.asked
+    assert request.folder.startswith("S01-")
+    assert "plan" not in request.about
+    assert request.about["subject"] == "S01"
+    assert request.settings.protocol.blocks[0].condition == "OFF"
+
+
+def test_a_session_outside_of_a_blinded_plan_takes_its_codes(client, study):
+    folder = study("--blinded")
+    shown = Page(client, folder)
+    shown.outside()
+    codes = plan_of(folder).about.codes
+    assert not any(name in shown.words() for name in NAMES)
+    shown.field("subject", outside=True).value = "S01"
+    shown.field("operator", outside=True).value = "Kim"
+    shown.start_outside()
+    assert shown.asked == []
+    error = shown.field("condition0", outside=True).error
+    assert error == "condition: write a code of the plan: code-A, code-B"
+    shown.field("condition0", outside=True).value = codes["Quagga"]
+    shown.field("condition1", outside=True).value = codes["Zebra"]
+    shown.field("epochs0", outside=True).value = "many"
+    assert not any(name in shown.words() for name in NAMES)
+    shown.field("epochs0", outside=True).value = "2"
+    shown.start_outside()
+    (request,) = shown.asked
+    assert request.about["codes"] == codes
+    assert request.about["blinded"] is True
+    found = [block.condition for block in request.settings.protocol.blocks]
+    assert found == ["Quagga", "Zebra"]
+    assert not any(name in shown.words() for name in NAMES)
+    assert not any(name in (folder / "draft.json").read_text() for name in NAMES)
 
 
 def test_a_damaged_plan_is_an_error_on_the_page(client, study):
