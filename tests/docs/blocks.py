@@ -38,6 +38,7 @@ RUN = (
     HOW_TO / "design-an-experiment.md",
     HOW_TO / "optimise-the-perturbation.md",
     HOW_TO / "plan-the-days.md",
+    HOW_TO / "recover-a-session.md",
     HOW_TO / "undo.md",
 )
 
