@@ -190,7 +190,7 @@ def test_a_new_study_is_complete_and_never_written_over(rigidimeter, tmp_path: P
     folder = tmp_path / "fresh"
     assert rigidimeter("study", "new", folder, "--title", 'A "title"').status == 0
     assert sorted(path.name for path in folder.iterdir()) == [
-        "exclusions.csv", "ratings.csv", "sessions.csv", "study.toml",
+        "data-dictionary.csv", "exclusions.csv", "ratings.csv", "sessions.csv", "study.toml",
     ]  # fmt: skip
     assert read_study_toml(folder / "study.toml").primary == PrimaryTable(declared=date.today())
     before = (folder / "study.toml").read_bytes()

@@ -140,13 +140,20 @@ def compare(
 def _write(
     found: StudyResult, json_out: Path | None, csv_out: Path | None, place: str = ""
 ) -> None:
-    from rigidimeter.analysis.study import comparison_document, result_table, table_csv
-    from rigidimeter.core.files import write_json, write_text
+    from rigidimeter.analysis.study import (
+        columns_of_rows,
+        comparison_document,
+        result_table,
+        table_csv,
+    )
+    from rigidimeter.core.files import write_dictionary_beside, write_json, write_text
 
     if json_out is not None:
         write_json(json_out, comparison_document(found, place))
     if csv_out is not None:
-        write_text(csv_out, table_csv(result_table(found, "comparisons")))
+        rows = result_table(found, "comparisons")
+        write_text(csv_out, table_csv(rows))
+        write_dictionary_beside(csv_out, "comparisons", columns_of_rows(rows))
 
 
 def _say_changes(found: StudyResult, folder: Path, *, kept: bool) -> None:

@@ -19,7 +19,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.executor import each
 from rigidimeter.core.files import csv_text, toml_text, write_text
 from rigidimeter.core.settings import SinusoidSettings
-from rigidimeter.core.study_files import STUDY_SCHEMA, PrimaryTable
+from rigidimeter.core.study_files import STUDY_SCHEMA, PrimaryTable, write_study_dictionary
 from rigidimeter.core.units import rad_from_deg
 from rigidimeter.virtual.study_design import ConditionDesign, StudyDesign
 from rigidimeter.virtual.study_plan import DayPlan, day_joint, felt_rigidity, plan_study
@@ -118,6 +118,7 @@ def _write_tables(folder: Path, plans: Sequence[DayPlan], subject: str) -> None:
     ]
     columns = ("subject", "day", "condition", "examiner", "score")
     write_text(folder / "ratings.csv", csv_text(columns, ratings))
+    write_study_dictionary(folder)
 
 
 def _study_toml(design: StudyDesign, seed: int) -> str:

@@ -156,7 +156,7 @@ def test_searches_and_compares(tmp_path: Path) -> None:
     assert "Multisine crest factor 1.494" in words
     assert {path.name for path in folder.iterdir()} == {
         "prbs.csv", "sinusoid.csv", "protocol.csv", "bode.svg", "multisine.csv", "optimised.toml",
-        "design.json",
+        "design.json", "data-dictionary.csv",
     }  # fmt: skip
     snippet = (folder / "optimised.toml").read_text()
     assert all(f"    {line}" in text.splitlines() for line in snippet.splitlines())

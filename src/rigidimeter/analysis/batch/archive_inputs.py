@@ -13,7 +13,7 @@ from rigidimeter.analysis.reading.formats import READERS, reader_of
 from rigidimeter.analysis.study.blinding import Naming, naming
 from rigidimeter.analysis.study.sessions import place_of
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import RECORDING_BYTES, open_regular
+from rigidimeter.core.files import RECORDING_BYTES, is_dictionary, open_regular
 from rigidimeter.core.study_files import StudyFolder, TableRow, is_study, read_study_folder
 
 
@@ -104,7 +104,7 @@ def _expanded(named: Iterable[str | Path]) -> Iterator[Path]:
         path = Path(one)
         if glob.has_magic(str(one)) and not path.exists():
             found = sorted(glob.glob(str(one), recursive=True))
-            yield from map(Path, found or [str(one)])
+            yield from (path for path in map(Path, found or [str(one)]) if not is_dictionary(path))
         else:
             yield path
 
@@ -126,7 +126,7 @@ def _below(path: Path, seen: dict[Path, bool], *, asked: bool) -> Iterator[Input
         yield Input(path)
     elif path.is_dir():
         for child in sorted(path.iterdir()) if os.access(path, os.R_OK | os.X_OK) else ():
-            if not child.name.startswith("."):
+            if not (child.name.startswith(".") or is_dictionary(child)):
                 yield from _below(child, seen, asked=False)
         if asked and not any(is_input and place in one.parents for one, is_input in seen.items()):
             yield Input(path, refused=f"{path}: holds nothing that can be read")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rigidimeter.analysis.batch.parts import Row
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import as_read, csv_text, in_place
+from rigidimeter.core.files import as_read, csv_text, in_place, write_dictionary_beside
 from rigidimeter.core.records import AMPLITUDE, Activity, Analysis, Fit, Outcome, Score
 
 ENDINGS = (".parquet", ".csv")
@@ -55,6 +55,8 @@ def write_table(path: Path, rows: Iterable[Row]) -> None:
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else error
         raise UserError(f"{path}: cannot be written ({reason})") from None
+    if path.suffix == ".csv":
+        write_dictionary_beside(path, "batch", columns())
 
 
 def read_table(path: Path) -> Iterator[Row]:

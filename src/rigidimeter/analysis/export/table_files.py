@@ -7,6 +7,7 @@ program finds them in any of the tables.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,16 @@ from rigidimeter.analysis.export.document_tables import columns_of, document_tab
 from rigidimeter.analysis.export.exported_sessions import ExportedSession
 from rigidimeter.analysis.reading.formats.arrow_file import VIRTUAL
 from rigidimeter.analysis.reading.formats.clocked_table import Stream
-from rigidimeter.core.files import csv_text, json_text, write_json, write_text
+from rigidimeter.core.files import (
+    DICTIONARY,
+    Meaning,
+    csv_text,
+    dictionary_text,
+    json_text,
+    write_json,
+    write_text,
+)
+from rigidimeter.core.session import SAMPLE_UNITS
 
 DOCUMENT = "session.json"
 _SHOWN = ("software", "virtual", "subject", "day", "condition", "part", "source")
@@ -50,12 +60,29 @@ def _write(
     write: Callable[[pa.Table, Path], None],
 ) -> None:
     folder.mkdir()
+    columns: dict[str, list[str]] = {}
     for stream in session.streams:
-        write(_stream_table(stream, session.about), folder / f"{stream.name}{suffix}")
-    for name, rows in document_tables(session.about).items():
-        columns = list(dict.fromkeys(key for row in rows for key in row))
-        write_text(folder / f"{name}.csv", csv_text(columns, rows))
+        table, name = _stream_table(stream, session.about), f"{stream.name}{suffix}"
+        write(table, folder / name)
+        columns[name] = table.schema.names
+    samples = dict.fromkeys(columns, "samples")
+    for stem, rows in document_tables(session.about).items():
+        name = f"{stem}.csv"
+        columns[name] = list(dict.fromkeys(key for row in rows for key in row))
+        write_text(folder / name, csv_text(columns[name], rows))
+    write_text(folder / DICTIONARY, dictionary_text(columns, samples, _recorded()))
     write_json(folder / DOCUMENT, session.about)
+
+
+def _recorded() -> dict[str, Meaning]:
+    """Return what only a session records: what its manifest says, less the unit."""
+    found = {}
+    for column, said in SAMPLE_UNITS.items():
+        stated = re.match(r"(?:(N·m|rad/s|rad|s|1)\b,? ?)?", said)
+        words = said[stated.end() :] if stated else said
+        if column not in ("time_s", "epoch") and words:
+            found[column] = Meaning((stated and stated[1]) or "1", words)
+    return found
 
 
 def _stream_table(stream: Stream, about: Mapping[str, Any]) -> pa.Table:

@@ -15,6 +15,7 @@ from rigidimeter.core.files import (
     plain_values,
     read_json,
     size_text,
+    write_dictionary_beside,
     write_text,
 )
 from rigidimeter.core.findings import finding_from
@@ -91,6 +92,7 @@ def write_estimates_csv(path: Path, analysis: Analysis) -> None:
     # Epochs with EMG have more columns than others.
     columns = dict.fromkeys(name for row in rows for name in row) or ["epoch"]
     write_text(path, csv_text(list(columns), rows))
+    write_dictionary_beside(path, "estimates" if analysis.fits else "scores", columns)
 
 
 def read_estimates(path: Path) -> Analysis:

@@ -22,7 +22,7 @@ from rigidimeter.analysis.report.style import (
     svg_text,
 )
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import csv_text, write_json, write_text
+from rigidimeter.core.files import DICTIONARY, csv_text, dictionary_text, write_json, write_text
 from rigidimeter.core.settings import Settings
 from rigidimeter.model import Loop, Margins
 from rigidimeter.planning import Design, design_document, prbs_toml
@@ -57,6 +57,9 @@ def write_design_folder(folder: Path, design: Design) -> list[str]:
         texts["multisine.csv"] = _columns(design, ["perturbation_nm"], torque)
     if design.ranked is not None:
         texts["optimised.toml"] = prbs_toml(design.ranked[0].prbs)
+    tables = {name: text.partition("\n")[0].split(",") for name, text in texts.items()
+              if name.endswith(".csv")}  # fmt: skip
+    texts[DICTIONARY] = dictionary_text(tables)
     for name, text in texts.items():
         write_text(folder / name, text)
     write_json(folder / "design.json", design_document(design))

@@ -22,7 +22,7 @@ from rigidimeter.analysis.report.methods_prose import methods_prose
 from rigidimeter.analysis.report.sections import SECTIONS
 from rigidimeter.analysis.report.style import svg_text
 from rigidimeter.analysis.study import StudyResult, deviation_words, lead, traffic_light
-from rigidimeter.core.files import csv_text, visible
+from rigidimeter.core.files import DICTIONARY, csv_text, dictionary_text, visible
 from rigidimeter.core.version import __version__
 from rigidimeter.core.words import Column, Table, epoch_name, short_names, shown_below, shown_value
 
@@ -88,6 +88,8 @@ def write_report(
 ) -> Path:
     """Write ``report.html``, ``tables/*.csv`` and ``figures/*`` into a folder.
 
+    ``tables/data-dictionary.csv`` has unit and meaning of every column of the others.
+
     A study folder also gets ``methods.txt``, the paragraphs of methods as plain text. The same
     result gives the same bytes.
 
@@ -114,8 +116,11 @@ def write_report(
         progress(0.5 + 0.5 * len(svg) / len(figures))
     (out / "tables").mkdir(parents=True, exist_ok=True)
     (out / "figures").mkdir(parents=True, exist_ok=True)
-    for table in tables(made).values():
-        _write(out / "tables" / f"{table.name}.csv", _csv(table))
+    written = {f"{table.name}.csv": table for table in tables(made).values()}
+    for name, table in written.items():
+        _write(out / "tables" / name, _csv(table))
+    described = dictionary_text({name: _columns(table) for name, table in written.items()})
+    _write(out / "tables" / DICTIONARY, described)
     for name, text in svg.items():
         _write(out / "figures" / f"{file_stem(name)}.svg", text)
     if result.sessions:
@@ -137,8 +142,12 @@ def _write(path: Path, text: str) -> None:
 
 def _csv(table: Table) -> str:
     """Return all values of the rows; without rows, a header of what the page would show."""
+    return csv_text(_columns(table), table.rows)
+
+
+def _columns(table: Table) -> list[str]:
     names = dict.fromkeys(name for row in table.rows for name in row)
-    return csv_text(list(names) or [column.name for column in table.columns], table.rows)
+    return list(names) or [column.name for column in table.columns]
 
 
 def _mark(result: StudyResult) -> str:

@@ -52,6 +52,7 @@ from rigidimeter.analysis.study.sensitivity import method_caveats
 from rigidimeter.analysis.study.statements import Statements, lead, statements
 from rigidimeter.analysis.study.study_analysis import analyse_study, estimate_study, read_study
 from rigidimeter.analysis.study.tables import (
+    columns_of_rows,
     comparison_document,
     result_table,
     result_tables,

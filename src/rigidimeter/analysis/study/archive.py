@@ -3,7 +3,7 @@
     STUDY/analysis/inputs.json      digests of all inputs and results, settings, method, seed
     STUDY/analysis/estimates.json   the estimates, as `rigidimeter estimate` writes them
     STUDY/analysis/comparison.json  every conclusion
-    STUDY/analysis/*.csv            the same as tables
+    STUDY/analysis/*.csv            the same as tables, and data-dictionary.csv: what is in them
 
 A file whose bytes would be the same is not written again. `comparison.json` and then `inputs.json`
 are written last: a run that was cut off leaves those of the run before, and the next one says what
@@ -24,9 +24,21 @@ from rigidimeter.analysis.study.families import ANALYSIS, COMPARISON
 from rigidimeter.analysis.study.measures import RATING
 from rigidimeter.analysis.study.results import StudyResult
 from rigidimeter.analysis.study.study_analysis import StudyRead
-from rigidimeter.analysis.study.tables import comparison_document, result_tables, table_csv
+from rigidimeter.analysis.study.tables import (
+    columns_of_rows,
+    comparison_document,
+    result_tables,
+    table_csv,
+)
 from rigidimeter.core.errors import UserError, refused
-from rigidimeter.core.files import json_text, read_json, text_bytes, write_text
+from rigidimeter.core.files import (
+    DICTIONARY,
+    dictionary_text,
+    json_text,
+    read_json,
+    text_bytes,
+    write_text,
+)
 from rigidimeter.core.settings import dump_settings, with_new_names
 from rigidimeter.core.version import __version__
 
@@ -60,6 +72,9 @@ def keep(read: StudyRead, study: StudyResult) -> list[str]:
     texts = {
         "estimates.json": json_text(estimates_document(study.analysis)),
         **{f"{name}.csv": table_csv(tables[name]) for name in _TABLES if tables[name]},
+        DICTIONARY: dictionary_text(
+            {f"{name}.csv": columns_of_rows(tables[name]) for name in _TABLES if tables[name]}
+        ),
         COMPARISON: json_text(document),
     }
     inputs = _inputs(read, study)

@@ -20,7 +20,7 @@ from rigidimeter.analysis.estimation import aligned, epoch_signals
 from rigidimeter.analysis.estimation.stretches import longest_part
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.core.errors import UserError, refused
-from rigidimeter.core.files import as_written, in_place
+from rigidimeter.core.files import as_written, in_place, write_dictionary_beside
 from rigidimeter.core.records import Analysis
 
 _WRITERS = {".csv": pyarrow.csv.CSVWriter, ".parquet": pyarrow.parquet.ParquetWriter}
@@ -97,3 +97,5 @@ def write_subject_torque(path: Path, recording: Recording, analysis: Analysis) -
     ):
         for table in itertools.chain([first], tables):
             out.write_table(table)
+    if path.suffix.lower() == ".csv":
+        write_dictionary_beside(path, "subject_torque", first.schema.names)

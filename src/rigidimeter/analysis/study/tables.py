@@ -253,4 +253,9 @@ TABLES: Mapping[str, Callable[[StudyResult], Rows]] = {
 
 def table_csv(rows: Rows) -> str:
     """Return a table as CSV; a column is there if any row has it."""
-    return csv_text(list(dict.fromkeys(name for row in rows for name in row)), rows)
+    return csv_text(columns_of_rows(rows), rows)
+
+
+def columns_of_rows(rows: Rows) -> list[str]:
+    """Return the columns of a table, in their order."""
+    return list(dict.fromkeys(name for row in rows for name in row))

@@ -8,6 +8,15 @@ from rigidimeter.core.files.checksum import (
     digest_hex,
     with_checksum,
 )
+from rigidimeter.core.files.data_dictionary import (
+    DICTIONARY,
+    Meaning,
+    dictionary_text,
+    is_dictionary,
+    meaning_of,
+    rows_of,
+    write_dictionary_beside,
+)
 from rigidimeter.core.files.escaping import NUMBER_TEXT, as_read, as_written, printable, visible
 from rigidimeter.core.files.label_table import (
     TextTable,

@@ -76,4 +76,4 @@ from rigidimeter.core.study_files.study_toml import (
     is_own,
     read_study_toml,
 )
-from rigidimeter.core.study_files.tables import table_path
+from rigidimeter.core.study_files.tables import table_path, write_study_dictionary

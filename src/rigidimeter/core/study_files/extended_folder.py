@@ -43,6 +43,7 @@ from rigidimeter.core.study_files.tables import (
     empty_table,
     table_path,
     table_rows,
+    write_study_dictionary,
 )
 
 _TABLES = ("sessions", "ratings", "exclusions")
@@ -77,6 +78,7 @@ def write_new_study(
         folder.mkdir(parents=True, exist_ok=True)
     for name in _TABLES:
         write_text(folder / f"{name}.csv", empty_table(name))
+    write_study_dictionary(folder)
     shown = title.strip() or folder.resolve().name
     conditions = dict(planned or {OFF: ConditionTable(), DBS: ConditionTable()})
     primary = PrimaryTable(declared=date.today())

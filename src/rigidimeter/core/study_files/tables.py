@@ -14,15 +14,19 @@ from pathlib import Path
 
 from rigidimeter.core.errors import UserError, refused
 from rigidimeter.core.files import (
+    DICTIONARY,
     TABLE_BYTES,
     TextTable,
     as_written,
+    dictionary_text,
     read_text_table,
     read_utf8,
     replace_file,
     text_bytes,
     write_text,
 )
+from rigidimeter.core.study_files.day_plan import COLUMNS as PLAN_COLUMNS
+from rigidimeter.core.study_files.day_plan import PLAN_TABLE
 from rigidimeter.core.study_files.folder import TABLE_COLUMNS, is_study
 from rigidimeter.core.study_files.study_toml import STUDY_FILE, read_study_toml
 
@@ -45,6 +49,18 @@ _MAY_BE_LOST = "note"
 def empty_table(name: str) -> str:
     """Return a table without rows: what it is for, and its columns."""
     return f"{_ABOUT[name]}{','.join(_COLUMNS[name])}\n"
+
+
+def write_study_dictionary(folder: Path) -> None:
+    """Write what is in each column of every table that a study may have.
+
+    Raises
+    ------
+    UserError
+        If it cannot be written.
+    """
+    columns = {f"{name}.csv": (*needed, *more) for name, (needed, more) in TABLE_COLUMNS.items()}
+    write_text(folder / DICTIONARY, dictionary_text(columns | {PLAN_TABLE: PLAN_COLUMNS}))
 
 
 def table_path(folder: Path, name: str) -> Path:
@@ -100,6 +116,7 @@ def add_rows(path: Path, name: str, rows: Sequence[Mapping[str, str]]) -> None:
         with refused(path, "cannot be made"):
             path.parent.mkdir(parents=True, exist_ok=True)
         write_text(path, empty_table(name))
+        write_study_dictionary(path.parent)
     table = checked_table(path, name)
     for row in rows:
         absent = [
