@@ -11,6 +11,7 @@ from rigidimeter.core.files.checksum import (
 from rigidimeter.core.files.data_dictionary import (
     DICTIONARY,
     Meaning,
+    described,
     dictionary_text,
     is_dictionary,
     meaning_of,

@@ -59,7 +59,13 @@ def _records() -> Mapping[str, Mapping[str, Any]]:
 
 def rows_of(table: str) -> str:
     """Return what each row of a table stands for; empty if that is not known."""
-    return str(_records()["rows"].get(table, ""))
+    records = _records()
+    return str((records["rows"] | records["rows elsewhere"]).get(table, ""))
+
+
+def described(section: str) -> dict[str, Meaning]:
+    """Return what one section describes, in order: the columns of a table, keys of a document."""
+    return {name: _meaning(said, name) for name, said in _records()[section].items()}
 
 
 def meaning_of(table: str, column: str) -> Meaning:

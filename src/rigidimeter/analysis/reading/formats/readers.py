@@ -68,6 +68,8 @@ class Reader:
         What makes such files. Where it is given, any exception of `read` means a damaged file.
     extra : str
         The extra of this package that `read` needs for some files, as in ``rigidimeter[matlab]``.
+    about : str
+        For the reference: where units, clocks and epochs come from, and what else is particular.
     """
 
     name: str
@@ -78,36 +80,63 @@ class Reader:
     made_by: str = ""
     extra: str = ""
     of_text: bool = False
+    about: str = ""
 
 
 READERS: list[Reader] = [
-    Reader("session folder", (), read_session, sniff=is_session, settings=session_settings),
+    Reader(
+        "session folder",
+        (),
+        read_session,
+        sniff=is_session,
+        settings=session_settings,
+        about="recorded by `run`, `console` or `simulate`; everything is known",
+    ),
     Reader(
         "BIDS motion recording",
         (".tsv",),
         read_bids_motion,
         sniff=is_bids_motion,
         made_by="a program that writes BIDS-Motion",
+        about="`…_motion.tsv` with `_channels.tsv` and `_motion.json` beside it, or a data set "
+        "with one recording; a clock for each tracking system; events with a column `epoch` are "
+        "epochs",
     ),
     Reader(
         "text table",
         (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".sto", ".mot", ".gz"),
         read_text_recording,
+        about="separated by comma, semicolon, tab, bar or blanks; decimal comma; UTF-8, UTF-16, "
+        "Windows-1252; `#` begins a comment; names below a block of other lines, and a row of "
+        "units; units and rates in the headers of LabVIEW, LabChart, Spike2, OpenSim, "
+        "AcqKnowledge, Vicon Nexus, Qualisys and Biodex",
         of_text=True,
     ),
     Reader(
         "spreadsheet",
         (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"),
         read_spreadsheet,
+        about="a sheet, read as text is; `--table` names one of several",
         made_by="Excel or LibreOffice",
         extra="excel",
         of_text=True,
     ),
-    Reader("NumPy archive", (".npz",), read_npz, made_by="numpy.savez"),
+    Reader(
+        "NumPy archive",
+        (".npz",),
+        read_npz,
+        made_by="numpy.savez",
+        about="arrays by name; a single value `rate_hz`, `fs_hz`, `fs` or `sampling_rate_hz`; a "
+        "matrix `data` with `names`, `columns`, `channels` or `labels`; nothing is unpickled",
+    ),
     Reader(
         "MATLAB file",
         (".mat",),
         read_mat,
+        about="version 4 to 7; tables, timetables, objects and 7.3 need the extra; units from "
+        "`VariableUnits`; fields of structures have dotted names (`data.torque`); exports of "
+        "LabChart, AcqKnowledge, Spike2 and ControlDesk, Simulink and `timeseries` with "
+        "names, units and clocks",
         made_by="save in MATLAB",
         extra="matlab",
         of_text=True,
@@ -116,6 +145,8 @@ READERS: list[Reader] = [
         "NWB file",
         (".nwb",),
         read_nwb,
+        about="every time series with one value a sample, by its own clock, `conversion` and "
+        "`offset`; trials or epochs, without those whose `excluded` is true",
         made_by="a program that writes NWB",
         extra="nwb",
     ),
@@ -124,17 +155,51 @@ READERS: list[Reader] = [
         (".xdf", ".xdfz"),
         read_xdf,
         settings=xdf_settings,
+        about="a clock for each stream; offsets applied and stamps straightened; streams of `run` "
+        "give its epochs",
         made_by="LabRecorder",
         extra="xdf",
     ),
-    Reader("HDF5 file", (".h5", ".hdf5"), read_hdf5, made_by="h5py", extra="matlab"),
-    Reader("TDMS file", (".tdms",), read_tdms, made_by="LabVIEW", extra="tdms"),
-    Reader("C3D file", (".c3d",), read_c3d, made_by="a program of motion capture", extra="c3d"),
-    Reader("BIOPAC file", (".acq",), read_biopac, made_by="AcqKnowledge", extra="biopac"),
+    Reader(
+        "HDF5 file",
+        (".h5", ".hdf5"),
+        read_hdf5,
+        made_by="h5py",
+        extra="matlab",
+        about="datasets of one dimension, in groups with dotted names; attributes `unit` or "
+        "`units`, and `fs` or as in NumPy archives; a dataset with a `scale_factor` is not read",
+    ),
+    Reader(
+        "TDMS file",
+        (".tdms",),
+        read_tdms,
+        made_by="LabVIEW",
+        extra="tdms",
+        about="a clock for each waveform channel (`wf_increment`), units from `unit_string`",
+    ),
+    Reader(
+        "C3D file",
+        (".c3d",),
+        read_c3d,
+        made_by="a program of motion capture",
+        extra="c3d",
+        about="analogue channels, scaled, with their `UNITS`; no angle is computed from markers",
+    ),
+    Reader(
+        "BIOPAC file",
+        (".acq",),
+        read_biopac,
+        made_by="AcqKnowledge",
+        extra="biopac",
+        about="a clock and a unit for each channel",
+    ),
     Reader(
         "electrophysiology file",
         SUFFIXES,
         read_neurophysiology,
+        about="a clock and a unit for each channel; Plexon has millivolts, so give `--scale`; "
+        "`.smrx` also needs sonpy, which has no wheel for Linux below Python 3.14 and was not "
+        "tested: save as `.smr`",
         made_by="Spike2, pCLAMP, Central or Plexon",
         extra="neo",
     ),
@@ -142,6 +207,8 @@ READERS: list[Reader] = [
         "Parquet or Arrow file",
         (".parquet", ".feather", ".arrow", ".arrows"),
         read_arrow,
+        about="the unit of a field in its metadata under `unit`, or in its name; `virtual = true` "
+        "in the metadata of a simulated recording",
         made_by="a program that writes Parquet or Arrow",
     ),
 ]
