@@ -9,7 +9,7 @@ from rigidimeter.analysis.reading import estimates_document
 from rigidimeter.analysis.reading.formats import READERS
 from rigidimeter.core.files import Meaning, described, meaning_of
 from rigidimeter.core.findings import Finding
-from rigidimeter.core.records import Analysis, Delay, Fit, Outcome, Score
+from rigidimeter.core.records import Activity, Analysis, Delay, Fit, Outcome, Score
 from rigidimeter.core.session import SAMPLE_UNITS
 
 
@@ -60,7 +60,8 @@ def _in_words(said: Meaning) -> str:
 
 def _fit() -> str:
     listed = {"band_hz": Meaning("Hz", "[low, high]"), "findings": Meaning("", "a list, below")}
-    return _columns("estimates", estimates_document(analysis())["epochs"][0], **listed)
+    names = [*estimates_document(analysis())["epochs"][0], *Activity((), 0.0, 0.0).row()]
+    return _columns("estimates", names, **listed)
 
 
 def _score() -> str:

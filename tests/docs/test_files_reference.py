@@ -17,11 +17,7 @@ from rigidimeter.analysis.batch import columns as batch_columns
 from rigidimeter.analysis.reading import ReadOptions, estimates_document, read_recording
 from rigidimeter.cli.main import app
 from rigidimeter.core.errors import UserError
-<<<<<<< HEAD
-from rigidimeter.core.findings import Finding
-from rigidimeter.core.records import Activity, Analysis, Delay, Fit, Outcome, Score
-=======
->>>>>>> 786c44bc (The reference of files takes its tables of columns and keys from the code that writes them; each format says in the code what its files state)
+from rigidimeter.core.records import Activity
 from rigidimeter.core.session import SAMPLE_UNITS, SessionWriter, read_events, read_manifest
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.study_files import STUDY_SCHEMA
@@ -57,12 +53,13 @@ def test_the_manifest_and_event_keys_are_those_of_a_session(tmp_path: Path) -> N
 def test_the_keys_of_the_estimates_are_documented() -> None:
     document = estimates_document(analysis())
     assert list(table(FILES, "Top level")) == list(document)
-    assert set(table(FILES, "Each fit")) == set(document["epochs"][0])
-    assert set(table(FILES, "Each fit")) == set(document["fixed_inertia"]["epochs"][0])
+    of_emg = set(Activity((), 0.0, 0.0).row())
+    assert set(table(FILES, "Each fit")) - of_emg == set(document["epochs"][0])
+    assert set(table(FILES, "Each fit")) - of_emg == set(document["fixed_inertia"]["epochs"][0])
     assert set(table(FILES, "Each score")) == set(document["scores"][0])
     assert set(table(FILES, "Each finding")) == set(document["epochs"][0]["findings"][0])
     assert set(table(FILES, "Each delay")) == set(document["delays"][0])
-    assert set(document["pooled"]) == {*table(FILES, "Each fit"), "conditions"}
+    assert set(document["pooled"]) == {*table(FILES, "Each fit"), "conditions"} - of_emg
     assert set(document["fixed_inertia"]) == {"inertia_kg_m2", "epochs"}
     assert f"`{document['schema']}`" in FILES.read_text("utf-8")
 
@@ -70,15 +67,10 @@ def test_the_keys_of_the_estimates_are_documented() -> None:
 def test_the_columns_of_a_batch_are_documented() -> None:
     named, columns = list(table(FILES, "Batch table")), list(batch_columns())
     assert named == columns[:10] + columns[-4:]
-<<<<<<< HEAD
     emg = Activity((), 0.0, 0.0).row()
-    of_each = {*_analysis().rows()[0], *_analysis().scores[0].row(), *emg}
+    of_each = {*analysis().rows()[0], *analysis().scores[0].row(), *emg}
     assert set(columns[10:-4]) == of_each - set(columns[:10])
     assert all(f"`{name}`" in FILES.read_text("utf-8") for name in emg)
-=======
-    numbers = set(columns[10:-4])
-    assert numbers == {*analysis().rows()[0], *analysis().scores[0].row()} - set(columns[:10])
->>>>>>> 786c44bc (The reference of files takes its tables of columns and keys from the code that writes them; each format says in the code what its files state)
 
 
 def test_the_keys_of_the_comparisons_are_documented(tmp_path: Path) -> None:
