@@ -40,6 +40,9 @@ _UNITS = {
 """How names end that state their unit; the longer ending comes first."""
 
 
+_ENDS = ("_se", "_low", "_high")
+"""What may follow the unit in a name."""
+
 _OTHER_COLUMNS = ("unit", "amplitude_unit")
 """Columns that hold the unit of other columns, row by row."""
 
@@ -60,7 +63,7 @@ def _records() -> Mapping[str, Mapping[str, Any]]:
 def rows_of(table: str) -> str:
     """Return what each row of a table stands for; empty if that is not known."""
     records = _records()
-    return str((records["rows"] | records["rows elsewhere"]).get(table, ""))
+    return str(records["rows"].get(table) or records["rows elsewhere"].get(table, ""))
 
 
 def described(section: str) -> dict[str, Meaning]:
@@ -110,7 +113,8 @@ def _meaning(said: str | list[str], column: str) -> Meaning:
     if not isinstance(said, str):
         unit, words = said
         return Meaning(f"(column {unit})" if unit in _OTHER_COLUMNS else unit, words)
-    ends = (unit for ending, unit in _UNITS.items() if column.endswith(ending))
+    base = next((column.removesuffix(e) for e in _ENDS if column.endswith(e)), column)
+    ends = (unit for ending, unit in _UNITS.items() if base.endswith(ending))
     return Meaning(next(ends, ""), said)
 
 
