@@ -37,7 +37,7 @@ protocol.blocks = [
 ]
 """
 WIDTH, HEIGHT, REPORT_HEIGHT, LIST_HEIGHT = 1100, 860, 1080, 1120
-FORM_HEIGHT = 960
+FORM_HEIGHT = 1000
 COLOURS = 256
 ATTEMPTS = 6
 STATE = "document.getElementById('state').textContent"

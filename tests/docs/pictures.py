@@ -2,7 +2,7 @@
 
     python -m tests.docs.pictures
 
-It needs Chromium and takes two minutes: a part of the operator's day runs in real time. The words
+It needs Chromium and takes some minutes: parts of an operator's days run in real time. The words
 that a picture shows are written to `pictured.json`, so that they are compared without a browser.
 """
 
@@ -21,6 +21,7 @@ from tests.docs.markdown import ROOT
 
 REPORT = ROOT / "docs" / "images" / "report.png"
 DAY = ROOT / "docs" / "tutorials" / "operator-day"
+DAYS = ROOT / "docs" / "how-to" / "plan-the-days"
 PICTURED = Path(__file__).with_name("pictured.json")
 REPORT_SIZE = {"width": 1180, "height": 810}
 _NUMBER = re.compile(r"[+−-]?\d+(?:[.,]\d+)?")
@@ -47,6 +48,7 @@ def unnumbered(text: str) -> str:
 def main() -> None:
     """Make all."""
     from tests.console.pictures import pictures
+    from tests.console.planned_pictures import planned_pictures
 
     words: dict[str, list[str]] = {}
     with tempfile.TemporaryDirectory(prefix="pictures-") as name:
@@ -61,9 +63,11 @@ def main() -> None:
             page.goto(page_file.as_uri())
             page.screenshot(path=REPORT)
             words[f"{REPORT.relative_to(ROOT)}"] = seen(page, IN_REPORT)
-        Path(name, "day").mkdir()
-        for picture, shown_words in pictures(DAY, Path(name, "day")).items():
-            words[f"{(DAY / picture).relative_to(ROOT)}.png"] = shown_words
+        for made, folder in ((pictures, DAY), (planned_pictures, DAYS)):
+            place = Path(name, folder.name)
+            place.mkdir()
+            for picture, shown_words in made(folder, place).items():
+                words[f"{(folder / picture).relative_to(ROOT)}.png"] = shown_words
     PICTURED.write_text(json.dumps(words, indent=1, ensure_ascii=False) + "\n", "utf-8")
 
 

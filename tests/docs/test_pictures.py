@@ -9,6 +9,7 @@ from tests.docs import blocks, pictures
 from tests.docs.markdown import DOCUMENTS, ROOT
 from tests.docs.pictures import unnumbered
 
+OF_THE_PAGE = ("/operator-day/", "/plan-the-days/")
 PICTURED = json.loads(pictures.PICTURED.read_text("utf-8"))
 
 
@@ -20,8 +21,8 @@ def test_every_picture_is_in_a_document() -> None:
     }
     made = {str(path.relative_to(ROOT)) for path in (ROOT / "docs").rglob("*.png")}
     assert shown == made
-    day = {path for path in made if "/operator-day/" in path}
-    assert set(PICTURED) == {"docs/images/report.png", *day}
+    of_page = {path for path in made if any(folder in path for folder in OF_THE_PAGE)}
+    assert set(PICTURED) == {"docs/images/report.png", *of_page}
 
 
 def test_the_picture_of_the_report_has_its_present_words(ran) -> None:
@@ -38,7 +39,7 @@ def test_the_pictures_of_the_page_have_its_present_buttons_and_labels() -> None:
     texts += [unnumbered(path.read_text("utf-8")) for path in sorted(assets.glob("*.html"))]
     now = "\n".join(texts).lower()
     for picture, words in PICTURED.items():
-        if "operator-day/" in picture and not picture.endswith("report.png"):
+        if any(folder in picture for folder in OF_THE_PAGE) and not picture.endswith("report.png"):
             # Of what is put together, each piece: "Range of motion: upper end [deg]".
             pieces = {piece.strip() for text in words for piece in re.split(r"[:;#\[\]]", text)}
             assert [piece for piece in pieces if piece.lower() not in now] == [], picture
