@@ -35,6 +35,9 @@ from rigidimeter.rig.console.page.prediction import detected, prediction_lines
 from rigidimeter.rig.console.page.server_state import ServerState
 from rigidimeter.rig.console.page.session_form import YES, Field
 
+FOLLOW_S = 2.0
+"""How often it is looked whether there is a plan."""
+
 
 class DrawView:
     """The form of a plan, and the plan that it draws, before it is written.
@@ -95,6 +98,12 @@ class DrawView:
             self._table = ui.html("", sanitize=False).classes("plan")
             ui.button("Write this plan", on_click=self._write).mark("write")
         self._check()
+        ui.timer(FOLLOW_S, self._follow)
+
+    def _follow(self) -> None:
+        """Go on to a plan that was written by another page or program."""
+        if self._state.place.planned and not self._state.busy:
+            self._written()
 
     def _row(self, fields: Sequence[Field]) -> None:
         with ui.row().classes("w-full items-start"):

@@ -210,6 +210,16 @@ def test_a_plan_that_came_meanwhile_is_not_written_over(client, tmp_path, rigidi
     assert not shown.written
 
 
+def test_a_plan_that_the_command_wrote_is_gone_on_to(client, tmp_path, rigidimeter):
+    shown = Form(client, tmp_path / "study")
+    (timer,) = (one for one in client.elements.values() if isinstance(one, ui.timer))
+    timer.callback()
+    assert not shown.written
+    assert rigidimeter("study", "plan", tmp_path / "study", "--subjects", "S09").status == 0
+    timer.callback()
+    assert shown.written
+
+
 def test_days_and_epochs_are_those_of_the_prediction(client, tmp_path, monkeypatch):
     monkeypatch.setattr(draw_view, "prediction_lines", lambda *_: ["5 days"])
     asked = []
