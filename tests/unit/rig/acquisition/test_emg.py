@@ -19,6 +19,7 @@ from rigidimeter.core.session import Sample, SessionWriter, read_emg
 from rigidimeter.core.settings import EmgSettings, Settings, parse_settings
 from rigidimeter.model import LiveEnvelope, VirtualMuscles
 from rigidimeter.rig.acquisition.processes import (
+    LoopStatus,
     ProcessCondition,
     Role,
     SessionMemory,
@@ -26,6 +27,7 @@ from rigidimeter.rig.acquisition.processes import (
 )
 from rigidimeter.rig.console import EnvelopeReader
 from rigidimeter.rig.devices import DaqEmg, ReaderError, open_emg, require_emg
+from rigidimeter.rig.devices.base import EmgSamples
 
 CONFIG = """\
 [ports]
@@ -220,6 +222,63 @@ def test_a_card_that_fails_is_named_and_what_it_gave_is_kept(tmp_path: Path):
     assert remarks[-1].startswith("EMG ended at")
     assert remarks[-1].endswith("the buffer ran over")
     assert read_emg(tmp_path / "session").closed
+
+
+class Blocks:
+    """A source whose samples come 0.8 s at a time, so many times."""
+
+    rate_hz, block_s = 2000.0, 0.8
+
+    def __init__(self, most: int) -> None:
+        self.most, self.start_s, self.sent = most, time.monotonic() - self.block_s, 0
+
+    def read(self) -> EmgSamples:
+        due = min(int((time.monotonic() - self.start_s) / self.block_s), self.most)
+        count = np.arange(self.sent, round(due * self.block_s * self.rate_hz))
+        self.sent += count.size
+        return EmgSamples(self.start_s + count / self.rate_hz, 0.0, np.zeros((count.size, 2)))
+
+    def close(self) -> None:
+        pass
+
+
+def in_blocks(_: EmgSettings) -> Blocks:
+    return Blocks(1000)
+
+
+def in_three_blocks(_: EmgSettings) -> Blocks:
+    return Blocks(3)
+
+
+def test_a_source_that_sends_blocks_is_not_named_missing(tmp_path: Path):
+    """Though they are longer than what else counts as missing; the last is waited for."""
+    seen: set[ProcessCondition] = set()
+
+    def watch(shared: SessionMemory) -> None:
+        start_s = time.monotonic()
+        while time.monotonic() < start_s + 3.0:
+            seen.add(shared.status.condition(Role.EMG))
+            time.sleep(0.02)
+        shared.status.show_loop(LoopStatus(time_s=time.monotonic() - start_s))
+
+    settings = with_emg(source="lsl", stream="Blocks")
+    _, remarks = recorded(settings, tmp_path / "session", 0.5, in_blocks, watch)
+    assert seen - {ProcessCondition.STARTING} == {ProcessCondition.RUNNING}
+    assert remarks == []
+    assert read_emg(tmp_path / "session").time_s[-1] > 3.0
+
+
+def test_blocks_that_stop_are_named_missing(tmp_path: Path):
+    notes: list[str] = []
+
+    def watch(shared: SessionMemory) -> None:
+        notes.append(reached(shared, ProcessCondition.TROUBLE))
+        shared.status.show_loop(LoopStatus(time_s=10.0))
+
+    settings = with_emg(source="lsl", stream="Blocks")
+    _, remarks = recorded(settings, tmp_path / "session", 0.5, in_three_blocks, watch)
+    since = notes[0].removeprefix("missing since ")
+    assert remarks == [f"EMG is missing from {since.removesuffix(' s')} to 10.0 s"]
 
 
 def test_the_virtual_subject_has_the_emg_of_its_ticks(tmp_path: Path):

@@ -33,7 +33,12 @@ from rigidimeter.rig.devices.base import EmgSamples, EmgSource
 POLL_S = 0.05
 NICENESS = 5
 STALLED_S = 0.5
-"""EMG that is missing for longer is named."""
+"""EMG that is missing for longer is named; where a source sends blocks, for a block longer."""
+BLOCKS = 5
+"""So many blocks show how long those of a source are: the second longest of them, for one that
+waited somewhere says nothing of the next."""
+LAST_BLOCK_S = 1.5
+"""For so long at most the last block is waited for after the session; the process must end."""
 WAITING_S = 60.0
 """So much EMG waits for a disk that takes nothing."""
 SYNC_S = 1.0
@@ -80,6 +85,32 @@ class _Virtual:
 
     def close(self) -> None:
         """Do nothing: there is no connection."""
+
+
+class _Arrivals:
+    """When samples came, and whether the source is silent for longer than between its blocks."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self._rate_hz = rate_hz
+        self._blocks_s: deque[float] = deque(maxlen=BLOCKS)
+        self._arrived_s = time.monotonic()
+
+    def note(self, samples: int, *, expected: bool) -> None:
+        """Note what was read; before anything is expected there is no silence."""
+        if samples:
+            self._blocks_s.append(samples / self._rate_hz)
+        if samples or not expected:
+            self._arrived_s = time.monotonic()
+
+    @property
+    def block_s(self) -> float:
+        """How long the blocks of the source are."""
+        longest = sorted(self._blocks_s)[-2:]
+        return longest[0] if longest else 0.0
+
+    @property
+    def stalled(self) -> bool:
+        return time.monotonic() - self._arrived_s > STALLED_S + self.block_s
 
 
 class _Envelope:
@@ -161,10 +192,11 @@ def emg_main(
     found: list[str] = []
     try:
         events = _Events(shared)
+        LiveEnvelope(settings.emg.rate_hz, 1)  # loads what takes a second, before the source sends
         source = open_emg(settings.emg) if open_emg else _Virtual(settings, shared, events)
         written = _Written(settings, _folder(shared))
-        remarks.send([])
         envelope = _Envelope(source, len(settings.emg.channels), shared.status)
+        remarks.send([])
         found = _record(source, written, envelope, events, shared, lost_s, console_pid)
     except Exception as error:  # of the source's package too: else an end without a word
         found = [f"EMG was not recorded: {error or type(error).__name__}"]
@@ -194,19 +226,21 @@ def _record(
     """Record; return what is missing, as sentences."""
     status = shared.status
     missing: list[str] = []
-    over, last_s, arrived_s = False, 0.0, time.monotonic()
+    over, last_s, arrivals, until_s = False, 0.0, _Arrivals(source.rate_hz), math.inf
     status.set_condition(Role.EMG, ProcessCondition.RUNNING)
     try:
         while not over:
             # A loop that was killed did not say that it ended; the recorder does.
             ended = any(status.ended(role, lost_s) for role in (Role.LOOP, Role.RECORDER))
-            over = ended or os.getppid() != console_pid
+            if ended and math.isinf(until_s):
+                until_s = time.monotonic() + _last_block_s(arrivals.block_s)
+            whole = ended and last_s >= _length_s(status)
+            over = whole or time.monotonic() >= until_s or os.getppid() != console_pid
             events.follow()
             source_s, offset_s, emg_v = source.read()
             status.beat(Role.EMG)
-            if source_s.size or events.origin_s is None:
-                arrived_s = time.monotonic()
-            _show(status, last_s, stalled=time.monotonic() - arrived_s > STALLED_S)
+            arrivals.note(source_s.size, expected=events.origin_s is not None)
+            _show(status, last_s, stalled=arrivals.stalled)
             if events.origin_s is not None:
                 time_s = source_s + (offset_s - events.origin_s)
                 since = time_s >= 0.0  # the session's clock began
@@ -226,8 +260,7 @@ def _record(
         missing.append(f"EMG {note}")
     else:
         status.set_condition(Role.EMG, ProcessCondition.DONE)
-        loop = status.loop()
-        missing += _gap(last_s, loop.time_s if loop is not None else 0.0)
+        missing += _gap(last_s, _length_s(status))
     finally:
         source.close()
         written.close()
@@ -236,6 +269,17 @@ def _record(
     if status.folder() != written.folder:
         missing.append(f"EMG is in {written.folder / EMG}, not with the samples; copy it to them")
     return missing
+
+
+def _last_block_s(block_s: float) -> float:
+    """Return for how long a block may be on its way when the session has ended."""
+    return min(block_s + STALLED_S, LAST_BLOCK_S) if block_s > STALLED_S else 0.0
+
+
+def _length_s(status: SharedStatus) -> float:
+    """Return how long the session is, 0 where the loop never ran."""
+    loop = status.loop()
+    return loop.time_s if loop is not None else 0.0
 
 
 def _show(status: SharedStatus, last_s: float, *, stalled: bool) -> None:

@@ -89,6 +89,8 @@ def test_the_envelope_of_each_muscle_is_in_a_pane_where_there_is_emg(page):
     page.evaluate("(sent) => rigTraces.emg(sent)", sent | {"points": []})
     missing = "EMG envelope [µV]: — biceps – – triceps"
     assert missing in send(page, math.nan)
+    page.evaluate("(sent) => rigTraces.emg(sent)", sent | {"points": [[6.9, 5.0, 6.0]]})
+    assert "EMG envelope [µV]: — biceps: 5.00 – – triceps: 6.00" in send(page, math.nan)
     page.evaluate("rigTraces.task('sinusoid')")
     assert sum("EMG" in one for one in send(page, math.nan)) == 1
     page.evaluate("rigTraces.emg({ muscles: [], points: [] })")

@@ -5,7 +5,7 @@ window.rigTraces = (() => {
   const PANES = ["torque [N·m]", "angle [deg]", "velocity command [deg/s]", "perturbation [N·m]", "drive's torque [N·m]"];
   const PERTURBATION = 3, DRIVE = 4;
   const DASHES = [[], [8, 4], [2, 3]];  // lines are told apart by their dashes too
-  const EMG_OLD_S = 0.5, MARKS = ["—", "– –", "···"];
+  const EMG_OLD_S = 0.5, GAP_S = 1e-3, MARKS = ["—", "– –", "···"];
   const TITLE_PX = 22, TIME_AXIS_PX = 52, FONT = "14px system-ui", LABEL = { labelFont: FONT, labelSize: 20 };
   const $ = (id) => document.getElementById(id);
   const colour = (name) => getComputedStyle(document.body).getPropertyValue(name).trim();
@@ -49,7 +49,9 @@ window.rigTraces = (() => {
     const last = () => envelope[0][envelope[0].length - 1], now = data[0][data[0].length - 1];
     const add = (point) => point.forEach((value, k) => envelope[k].push(value));
     for (const point of sent.points) if (!(point[0] <= last())) add(point);
-    if (now - last() > EMG_OLD_S) add([now, ...muscles.map(() => null)]);  // missing: a gap, and no value
+    // Missing: a gap, and no value. What comes later, as of a source that sends long blocks, is drawn behind it.
+    const values = envelope[muscles.length ? 1 : 0];
+    if (now - last() > EMG_OLD_S && values[values.length - 1] !== null) add([last() + GAP_S, ...muscles.map(() => null)]);
     forget([envelope]);
   }
 
