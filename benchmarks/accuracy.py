@@ -85,7 +85,7 @@ def pooled_bias(n: int) -> list[str]:
             )
         rows.append(
             [
-                f"{sd} N·m, bandlimited, mean of {len(squares)}",
+                f"{sd} N·m, bandlimited, mean of {len(squares)}, three a recording",
                 *percent(np.mean(array(squares), 0) / TRUTH - 1),
             ]
         )
