@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 OUT ?= demo-study
 
-.PHONY: install demo test check docs bench bench-loop hazards mutation golden matrix fuzz docs-pictures example-data clean
+.PHONY: install demo test quick check docs bench bench-loop hazards mutation golden matrix fuzz docs-pictures example-data clean
 
 install: $(STAMP)
 
@@ -32,6 +32,14 @@ test: export PYTHONDONTWRITEBYTECODE =
 
 test: install
 	$(BIN)/python -m tests
+
+# Under a minute: before each commit.
+quick: install
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/lint-imports > /dev/null || $(BIN)/lint-imports
+	$(BIN)/python -m pytest -q -n 2 -m "not slow and not realtime" tests/unit/core tests/unit/model tests/unit/rig/guard \
+		tests/unit/test_fronts.py tests/docs/test_documents.py tests/docs/test_generated.py tests/docs/test_plain_words.py
 
 check: install
 	$(BIN)/ruff format --check .
