@@ -1,16 +1,18 @@
-"""Runs the shell blocks of documents in order, and compares or rewrites the output that they show.
+"""Runs the blocks of documents in order, of the shell and of Python, and compares or rewrites the output that they show.
 
     python -m tests.docs.blocks            compare
     python -m tests.docs.blocks --write    rewrite what differs
 
 Each document has a folder of its own. In it the blocks ``sh`` are run, and those in a comment,
 ``<!-- sh``, which a reader does not see (``<!-- sh quiet``: nor what it prints); ``toml NAME`` is
-written as a file. A block ``text output`` shows what the commands since the last one printed. A
+written as a file. Blocks ``python`` are cells of one notebook: of each a last expression is shown;
+``<!-- python`` is one that a reader does not see. A block ``text output`` shows what the commands since the last one printed. A
 block after ``<!-- not run -->`` needs a rig, or a study of the reader's.
 """
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import io
 import os
@@ -21,7 +23,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from tests.console.opened import Console
 from tests.docs.markdown import ROOT
@@ -33,6 +35,8 @@ HOW_TO = ROOT / "docs" / "how-to"
 RUN = (
     TUTORIALS / "first-study.md",
     TUTORIALS / "operator-day.md",
+    TUTORIALS / "my-first-recording.md",
+    TUTORIALS / "from-python.md",
     HOW_TO / "after-a-change.md",
     HOW_TO / "count-the-days.md",
     HOW_TO / "design-an-experiment.md",
@@ -44,7 +48,7 @@ RUN = (
 
 NOT_RUN = "<!-- not run -->\n"
 
-_BLOCK = re.compile(r"^(?:```|<!-- (?=sh))([^\n]*)\n(.*?)^(?:```|-->)$", re.DOTALL | re.M)
+_BLOCK = re.compile(r"^(?:```|<!-- (?=sh|python))([^\n]*)\n(.*?)^(?:```|-->)$", re.DOTALL | re.M)
 _NUMBER = re.compile(r"(?<![\w-])[+−-]?\d+(?:[.,]\d+)?(?![\w.]\d)")
 _TOOK = re.compile(r"(?<=Done in )\d+(?= s)")
 _VARIES = (
@@ -80,6 +84,7 @@ def run(path: Path, folder: Path) -> Iterator[Shown]:
         If a command ends with another status than 0.
     """
     printed, text = "", path.read_text("utf-8")
+    names: dict[str, Any] = {"__name__": path.stem}
     for block in _BLOCK.finditer(text):
         kind, _, more = block[1].partition(" ")
         if text[: block.start()].endswith(NOT_RUN):
@@ -87,6 +92,8 @@ def run(path: Path, folder: Path) -> Iterator[Shown]:
         if kind == "sh":
             said = [_command(line, folder) for line in lines_of(block[2])]
             printed += "" if more == "quiet" else "".join(said)
+        elif kind == "python":
+            printed += cell(block[2], folder, names)
         elif kind == "toml" and more:
             (folder / more).write_text(block[2], "utf-8")
         elif block[1] == "text output":
@@ -94,6 +101,20 @@ def run(path: Path, folder: Path) -> Iterator[Shown]:
                 path, block.start(2), block[2], printed.replace(f"{folder.resolve()}", "...")
             )
             printed = ""
+
+
+def cell(text: str, folder: Path, names: dict[str, Any]) -> str:
+    """Run a block of Python as a cell of a notebook; return what it shows."""
+    tree = ast.parse(text)
+    last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+    out = io.StringIO()
+    with contextlib.chdir(folder), contextlib.redirect_stdout(out):
+        exec(compile(tree, "document", "exec"), names)
+        if last is not None:
+            shown = eval(compile(ast.Expression(last.value), "document", "eval"), names)
+            if shown is not None:
+                print(repr(shown))
+    return out.getvalue()
 
 
 def lines_of(text: str) -> list[str]:

@@ -6,10 +6,20 @@ from collections.abc import Callable, Iterable, Mapping
 
 from rigidimeter.analysis.batch import columns as batch_columns
 from rigidimeter.analysis.reading import estimates_document
+from rigidimeter.analysis.reading.channels.choice import LABELS
 from rigidimeter.analysis.reading.formats import READERS
 from rigidimeter.core.files import Meaning, described, meaning_of
 from rigidimeter.core.findings import Finding
-from rigidimeter.core.records import Activity, Analysis, Delay, Fit, Outcome, Score
+from rigidimeter.core.records import (
+    CHANNEL_UNITS,
+    EMG_CHANNELS,
+    Activity,
+    Analysis,
+    Delay,
+    Fit,
+    Outcome,
+    Score,
+)
 from rigidimeter.core.session import SAMPLE_UNITS
 
 
@@ -88,6 +98,16 @@ def formats_table() -> str:
         suffixes = ", ".join(f"`{suffix}`" for suffix in reader.suffixes) or "a folder"
         extra = f"`rigidimeter[{reader.extra}]`" if reader.extra else "–"
         lines.append(f"| {reader.name} | {suffixes} | {reader.about} | {extra} |")
+    return "\n".join(lines)
+
+
+def columns_read() -> str:
+    """Return the columns that a recording may have."""
+    read = described("read")
+    rows = {"time_s": "s"} | {n: u for n, u in CHANNEL_UNITS.items() if n not in EMG_CHANNELS[1:]}
+    lines = ["| column | unit | |", "| --- | --- | --- |"]
+    for name in (*rows, *LABELS):
+        lines.append(f"| `{name}` | {rows.get(name, '')} | {read[name].meaning} |")
     return "\n".join(lines)
 
 

@@ -144,7 +144,7 @@ def _every_help(*command: str) -> list[str]:
 
 
 def test_the_columns_that_are_read_are_listed() -> None:
-    columns = table(ROOT / "docs" / "how-to" / "read-your-recording.md", "The columns")
+    columns = table(ROOT / "docs" / "how-to" / "name-the-columns.md", "Name the columns")
     listed = {name: unit for name, unit in CHANNEL_UNITS.items() if name not in EMG_CHANNELS[1:]}
     assert set(columns) == {"time_s", *listed, *LABELS}
     for name, unit in listed.items():
