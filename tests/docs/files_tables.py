@@ -106,8 +106,9 @@ def columns_read() -> str:
     read = described("read")
     rows = {"time_s": "s"} | {n: u for n, u in CHANNEL_UNITS.items() if n not in EMG_CHANNELS[1:]}
     lines = ["| column | unit | |", "| --- | --- | --- |"]
-    for name in (*rows, *LABELS):
-        lines.append(f"| `{name}` | {rows.get(name, '')} | {read[name].meaning} |")
+    lines += [
+        f"| `{name}` | {rows.get(name, '')} | {read[name].meaning} |" for name in (*rows, *LABELS)
+    ]
     return "\n".join(lines)
 
 
