@@ -1,4 +1,4 @@
-"""Runs the blocks of documents in order, of the shell and of Python, and compares or rewrites the output that they show.
+"""Runs the blocks of documents in order; compares or rewrites the output that they show.
 
     python -m tests.docs.blocks            compare
     python -m tests.docs.blocks --write    rewrite what differs
@@ -6,8 +6,9 @@
 Each document has a folder of its own. In it the blocks ``sh`` are run, and those in a comment,
 ``<!-- sh``, which a reader does not see (``<!-- sh quiet``: nor what it prints); ``toml NAME`` is
 written as a file. Blocks ``python`` are cells of one notebook: of each a last expression is shown;
-``<!-- python`` is one that a reader does not see. A block ``text output`` shows what the commands since the last one printed. A
-block after ``<!-- not run -->`` needs a rig, or a study of the reader's.
+``<!-- python`` is one that a reader does not see. A block ``text output`` shows what the commands
+since the last one printed. A block after ``<!-- not run -->`` needs a rig, or a study of the
+reader's.
 """
 
 from __future__ import annotations
