@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 OUT ?= demo-study
 
-.PHONY: install demo test quick check docs bench bench-loop hazards mutation golden matrix fuzz docs-pictures example-data clean
+.PHONY: install demo test quick check docs gallery bench bench-loop hazards mutation golden matrix fuzz docs-pictures example-data clean
 
 install: $(STAMP)
 
@@ -53,6 +53,13 @@ docs: install
 	$(BIN)/codespell README.md docs examples src
 	$(BIN)/sphinx-build --fail-on-warning --keep-going -q -b html docs build/site
 	@echo "the site: build/site/index.html"
+
+# The gallery with the scripts that need more packages, too.
+gallery: install
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[docs,bench]'
+	$(BIN)/sphinx-build --fail-on-warning --keep-going -q -b html \
+		-D sphinx_gallery_conf.filename_pattern=/ docs build/site
+	@echo "the gallery: build/site/gallery/index.html"
 
 bench: install
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[all,dev,bench]'

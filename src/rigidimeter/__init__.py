@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from rigidimeter.analysis.estimation import identify
     from rigidimeter.analysis.reading import data, read
     from rigidimeter.analysis.report import plot, report
-    from rigidimeter.analysis.study import compare, estimate
+    from rigidimeter.analysis.study import compare, estimate, fit_terms
     from rigidimeter.planning import design
     from rigidimeter.virtual import simulate
 
@@ -40,6 +40,7 @@ __all__ = [
     "data",
     "design",
     "estimate",
+    "fit_terms",
     "identify",
     "plot",
     "read",
@@ -53,6 +54,7 @@ _ROOMS = {
     "data": "rigidimeter.analysis.reading",
     "estimate": "rigidimeter.analysis.study",
     "compare": "rigidimeter.analysis.study",
+    "fit_terms": "rigidimeter.analysis.study",
     "simulate": "rigidimeter.virtual",
     "design": "rigidimeter.planning",
     "plot": "rigidimeter.analysis.report",

@@ -9,7 +9,7 @@ import rigidimeter
 from rigidimeter.core.errors import UserError, arguments_named
 
 NAMES = {
-    *("batch", "compare", "data", "design", "estimate", "identify"),
+    *("batch", "compare", "data", "design", "estimate", "fit_terms", "identify"),
     *("plot", "read", "report", "simulate"),
 }
 

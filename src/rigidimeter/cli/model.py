@@ -15,9 +15,6 @@ from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import show
 from rigidimeter.core.errors import UserError
 
-USUAL = "inertia,damping,stiffness"
-COMPARED = f"{USUAL},reflex,cubic,directional-damping,coulomb"
-
 
 @reads_recordings
 def model(
@@ -45,7 +42,7 @@ def model(
     For example:
       rigidimeter model demo-study/elbow.csv --terms inertia,reflex --compare
     """
-    from rigidimeter.analysis.estimation.terms import candidates, parse_terms
+    from rigidimeter.analysis.study.fitted_terms import asked
     from rigidimeter.analysis.study.torque_models import model_document, model_recording
     from rigidimeter.cli.model_text import model_blocks
     from rigidimeter.core.files import write_json
@@ -54,9 +51,7 @@ def model(
         raise UserError(
             f"--method {recordings.method}: terms are fitted only with bandlimited; leave it out"
         )
-    named = [parse_terms(text) for text in terms or [COMPARED if compare else USUAL]]
-    grow = compare and len(named) == 1
-    models = candidates(named[0]) if grow else named
+    models, grow = asked(terms, compare)
     band_hz = recordings.band_hz
     if band_hz is not None and band_hz[0] == 0:
         if not band_hz[1] > 0:

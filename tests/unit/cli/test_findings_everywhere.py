@@ -84,6 +84,7 @@ def test_every_output_says_the_same_words(shown):
     for group in estimates.findings:
         one = group.finding
         assert " ".join(group.line.split()) in on_terminal
+        assert repr(group) == group.line
         unfolding = (
             f'<span class="outcome is-{one.level}">{one.level}</span> '
             f"<strong>{one.name}</strong> {one.headline}; {group.where}</summary> "

@@ -29,6 +29,7 @@ from rigidimeter.analysis.study.difference_rows import (
 )
 from rigidimeter.analysis.study.differences import Difference
 from rigidimeter.analysis.study.families import Primary
+from rigidimeter.analysis.study.fitted_terms import FittedTerms, fit_terms
 from rigidimeter.analysis.study.measures import RATING, Measure, Observation, conditions
 from rigidimeter.analysis.study.provenance import provenance
 from rigidimeter.analysis.study.rating_relation import Relation, agreement, relations

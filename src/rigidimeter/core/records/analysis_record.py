@@ -105,6 +105,9 @@ class FindingGroup(NamedTuple):
         one = self.finding
         return f"{one.level}  {one.name}  {one.headline}; {self.where}"
 
+    def __repr__(self) -> str:
+        return self.line
+
 
 def grouped(
     fits: Sequence[Fit], pooled: Sequence[Fit], across: Sequence[Finding] = ()
