@@ -5,13 +5,16 @@
 The loop of the virtual rig runs as on a rig, with recorder and live estimator. EMG comes from an
 outlet of Lab Streaming Layer in a program of its own, which runs in all three cases; in the third
 it sends nothing from 6 s after it was found. The cases take turns, so that what else the machine
-does is shared by them. The first second is left out: processes start then.
+does is shared by them; the ratio is that of each session to the one without EMG of the same turn.
+`cyclictest` of the loop's priority runs beside it, where it is installed. The first second is left
+out: processes start then.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -21,15 +24,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.loop import Timed
+from benchmarks.loop import Timed, cyclictest, histogram_us, late_and_missed, quantiles_us
+from benchmarks.quiet import Beside, Others, quiet_words, ratio_words
 from rigidimeter.core.session import read_emg, read_samples
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.planning import plan
 from rigidimeter.rig.acquisition import DeadlineClock, run_session
-from rigidimeter.rig.acquisition.processes import LoopSide, Realtime, RecordingPlan, supervise
+from rigidimeter.rig.acquisition.processes import (
+    LoopSide,
+    Realtime,
+    RecordingPlan,
+    SessionMemory,
+    supervise,
+)
 from rigidimeter.rig.devices import SimulatedRig, open_emg
 
 SKIPPED_S = 1.0
+CPU = 1
 CASES = ("without EMG", "two channels at 2 kHz", "a stream that stalls")
 OUTLET = """\
 import sys, time
@@ -62,6 +73,7 @@ class Run(NamedTuple):
     p99_us: float
     emg: int
     lost: int
+    beside: Beside
 
 
 def session(settings: Settings, duration_s: float, side: LoopSide) -> None:
@@ -85,6 +97,14 @@ def measured(case: str, seconds: float, folder: Path, priority: int) -> Run:
     emg = {"source": "lsl", "stream": name, "muscles": ["biceps", "triceps"]}
     patient = {"missed_in_a_row": 1000, "stall_s": 1.0}
     settings = parse_settings({"loop": patient, **({} if case == CASES[0] else {"emg": emg})})
+    others, rate_hz = Others(), settings.rig.tick_rate_hz
+    reference: list[subprocess.Popen[str]] = []
+
+    def console(shared: SessionMemory) -> None:
+        status = shared.status.loop()
+        if not reference and status is not None and status.time_s >= SKIPPED_S:
+            reference.append(cyclictest(rate_hz, seconds - SKIPPED_S, CPU, priority))
+
     how = "stalls" if case == CASES[2] else "sends"
     command = [sys.executable, "-c", OUTLET, name, how]
     outlet = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
@@ -95,16 +115,23 @@ def measured(case: str, seconds: float, folder: Path, priority: int) -> Run:
             partial(session, settings, seconds),
             RecordingPlan(folder, settings, virtual=True),
             realtime=Realtime(priority=priority, attended=False),
+            console=console if shutil.which("cyclictest") else lambda _: None,
             open_emg=open_emg,
         )
     finally:
         outlet.kill()
         outlet.communicate()
+        counts = [histogram_us(one.communicate()[0]) for one in reference]
+    beside = Beside(others.percent())
+    if counts and counts[0].any():
+        p99_us = quantiles_us(counts[0])[1]
+        beside = beside._replace(
+            reference_us=p99_us, reference_late=late_and_missed(counts[0], rate_hz)[0]
+        )
     samples = read_samples(folder / "samples.arrows")
     later = samples["time_s"] >= SKIPPED_S
     late_s, tick = samples["lateness_s"][later], samples["tick"][later]
     found = read_emg(folder)
-    rate_hz = settings.rig.tick_rate_hz
     run = Run(
         tick.size,
         int(np.sum(late_s > 0.5 / rate_hz)),
@@ -112,6 +139,7 @@ def measured(case: str, seconds: float, folder: Path, priority: int) -> Run:
         1e6 * float(np.quantile(late_s, 0.99)),
         0 if found is None else found.time_s.size,
         0 if found is None else int(np.sum(np.round(np.diff(found.emg_v["emg_v"])) != 1)),
+        beside,
     )
     said = "; ".join(ended.remarks) or "nothing is missing"
     print(f"  {case}: {run.late} late, {run.missed} missed; {said}", file=sys.stderr)
@@ -125,18 +153,36 @@ def main() -> None:
     parser.add_argument("--priority", type=int, default=80)
     parser.add_argument("--cases", nargs="+", choices=CASES, default=CASES)
     asked = parser.parse_args()
-    print("| | ticks run | late | missed | p99 of lateness, µs | samples of EMG | gaps in them |")
-    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: |")
     runs: dict[str, list[Run]] = {case: [] for case in asked.cases}
     with tempfile.TemporaryDirectory() as place:
         for k in range(asked.runs):
             for case in asked.cases:
                 folder = Path(place) / f"{k}-{CASES.index(case)}"
                 runs[case].append(measured(case, asked.seconds, folder, asked.priority))
+    names = ("", "ticks run", "late", "missed", "p99 of lateness, µs", "ratio to that without EMG",
+             "p99 of cyclictest, µs", "others, % of processors", "samples of EMG",
+             "gaps in them")  # fmt: skip
+    print(f"| {' | '.join(names)} |\n| --- |{' ---: |' * (len(names) - 1)}")
     for case, found in runs.items():
-        ran, late, missed, _, emg, lost = map(sum, zip(*found, strict=True))
-        p99_us = float(np.median([run.p99_us for run in found]))
-        print(f"| {case} | {ran} | {late} | {missed} | {p99_us:.0f} | {emg} | {lost} |")
+        print(f"| {case} | {' | '.join(_cells(found, runs.get(CASES[0], [])))} |")
+    print(f"\n{quiet_words([run.beside for found in runs.values() for run in found])}")
+
+
+def _cells(found: list[Run], without: list[Run]) -> list[str]:
+    ratio = "–"
+    if without and without is not found:
+        ratio = ratio_words([run.p99_us for run in found], [run.p99_us for run in without])
+    medians = (
+        np.median([run.p99_us for run in found]),
+        np.median([run.beside.reference_us for run in found]),
+        np.median([run.beside.others_percent for run in found]),
+    )
+    ours_us, theirs_us, others = (f"{value:.0f}" for value in medians)
+    ran, late, missed, emg, lost = (
+        str(sum(getattr(run, name) for run in found))
+        for name in ("ran", "late", "missed", "emg", "lost")
+    )
+    return [ran, late, missed, ours_us, ratio, theirs_us, others, emg, lost]
 
 
 if __name__ == "__main__":

@@ -102,10 +102,12 @@ class Lateness(NamedTuple):
     ended: Ended
 
 
-def cyclictest(rate_hz: float, seconds: float, cpu: int) -> subprocess.Popen[str]:
+def cyclictest(
+    rate_hz: float, seconds: float, cpu: int, priority: int = PRIORITY
+) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [
-            *["cyclictest", "--quiet", "--mlockall", "--threads=1", f"--priority={PRIORITY}"],
+            *["cyclictest", "--quiet", "--mlockall", "--threads=1", f"--priority={priority}"],
             *[f"--affinity={cpu}", f"--interval={round(1e6 / rate_hz)}"],
             *[f"--duration={math.ceil(seconds)}", f"--histogram={HISTOGRAM_US}"],
         ],

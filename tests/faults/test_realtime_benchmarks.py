@@ -35,7 +35,9 @@ def test_ticks_beside_emg():
     """EMG is recorded without a gap beside the loop."""
     pytest.importorskip("pylsl", reason="pip install 'rigidimeter[lsl]'")
     case = "two channels at 2 kHz"
-    (row,) = printed_by("emg", "--seconds", 2, "--runs", 1, "--cases", case).splitlines()[2:]
+    printed = printed_by("emg", "--seconds", 2, "--runs", 1, "--cases", case)
+    row, _, words = printed.splitlines()[2:]
+    assert words.startswith("The machine was ")
     *_, emg, gaps = row.split("|")[1:-1]
     assert int(emg) > 2000
     assert int(gaps) == 0

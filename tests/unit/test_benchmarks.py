@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from benchmarks import batch
 from benchmarks.loop import late_and_missed
+from benchmarks.quiet import Beside, Others, quiet_words, ratio_words
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
@@ -117,3 +118,19 @@ def test_ticks_of_cyclictest_are_counted_as_ours() -> None:
     counts = np.bincount([400, 600, 1000, 1999, 3400, 3400], minlength=5000)
     assert late_and_missed(counts, 1000.0) == (5, 1 + 1 + 3 + 3)
     assert late_and_missed(counts, 100.0) == (0, 0)
+
+
+def test_a_machine_is_quiet_by_others_load_and_cyclictest():
+    quiet, busy, late = Beside(2.0, 40.0), Beside(30.0, 40.0), Beside(2.0, 90.0, 3)
+    assert quiet_words([quiet, quiet]).startswith("The machine was quiet: ")
+    assert "was not quiet: other programs took at most 30 %" in quiet_words([quiet, busy])
+    assert "cyclictest woke up 3 times more than half" in quiet_words([quiet, late])
+    assert "was not quiet" in quiet_words([quiet, late])
+    assert "cyclictest is not installed" in quiet_words([Beside(1.0)])
+    assert 0.0 <= Others().percent() <= 100.0
+
+
+def test_a_ratio_has_the_interval_of_its_runs():
+    """Logarithms -0.1, 0 and 0.1: their standard error is 0.0577, and t 4.303."""
+    assert ratio_words(np.exp([0.9, 1.0, 1.1]), np.exp([1.0] * 3)) == "1.00 (0.78 to 1.28)"
+    assert ratio_words([3.0], [2.0]) == "1.50"
