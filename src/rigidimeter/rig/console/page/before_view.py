@@ -122,8 +122,9 @@ class BeforeView:
         with ui.row():
             self._start = ui.button(start, on_click=self._ask).mark("start")
             self._start.props("size=lg")
-            ui.button("Predict precision, margin, days needed", on_click=self._predict)
-            ui.button("Dry run on the virtual rig", on_click=self._dry_run)
+            if not self._codes:  # the numbers of a condition would say which one it is
+                ui.button("Predict precision, margin, days needed", on_click=self._predict)
+                ui.button("Dry run on the virtual rig", on_click=self._dry_run)
             tested = ui.button("Test the tones").mark("tones")
             tested.on("click", js_handler="() => window.rigTones.test()")
             tested.tooltip("Two short low tones, a caution, then a long high one, a stop")
@@ -296,8 +297,7 @@ class BeforeView:
             ui.notify("first put right what is wrong in the form")
             return
         self._answer.set_content("<p>computing …</p>")
-        answer = await computed(self._jobs, settings, command, options, lines)
-        self._answer.set_content(in_codes(answer, self._codes))
+        self._answer.set_content(await computed(self._jobs, settings, command, options, lines))
 
 
 def _stored(path: Path) -> Any:

@@ -27,12 +27,13 @@ from rigidimeter.rig.console.page.session_form import (
 
 
 def coded_form(form: Mapping[str, str], codes: Mapping[str, str]) -> dict[str, str]:
-    """Return a form with codes in place of conditions; those that have none are left empty."""
+    """Return a form whose conditions are codes; any other is emptied.
+
+    A code in place of the protocol's own condition would say what the code stands for.
+    """
     conditions = {f"condition{k}": form[f"condition{k}"] for k in blocks_of(form)}
-    return dict(form) | {
-        key: text if text in codes.values() else codes.get(text, "")
-        for key, text in conditions.items()
-    }
+    kept = {key: text if text in codes.values() else "" for key, text in conditions.items()}
+    return dict(form) | kept
 
 
 def read_coded_form(

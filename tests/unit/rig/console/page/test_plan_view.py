@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from rigidimeter.rig.console.page import (
     PlanView,
     ServerState,
     StartRequest,
+    empty_form,
 )
 
 NAMES = ("Zebra", "Quagga")
@@ -208,6 +210,18 @@ def test_a_session_outside_of_the_plan_has_no_place_in_it(client, study):
     assert "plan" not in request.about
     assert request.about["subject"] == "S01"
     assert request.settings.protocol.blocks[0].condition == "OFF"
+
+
+def test_no_code_stands_in_place_of_a_condition_that_the_form_would_have(client, study):
+    """Whoever knows the protocol of the console would know what the code stands for."""
+    folder = study("--blinded")
+    draft = empty_form(Settings()) | {"condition0": "Quagga", "condition1": "code-A"}
+    (folder / "draft.json").write_text(json.dumps(draft))
+    shown = Page(client, folder)
+    shown.outside()
+    assert [shown.field(f"condition{k}", outside=True).value for k in (0, 1)] == ["", "code-A"]
+    buttons = [e.text for e in client.elements.values() if isinstance(e, ui.button)]
+    assert not any(text.startswith(("Predict", "Dry run")) for text in buttons)
 
 
 def test_a_session_outside_of_a_blinded_plan_takes_its_codes(client, study):
