@@ -1,4 +1,4 @@
-"""The blocks of documents that are written from the code, between marks.
+"""The blocks of documents that are written from the code, between marks, and the JSON Schemas.
 
 `python -m tests.docs.generated` writes them anew. A block NAME stands between the marks
 `<!-- NAME: begin -->` and `<!-- NAME: end -->`.
@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from tests.docs.command_help import command_help
 from tests.docs.conformance_table import drive_rules, sensor_rules
 from tests.docs.files_tables import FILES_BLOCKS, columns_read, formats_table
 from tests.docs.findings_table import findings_table
+from tests.docs.json_schemas import SCHEMAS, schema_text
 from tests.docs.markdown import ROOT
 from tests.docs.settings_tables import (
     mapping_tables,
@@ -39,6 +39,7 @@ BLOCKS: Mapping[Path, Mapping[str, Callable[[], str]]] = {
         "mapping": mapping_tables,
     },
 }
+FOLDER = ROOT / "docs" / "static" / "schemas"
 
 
 def with_blocks(page: Path) -> str:
@@ -52,11 +53,8 @@ def with_blocks(page: Path) -> str:
     return text
 
 
-def cell(text: str) -> str:
-    """Return a text as it may stand in a cell of a table."""
-    return re.sub(r"\s+", " ", text).replace("|", "\\|")
-
-
 if __name__ == "__main__":
     for path in BLOCKS:
         path.write_text(with_blocks(path), "utf-8")
+    for schema in SCHEMAS:
+        (FOLDER / schema).write_text(schema_text(schema), "utf-8")
