@@ -112,6 +112,8 @@ def columns_read() -> str:
     return "\n".join(lines)
 
 
+ratings_keys = _keys("ratings.json")
+
 FILES_BLOCKS: Mapping[str, Callable[[], str]] = {
     "manifest": _keys("manifest.json"),
     "samples": lambda: _table("column", SAMPLE_UNITS),

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from tests.docs.command_help import command_help
 from tests.docs.conformance_table import drive_rules, sensor_rules
-from tests.docs.files_tables import FILES_BLOCKS, columns_read, formats_table
+from tests.docs.files_tables import FILES_BLOCKS, columns_read, formats_table, ratings_keys
 from tests.docs.findings_table import findings_table
 from tests.docs.json_schemas import SCHEMAS, schema_text
 from tests.docs.markdown import ROOT
@@ -28,6 +28,7 @@ BLOCKS: Mapping[Path, Mapping[str, Callable[[], str]]] = {
     REFERENCE / "files.md": FILES_BLOCKS,
     REFERENCE / "formats.md": {"formats": formats_table},
     ROOT / "docs" / "how-to" / "name-the-columns.md": {"columns": columns_read},
+    ROOT / "docs" / "how-to" / "analyse-ratings.md": {"ratings": ratings_keys},
     REFERENCE / "diagnostics.md": {"findings": findings_table},
     REFERENCE / "commands.md": {"options": command_help},
     REFERENCE / "settings.md": {"settings": settings_tables},

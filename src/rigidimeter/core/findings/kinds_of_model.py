@@ -103,7 +103,7 @@ MODEL_KINDS = (
         "missing_term",
         "coupling compliance, friction, reflex, damping that differs between directions, cubic and "
         "quadratic stiffness: tested on the part of the torque that no linear filter of the motion "
-        "explains ([why](../how-to/choose-model-terms.md#why-terms-are-compared-without-their-"
+        "explains ([why](../development/model-terms.md#why-terms-are-compared-without-their-"
         "linear-part)), adjusted by Holm's method, p < 0.001; how far J, B and K move if they are "
         "included, in % of half their intervals (100 at most)",
         headline="The torque holds {terms}: {changes}",
