@@ -84,6 +84,7 @@ golden: install
 
 # Also the output that the tutorials show; it needs Chromium. Look at them before you commit them.
 docs-pictures: install
+	$(BIN)/python -m tests.docs.drawings
 	$(BIN)/python -m tests.docs.pictures
 
 # The recordings that `rm.data` returns.
