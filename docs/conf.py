@@ -35,6 +35,8 @@ sphinx_gallery_conf = {
     "within_subsection_order": "FileNameSortKey",
     "abort_on_example_error": True,
     "backreferences_dir": None,
+    "ignore_repr_types": r"matplotlib|ndarray",
+    "thumbnail_size": (640, 440),
     "remove_config_comments": True,
     "show_memory": False,
     "show_signature": False,

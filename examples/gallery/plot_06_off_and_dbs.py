@@ -10,6 +10,13 @@ The study is virtual: under DBS, B is 13 % and K 18 % lower, and every day has i
 
 import rigidimeter as rm
 
+# %%
+# The first table
+# ---------------
+#
+# Below OFF and DBS: what was measured, by how much they differ, what was simulated, the 95 %
+# interval and the verdict.
+
 result = rm.compare(rm.data("study"))
 result
 
@@ -20,12 +27,6 @@ result
 print(result.statements.tested)
 for sentence in result.statements.concluded:
     print(sentence)
-
-# %%
-# One row for each measure: the values, their difference, its 95 % interval and the verdict.
-
-differences = result.table().set_index("measure")
-differences[["reference", "value_reference", "other", "value_other", "p_holm", "verdict"]]
 
 # %%
 # Day by day
@@ -50,6 +51,7 @@ for found in result.findings:
 # The interval of K holds the simulated difference. That of B ends just short of it, as one in
 # twenty does.
 
+differences = result.table().set_index("measure")
 for measure, percent in {"stiffness_nm_rad": -18, "damping_nm_s_rad": -13}.items():
     row = differences.loc[measure]
     low, high = 100 * row[["difference_low", "difference_high"]] / row["value_reference"]

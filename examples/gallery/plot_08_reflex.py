@@ -46,7 +46,8 @@ MODELS = {
 models = rm.fit_terms(recording, list(MODELS.values()), compare=True)
 print(models)
 table = models.table()
-table[table["model"] == MODELS["with reflex+"]]
+shown = (table["model"] == MODELS["with reflex+"]) & (table["epoch"] == "0")
+table.loc[shown, ["parameter", "value", "se", "unit", "vaf_percent"]]
 
 # %%
 # The figure
