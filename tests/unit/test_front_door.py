@@ -1,8 +1,11 @@
 """The functions of `import rigidimeter`: listed, typed, and imported only when they are used."""
 
+import doctest
 import subprocess
 import sys
+from pathlib import Path
 
+import matplotlib.pyplot as plt
 import pytest
 
 import rigidimeter
@@ -25,6 +28,19 @@ def test_each_name_is_a_function_with_a_docstring() -> None:
         assert callable(function)
         assert len((function.__doc__ or "").splitlines()) > 3
         assert getattr(rigidimeter, name) is function
+
+
+@pytest.mark.parametrize("name", sorted(NAMES))
+def test_its_examples_run(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (found,) = doctest.DocTestFinder(recurse=False).find(getattr(rigidimeter, name), name)
+    assert found.examples, "the docstring has no example"
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
+    runner.run(found)
+    plt.close("all")
+    assert not runner.failures, capsys.readouterr().out
 
 
 def test_messages_name_arguments_and_not_options(tmp_path) -> None:

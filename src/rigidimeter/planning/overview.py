@@ -247,6 +247,13 @@ def design(
     ------
     UserError
         If a value is out of range, or the PRBS never changes level within its duration.
+
+    Examples
+    --------
+    >>> import rigidimeter as rm
+    >>> found = rm.design(prbs={"amplitude_nm": 0.5}, differences=["stiffness=20%"])
+    >>> all(condition.stable for condition in found.stability.conditions.values())
+    True
     """
     chosen = settings_from(settings, **changes)
     wanted = [WantedDifference.parse(text) for text in differences]

@@ -51,6 +51,15 @@ def simulate(
     ------
     UserError
         If the settings are wrong, the folder cannot be written, or the session fails.
+
+    Examples
+    --------
+    >>> import rigidimeter as rm
+    >>> blocks = [{"task": "prbs", "condition": "OFF", "epochs": 1}]
+    >>> settings = {"prbs": {"duration_s": 6.0}, "protocol": {"blocks": blocks}}
+    >>> recording = rm.simulate(settings, seed=1)
+    >>> [(epoch.label, epoch.condition) for epoch in recording.epochs]
+    [('1', 'OFF')]
     """
     settings = settings_from(settings)
     if seed is not None:

@@ -121,6 +121,16 @@ def batch(
     ------
     UserError
         If an argument is wrong, there is no input, or the table cannot be written.
+
+    Examples
+    --------
+    >>> import rigidimeter as rm
+    >>> session = {"prbs": {"duration_s": 6.0}, "protocol": {"blocks": [{"epochs": 1}]}}
+    >>> for seed in (1, 2):
+    ...     _ = rm.simulate(session, f"sessions/{seed}", seed=seed)
+    >>> found = rm.batch("sessions", "all.csv")
+    >>> found.inputs, found.epochs
+    (2, 2)
     """
     place = Path(out)
     if place.suffix not in ENDINGS:

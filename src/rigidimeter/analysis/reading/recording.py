@@ -227,6 +227,17 @@ def read(
     ------
     UserError
         If an argument is wrong, or if nothing could be read.
+
+    Examples
+    --------
+    >>> import numpy as np, rigidimeter as rm
+    >>> t = np.arange(3000) / 100
+    >>> angle = 3 * np.sin(2 * t) + 2 * np.sin(9 * t)  # deg
+    >>> rows = np.column_stack([t, np.sin(2 * t) + 0.1, angle])
+    >>> np.savetxt("mine.csv", rows, delimiter=",", header="time_s,Fz,angle", comments="")
+    >>> recording = rm.read("mine.csv", column={"torque_nm": "Fz"}, unit={"angle": "deg"})
+    >>> [(epoch.label, sorted(epoch.channels)) for epoch in recording.epochs]
+    [('1', ['angle_rad', 'torque_nm'])]
     """
     asked = _paths(paths)
     conditions = _conditions(condition, len(asked))

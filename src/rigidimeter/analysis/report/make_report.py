@@ -68,6 +68,13 @@ def report(
     ------
     UserError
         If something cannot be read, the folder cannot be written, or it holds other files.
+
+    Examples
+    --------
+    >>> import pandas as pd, rigidimeter as rm
+    >>> table = pd.DataFrame({"state": ["OFF", "ON"] * 6, "k": [1.8, 1.4, 1.7, 1.5] * 3})
+    >>> rm.report(rm.compare(table, value="k", by="state"), "report").name
+    'report.html'
     """
     folder = Path(out)
     if isinstance(result, (str, PathLike)):

@@ -237,6 +237,13 @@ def plot(x: Any, what: str = "", **options: Any) -> Panels | Axes:
         If there is no drawing of such an object.
     ValueError
         If there is none of this name, or nothing to draw.
+
+    Examples
+    --------
+    >>> import rigidimeter as rm
+    >>> panels = rm.plot(rm.data("elbow"), epoch=1, span_s=2.0)
+    >>> [panel.get_ylabel().split() for panel in panels][:2]
+    [['Perturbation', '(N·m)'], ['Torque', '(N·m)']]
     """
     drawings = next((one for kind, one in DRAWINGS.items() if isinstance(x, kind)), None)
     if drawings is None:

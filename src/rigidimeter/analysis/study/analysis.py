@@ -303,6 +303,15 @@ def estimate(
         If there is no such method.
     UserError
         If `recording` is neither, such as a path; the settings are wrong.
+
+    Examples
+    --------
+    >>> import rigidimeter as rm
+    >>> estimates = rm.estimate(rm.data("elbow"))
+    >>> estimates.method, len(estimates.fits)
+    ('iv', 6)
+    >>> estimates.table().groupby("condition")["stiffness_nm_rad"].median().round(2).to_dict()
+    {'DBS': 1.44, 'OFF': 1.75}
     """
     if isinstance(recording, Recording):
         epochs: tuple[Any, ...] = recording.epochs

@@ -108,6 +108,15 @@ def compare(
     ------
     UserError
         If there is nothing to compare, or a name is unknown.
+
+    Examples
+    --------
+    >>> import pandas as pd, rigidimeter as rm
+    >>> table = pd.DataFrame({"state": ["OFF", "ON"] * 6, "k": [1.8, 1.4, 1.7, 1.5] * 3})
+    >>> result = rm.compare(table, value="k", by="state")
+    >>> comparison = result.comparisons[0]
+    >>> comparison.summaries["OFF"].median, comparison.summaries["ON"].median
+    (1.75, 1.45)
     """
     wanted = (reference, other)
     path = Path(x) if isinstance(x, (str, PathLike)) else None

@@ -137,6 +137,13 @@ def fit_terms(
     ------
     UserError
         If a term is unknown, every epoch is an imposed sinusoid, or no model can be fitted.
+
+    Examples
+    --------
+    >>> import rigidimeter as rm
+    >>> table = rm.fit_terms(rm.data("elbow"), "inertia,damping,stiffness").table()
+    >>> round(float(table.query("parameter == 'stiffness'")["value"].iloc[0]), 1)
+    1.8
     """
     models, grow = asked(terms, compare)
     found = FittedTerms(
