@@ -19,6 +19,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from tests.docs.measured import between_the_marks, folded
 from tests.known_joint import angle_rad, torque_nm
 
 from benchmarks import batch, checks_cost, estimation, online
@@ -30,8 +31,6 @@ from rigidimeter.virtual import run_virtual_session
 TABLE = Path(__file__).parent.parent / "docs" / "development" / "benchmarks.md"
 IMPORTS = 20
 """Repeats of what takes a second and differs by some percent."""
-END = "<!-- measured: end -->"
-"""What follows it in the page is written by hand, and stays."""
 
 
 def session(folder: Path, seed: int) -> Path:
@@ -105,21 +104,19 @@ def main() -> None:
             *(checks_cost.rows(1, 1) if quick else checks_cost.rows()),
             *online.rows(),
         ]
-    lines = [
-        "# Benchmarks",
-        "",
-        f"Medians of {repeats} runs, alternating ours and the reference, Python "
-        f"{platform.python_version()} on {platform.machine()}. Written by `make bench`.",
-        "",
+    table = [
         "| what / reference | ours | reference | ratio |",
         "| --- | ---: | ---: | ---: |",
         *map(str, rows),
     ]
-    print("\n".join(lines))
+    print("\n".join(table))
     if quick:
         return
-    by_hand = TABLE.read_text(encoding="utf-8").partition(END)[2]
-    TABLE.write_text("\n".join(lines) + f"\n\n{END}{by_hand}", encoding="utf-8")
+    measured = (
+        f"Medians of {repeats} runs, alternating ours and the reference, Python "
+        f"{platform.python_version()} on {platform.machine()}."
+    )
+    between_the_marks(TABLE, "\n".join([measured, "", *folded(table)]))
 
 
 if __name__ == "__main__":

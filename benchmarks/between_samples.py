@@ -15,6 +15,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+from tests.docs.measured import between_the_marks, folded
 from tests.scenarios.drive_rig import STRUCTURES, TRUTH, DriveRig, run
 
 from rigidimeter.analysis.study import estimate
@@ -35,19 +36,6 @@ TITLES = (
 NOT_RUN = ["not run", "", "", "", "", "", ""]
 
 Rows = dict[tuple[str, str, str], list[str]]
-
-HEAD = f"""# Motion between the samples
-
-Measured with `python -m benchmarks.between_samples`: a relaxed subject on a simulator of its own in
-continuous time, {EPOCHS} epochs of 20 s, `iv`, drives of 50 Hz, J 0.0045 kg·m², B 0.1368 N·m·s/rad,
-K 1.751 N·m/rad. Torque, motion and command have the rate of the loop; the filter is a Butterworth
-low-pass of second order, and `estimation.torque_lowpass_hz` is its corner. Mean errors of J, B, K
-and half the interval of J, in %; "covered" counts intervals of J, B and K that hold the truth, of
-{3 * EPOCHS}; "flagged" counts epochs with the finding `between_samples`. Each parameter shall be
-within 2, 1 and 0.5 %, or be flagged with an interval that holds the truth; "broken" counts epochs
-with one that is neither. [What happens between the samples](../explanation/between-samples.md)
-explains the method and its limits; this page has only the measured tables.
-"""
 
 
 def cells(structure: str, rate_hz: float, lowpass_hz: float) -> list[str]:
@@ -75,18 +63,19 @@ def cells(structure: str, rate_hz: float, lowpass_hz: float) -> list[str]:
 
 
 def written(rows: Rows) -> str:
-    """Return the page."""
+    """Return what stands between the marks of the page."""
     broken = [rig for rig, found in rows.items() if "✗" in found[-1]]
     count = len(STRUCTURES) * len(RATES_HZ) * len(FILTERS_HZ)
     said = f"{len(rows)} of {count} rows were run; {len(broken)} hold a broken epoch."
-    lines = [HEAD, said, ""]
+    lines = [said]
     for structure in STRUCTURES:
-        lines += [f"## {structure[0].upper()}{structure[1:]}", "", *TITLES]
+        lines += ["", f"## {structure[0].upper()}{structure[1:]}", ""]
+        table = [*TITLES]
         for rate_hz, lowpass_hz in product(RATES_HZ, FILTERS_HZ):
             rig = (f"{rate_hz:g}", f"{lowpass_hz:g} Hz" if lowpass_hz else "none")
             found = rows.get((structure.lower(), *rig), NOT_RUN)
-            lines.append("| " + " | ".join([*rig, *found]) + " |")
-        lines.append("")
+            table.append("| " + " | ".join([*rig, *found]) + " |")
+        lines += folded(table)
     return "\n".join(lines)
 
 
@@ -105,13 +94,13 @@ def read(page: str) -> Rows:
 def main() -> None:
     """Write the rows of some structures into the page, each as soon as it is known."""
     structures = sys.argv[1:] or STRUCTURES
-    rows = read(TABLE.read_text(encoding="utf-8")) if TABLE.exists() else {}
+    rows = read(TABLE.read_text(encoding="utf-8"))
     for rate_hz, structure, lowpass_hz in product(FIRST_HZ, structures, FILTERS_HZ):
         found = cells(structure, rate_hz, lowpass_hz)
         corner = f"{lowpass_hz:g} Hz" if lowpass_hz else "none"
         rows[structure.lower(), f"{rate_hz:g}", corner] = found
         print(structure, f"{rate_hz:g}", corner, *found, sep=" | ", flush=True)
-        TABLE.write_text(written(rows), encoding="utf-8")
+        between_the_marks(TABLE, written(rows))
 
 
 if __name__ == "__main__":

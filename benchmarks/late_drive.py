@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from tests.docs.measured import between_the_marks, folded
 from tests.scenarios.late_drive_rig import LateRig, simulate
 
 from rigidimeter.analysis.estimation.diagnostics import CHECKS
@@ -86,22 +87,6 @@ def cells(found: Row) -> list[str]:
     return [*parts, f"{found.flagged:.0f}"]
 
 
-HEAD = """# A late drive and a noisy tachometer
-
-Measured with `python -m benchmarks.late_drive`, on a rig of its own that is solved exactly: 17-bit
-encoder, tachometer with noise of 0.01 rad/s, torque with white and coloured noise, epochs of 20 s,
-forty a recording, whose drive is identified anew. A human limb (J 0.075 kg·m², B 0.9 N·m·s/rad,
-K 11 N·m/rad) and a small one (0.0015, 0.03, 0.5), relaxed and pushing (0.8 and 0.06 N·m from 0.3 to
-4 Hz); method `iv`. Mean error, SD and median of half the 95 % interval of J, B and K in %, how many
-of the intervals hold the truth, in %, and in how many epochs `between_samples` is found, in %.
-{epochs} epochs a row, so the standard error of a coverage of 95 % is {error:.1f} points.
-
-Without the command the interval holds what the drive of the settings takes off J, and half a tick
-of a delay that was corrected; where neither is there, it holds the truth more often than 95 %. A
-drive that takes more off J, as one of first order does, is what `between_samples` then warns of: it
-gives the range of J ([why](../explanation/between-samples.md)). Beside a pushing subject the delay
-is not known well enough to rule out such a drive in each recording.
-"""
 TITLES = (
     "| limb | recorded | bias of J, B, K | SD | half interval | held | between_samples |",
     "| --- | --- | --- | --- | --- | --- | ---: |",
@@ -109,19 +94,23 @@ TITLES = (
 
 
 def table(recordings: int) -> list[str]:
-    """Return the lines of the page."""
+    """Return what stands between the marks of the page."""
     epochs = recordings * EPOCHS
-    lines = [HEAD.format(epochs=epochs, error=100 * np.sqrt(0.95 * 0.05 / epochs))]
+    error = 100 * np.sqrt(0.95 * 0.05 / epochs)
+    lines = [
+        f"{epochs} epochs a row; the standard error of a coverage of 95 % is {error:.1f} points."
+    ]
     for title, rig in RIGS.items():
-        lines += [f"## Drive of {title}", "", *TITLES]
+        lines += ["", f"## Drive of {title}", ""]
+        rows = [*TITLES]
         limbs = [limb for limb, rigs in LIMBS.items() if title in rigs]
         for limb, pushing in product(limbs, (False, True)):
             for names, channels in RECORDED.items():
                 found = row(replace(rig, limb=limb, pushing=pushing), channels, recordings)
                 who = f"{limb}, {'pushing' if pushing else 'relaxed'}"
-                lines.append("| " + " | ".join([who, names, *cells(found)]) + " |")
-                print(title, lines[-1], flush=True)
-        lines.append("")
+                rows.append("| " + " | ".join([who, names, *cells(found)]) + " |")
+                print(title, rows[-1], flush=True)
+        lines += folded(rows)
     return lines
 
 
@@ -135,7 +124,7 @@ def main() -> None:
     finally:
         CHECKS[:] = every
     if recordings == RECORDINGS:
-        TABLE.write_text("\n".join(lines), encoding="utf-8")
+        between_the_marks(TABLE, "\n".join(lines))
 
 
 if __name__ == "__main__":

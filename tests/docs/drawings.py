@@ -1,4 +1,4 @@
-"""Draws the figures of the explanations.
+"""Draws the figures of the explanations, and those of the maintainers' measured tables.
 
     python -m tests.docs.drawings
 
@@ -17,6 +17,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
+from tests.docs import measured_figures
 from tests.docs.markdown import ROOT
 
 FOLDER = ROOT / "docs" / "images"
@@ -204,6 +205,14 @@ DRAWINGS: Mapping[str, Callable[[], Figure]] = {
     "between-samples": between,
     "day-tests": day_tests,
 }
+FILES: Mapping[Path, Callable[[], Figure]] = {
+    folder / f"{name}.svg": figure
+    for folder, figures in (
+        (FOLDER, DRAWINGS),
+        (measured_figures.FOLDER, measured_figures.FIGURES),
+    )
+    for name, figure in figures.items()
+}
 
 
 def draw(path: Path, figure: Callable[[], Figure]) -> None:
@@ -215,8 +224,8 @@ def draw(path: Path, figure: Callable[[], Figure]) -> None:
 
 def main() -> None:
     """Draw all."""
-    for name, figure in DRAWINGS.items():
-        draw(FOLDER / f"{name}.svg", figure)
+    for path, figure in FILES.items():
+        draw(path, figure)
 
 
 if __name__ == "__main__":
