@@ -58,7 +58,7 @@ def report(
         )
     can_be_made(out)
     names = inputs_seen_from(out, recordings.paths)
-    if not overwrite and (why := why_not_own(out, names, recordings.paths)):
+    if not overwrite and (why := why_not_own(out, names)):
         raise UserError(
             f"--out {out}: {why}; name another folder, or write into it with --overwrite"
         )

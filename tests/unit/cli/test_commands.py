@@ -280,21 +280,6 @@ def test_a_report_renews_its_own_and_is_not_written_over_anothers(rigidimeter, s
     assert said(two, "--out", out, "--overwrite") == ""
 
 
-@pytest.mark.usefixtures("no_figures")
-def test_the_report_of_an_earlier_version_is_renewed_by_its_own_recording(
-    rigidimeter, simulate, tmp_path
-):
-    """It names its recordings by their paths alone."""
-    one, two, out = simulate(name="one"), simulate(name="two", seed=2), tmp_path / "page"
-    assert rigidimeter("report", one, "--out", out).status == 0
-    table = out / "tables" / "provenance.csv"
-    earlier = [line for line in table.read_text().splitlines() if not line.startswith('"inputs')]
-    assert len(earlier) == len(table.read_text().splitlines()) - 1
-    table.write_text("\n".join(earlier))
-    assert "holds the report of something else" in rigidimeter("report", two, "--out", out).err
-    assert rigidimeter("report", one, "--out", out).status == 0
-
-
 def test_a_session_in_which_an_epoch_failed_is_recorded_and_ends_with_1(rigidimeter, tmp_path):
     """The perturbation moves the arm to the position limit, the imposed sinusoid does not."""
     (tmp_path / "tight.toml").write_text(

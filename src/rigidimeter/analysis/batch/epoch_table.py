@@ -13,14 +13,12 @@ from pathlib import Path
 from rigidimeter.analysis.batch.parts import Row
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import as_read, csv_text, in_place, write_dictionary_beside
-from rigidimeter.core.records import AMPLITUDE, Activity, Analysis, Fit, Outcome, Score
+from rigidimeter.core.records import Activity, Analysis, Fit, Outcome, Score
 
 ENDINGS = (".parquet", ".csv")
 BATCH_SCHEMA = "rigidimeter.batch/1"
 
 _NO_ACTIVITY = Activity((), math.nan, math.nan)
-_NEWER = frozenset({*AMPLITUDE, *_NO_ACTIVITY.row()})
-"""Columns that older tables lack."""
 _ROWS = 2_000
 """Rows in memory at a time."""
 
@@ -116,12 +114,11 @@ def _read_parquet(path: Path) -> Iterator[Row]:
 def _read_csv(path: Path) -> Iterator[Row]:
     with path.open(encoding="utf-8", newline="") as file:
         reader = csv.DictReader(file, strict=True)
-        named = [name for name in columns() if name not in _NEWER]
-        if [name for name in reader.fieldnames or () if name not in _NEWER] != named:
+        if [*(reader.fieldnames or ())] != [*columns()]:
             raise ValueError("its columns are others")
         for row in reader:
             yield {
                 name: as_read(cell) if kind is str else kind(cell)
                 for name, kind in columns().items()
-                if (cell := row.get(name))
+                if (cell := row[name])
             }

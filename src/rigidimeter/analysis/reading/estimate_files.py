@@ -37,8 +37,6 @@ from rigidimeter.core.records import (
 )
 
 ESTIMATES_SCHEMA = "rigidimeter.estimates/2"
-READ_SCHEMAS = (ESTIMATES_SCHEMA, "rigidimeter.estimates/1")
-"""In the first a finding was a text with its threshold."""
 
 _PARAMETERS = tuple(parameter.name for parameter in PARAMETERS)
 
@@ -105,7 +103,7 @@ def read_estimates(path: Path) -> Analysis:
     """
     document = read_json(path, ESTIMATES_BYTES)
     schema = document.get("schema") if isinstance(document, dict) else None
-    if schema not in READ_SCHEMAS:
+    if schema != ESTIMATES_SCHEMA:
         raise UserError(f"{path}: schema is {schema!r}; expected {ESTIMATES_SCHEMA!r}")
     try:
         method = str(document["method"])
@@ -120,7 +118,7 @@ def read_estimates(path: Path) -> Analysis:
             tuple(_read_delay(row) for row in document["delays"]),
             str(document["method_reason"]),
             tuple(_band_estimate(row) for row in document["sensitivity"]),
-            tuple(map(finding_from, document.get("across", ()))),
+            tuple(map(finding_from, document["across"])),
             _axis(document),
         )
     except (KeyError, TypeError, ValueError, OverflowError) as error:
@@ -130,8 +128,8 @@ def read_estimates(path: Path) -> Analysis:
 
 
 def _axis(document: Mapping[str, Any]) -> Axis:
-    """Return how the axis stands, which older documents do not state."""
-    stated = document.get("axis", "unknown")
+    """Return how the axis stands."""
+    stated = document["axis"]
     if stated not in get_args(Axis):
         raise ValueError(f"axis {stated!r}")
     return cast("Axis", stated)
@@ -171,9 +169,7 @@ def _fit(row: Mapping[str, Any], method: str) -> Fit:
         vector: readonly([_number(row[name + ending]) for name in _PARAMETERS])
         for vector, ending in PARAMETER_VECTORS.items()
     }
-    numbers |= {name: _number(row[name]) for name in STATISTICS}
-    # Older files have no amplitude.
-    numbers |= {name: _number(row.get(name)) for name in AMPLITUDE}
+    numbers |= {name: _number(row[name]) for name in (*STATISTICS, *AMPLITUDE)}
     return Fit(
         source=str(row["source"]),
         epoch=str(row["epoch"]),

@@ -85,10 +85,10 @@ def report(
         inputs = [one for one in result if isinstance(one, (str, PathLike))]
     paths, names = [Path(one) for one in inputs], ""
     if paths:  # before anything is computed
-        _require_own(folder, names := inputs_seen_from(folder, paths), paths, overwrite)
+        _require_own(folder, names := inputs_seen_from(folder, paths), overwrite)
     shown = _result(result)
     if not paths:
-        _require_own(folder, names := joined_names(source_names(shown)), (), overwrite)
+        _require_own(folder, names := joined_names(source_names(shown)), overwrite)
     facts = {**shown.provenance, INPUTS: names}
     shown = replace(shown, title=title or shown.title or TITLE, provenance=facts)
     try:
@@ -99,8 +99,8 @@ def report(
         ) from None
 
 
-def _require_own(out: Path, names: str, paths: Sequence[Path], overwrite: bool) -> None:
-    if not overwrite and (why := why_not_own(out, names, paths)):
+def _require_own(out: Path, names: str, overwrite: bool) -> None:
+    if not overwrite and (why := why_not_own(out, names)):
         raise UserError(f"{out}: {why}; name another folder, or write with overwrite=True")
 
 

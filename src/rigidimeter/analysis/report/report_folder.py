@@ -35,7 +35,7 @@ def _seen_from(out: Path, path: Path) -> str:
         return os.path.realpath(path)
 
 
-def why_not_own(out: Path, names: str, inputs: Iterable[Path] = ()) -> str:
+def why_not_own(out: Path, names: str) -> str:
     """Return what a folder holds that a report must not be written over; empty if nothing.
 
     Parameters
@@ -44,8 +44,6 @@ def why_not_own(out: Path, names: str, inputs: Iterable[Path] = ()) -> str:
         The folder; it need not exist.
     names : str
         How the report names its inputs: see `inputs_seen_from`.
-    inputs : iterable of Path
-        Their paths as they were given, by which an earlier version named them.
 
     Raises
     ------
@@ -62,17 +60,8 @@ def why_not_own(out: Path, names: str, inputs: Iterable[Path] = ()) -> str:
     if facts is None:
         more = ", …" if len(there) > _NAMED else ""
         return f"holds files that are not of a report ({', '.join(there[:_NAMED])}{more})"
-    if INPUTS in facts:
-        others = facts[INPUTS]
-        same = not set(names.split(_BETWEEN)).isdisjoint(others.split(_BETWEEN))
-    else:
-        given = [os.path.normpath(path) for path in inputs]
-        sources = [key for key, fact in facts.items() if "SHA-256 " in fact]
-        others = ", ".join(sources[:_NAMED])
-        places = [os.path.normpath(key) for key in sources]
-        same = not places or any(
-            place == path or place.startswith(path + os.sep) for place in places for path in given
-        )
+    others = facts.get(INPUTS, "")
+    same = not set(names.split(_BETWEEN)).isdisjoint(others.split(_BETWEEN))
     return "" if same else f"holds the report of something else ({others})"
 
 

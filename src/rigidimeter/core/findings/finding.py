@@ -179,28 +179,19 @@ def found_between(
 
 
 def finding_from(row: Mapping[str, Any]) -> Finding:
-    """Return the finding of a document's row; also of one from when its text was stored.
+    """Return the finding of a document's row.
 
     Raises
     ------
     KeyError, TypeError, ValueError
         If the row is none.
     """
-    level: Level = "caution" if row["level"] == "doubt" else row["level"]
+    level: Level = row["level"]
     if level not in SERIOUS_FIRST:
         raise ValueError(f"finding level {level!r}")
-    name = str(row["name"])
-    if "text" in row:
-        return Finding(
-            name,
-            level,
-            _number(row["value"]),
-            _number(row["threshold"]),
-            facts={"text": str(row["text"]), "remedy": str(row["remedy"])},
-        )
     effect = row["effect"]
     return Finding(
-        name,
+        str(row["name"]),
         level,
         _number(row["value"]),
         _number(row["limit"]),

@@ -71,8 +71,8 @@ def words_of(name: str, facts: Mapping[str, Any]) -> Words:
     Parameters
     ----------
     name : str
-        Of its kind. A kind that is not known, or a finding without what the templates show, as
-        from an older file, is told by its numbers.
+        Of its kind. A kind that is not known, or a finding without what the templates show, is
+        told by its numbers.
     facts : mapping
         `value`, `limit`, `unit`, `p`, `percent_of` (of J, B and K, if known), and what else is
         shown.

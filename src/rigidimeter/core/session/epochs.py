@@ -33,7 +33,7 @@ from rigidimeter.core.session.folder import (
     read_manifest,
     read_session_files,
 )
-from rigidimeter.core.settings import Settings, parse_settings, with_new_names
+from rigidimeter.core.settings import Settings, parse_settings
 
 CHANNELS = ("torque_nm", "angle_rad", "velocity_rad_s", "velocity_command_rad_s", "perturbation_nm")
 """The columns of samples that an epoch has."""
@@ -47,14 +47,11 @@ def is_session(path: Path) -> bool:
 
 def session_settings(folder: Path) -> Settings:
     """Return the settings a session was recorded with."""
-    return _settings(folder, read_manifest(folder))[0]
+    return _settings(folder, read_manifest(folder))
 
 
-def _settings(folder: Path, manifest: Mapping[str, Any]) -> tuple[Settings, list[Notice]]:
-    source = f"{folder}/{MANIFEST}, settings"
-    values, renamed = with_new_names(manifest["settings"], source)
-    notices = [Notice("warning", renamed)] if renamed else []
-    return parse_settings(values, source=source), notices
+def _settings(folder: Path, manifest: Mapping[str, Any]) -> Settings:
+    return parse_settings(manifest["settings"], source=f"{folder}/{MANIFEST}, settings")
 
 
 def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
@@ -70,7 +67,8 @@ def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:
     """
     files = read_session_files(folder, (*CHANNELS, *_STAMPS, "epoch", "limited", "lateness_s"))
     manifest, samples, events = files.manifest, files.samples.columns, files.log.events
-    settings, notices = _settings(folder, manifest)
+    settings = _settings(folder, manifest)
+    notices: list[Notice] = []
     notices += _damage(folder, files)
     if files.ended is None:
         notices.append(

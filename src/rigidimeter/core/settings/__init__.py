@@ -36,7 +36,6 @@ from rigidimeter.core.settings.loop_settings import (
 )
 from rigidimeter.core.settings.messages import validated
 from rigidimeter.core.settings.models import CommissioningSettings, Settings
-from rigidimeter.core.settings.renamed import RENAMED, with_new_names
 from rigidimeter.core.settings.rig_settings import (
     DriveSideSettings,
     MotionSensorSettings,

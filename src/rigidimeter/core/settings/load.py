@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
@@ -12,14 +11,10 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import read_toml
 from rigidimeter.core.settings.messages import Model, validated
 from rigidimeter.core.settings.models import Settings
-from rigidimeter.core.settings.renamed import with_new_names
-
-REMOVED = ("intervals", "bootstrap_draws")
-"""Keys of [estimation] in older sessions, from when there were three kinds of interval."""
 
 
 def parse_settings(values: Mapping[str, Any], *, source: str = "settings") -> Settings:
-    """Validate a nested mapping; a warning names the keys that have their older names.
+    """Validate a nested mapping.
 
     Raises
     ------
@@ -27,11 +22,6 @@ def parse_settings(values: Mapping[str, Any], *, source: str = "settings") -> Se
         Naming each offending key, its value, its unit and the allowed range; for an unknown key
         the nearest known one.
     """
-    values = _renamed(values, source)
-    estimation = values.get("estimation")
-    if isinstance(estimation, Mapping) and any(key in estimation for key in REMOVED):
-        kept = {key: value for key, value in estimation.items() if key not in REMOVED}
-        values = {**values, "estimation": kept}
     return validated(Settings, values, source)
 
 
@@ -62,14 +52,7 @@ def load_settings(path: Path | None) -> Settings:
     """
     if path is None:
         return Settings()
-    values = read_toml(path)
-    for key in REMOVED:
-        if key in (values.get("estimation") or {}):
-            raise UserError(
-                f"{path}: estimation.{key} was removed, since all intervals hold for a residual of "
-                "any colour; leave the line out"
-            )
-    return parse_settings(values, source=str(path))
+    return parse_settings(read_toml(path), source=str(path))
 
 
 def dump_settings(settings: Settings) -> dict[str, Any]:
@@ -118,18 +101,10 @@ def changed_settings(
     UserError
         As `parse_settings`; the sentence begins with `source`.
     """
-    changes = _renamed(changes, source)
     # What was not stated and is not changed stays a default, and is not stated by this either.
     stated = settings.model_dump(mode="json", exclude_unset=True)
     touched = {key: value for key, value in dump_settings(settings).items() if key in changes}
     return parse_settings(_merged({**stated, **touched}, changes), source=source)
-
-
-def _renamed(values: Mapping[str, Any], source: str) -> dict[str, Any]:
-    renamed, notice = with_new_names(values, source)
-    if notice:
-        warnings.warn(notice, stacklevel=3)
-    return renamed
 
 
 def _merged(values: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from typing import Any
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import plain_values
-from rigidimeter.core.settings import Settings, with_new_names
+from rigidimeter.core.settings import Settings
 from rigidimeter.rig.commissioning.checks import RigCheck
 from rigidimeter.rig.commissioning.program_identity import program_identity
 from rigidimeter.rig.commissioning.repeated_checks import require_repeated
@@ -82,9 +82,6 @@ EXACT = ("reaction_time_s", "stale_s", "duration_s")
 FLOORS = ("min_inertia_kg_m2",)
 """Numbers among them that may be larger, never smaller."""
 
-ADDED: Mapping[str, float] = {"guard.arrival_speed_deg_s": 1000.0}
-"""Numbers that an older record does not have, each with what was so before it could be set."""
-
 
 @dataclass(frozen=True)
 class CommissioningRecord:
@@ -110,8 +107,7 @@ class CommissioningRecord:
     emulated : bool
         Whether no device of it is one of hardware.
     identity : mapping
-        Program, computer and kernel, as `program_identity` returned them; empty in records of
-        older versions.
+        Program, computer and kernel, as `program_identity` returned them.
     """
 
     rig_name: str
@@ -199,10 +195,7 @@ def read_record(path: Path) -> CommissioningRecord:
 
 
 def _values(record: CommissioningRecord) -> dict[str, Any]:
-    values = {**asdict(record), "passed": record.passed}
-    if not record.identity:  # the seal of an older record is that of its own keys
-        del values["identity"]
-    return values
+    return {**asdict(record), "passed": record.passed}
 
 
 def _record(values: dict[str, Any]) -> CommissioningRecord:
@@ -306,8 +299,7 @@ def check_record(
         )
     if age > timedelta(days=days):
         raise UserError(f"{path}: is of {record.made_utc[:10]}, and {valid}; {again}")
-    before, _ = with_new_names(record.covered, str(path))
-    _same_controller(path, before, plain_values(covered(settings)))
+    _same_controller(path, record.covered, plain_values(covered(settings)))
     if repeated:
         now = program_identity(rigfile) if identity is None else identity
         require_repeated(rigfile.path, path, record.identity, now, record.digest)
@@ -326,7 +318,7 @@ def _same_devices(path: Path, before: Mapping[str, Any], now: Mapping[str, Any])
                 )
         old, new = old.get("values", {}), new.get("values", {})
         for key in sorted({*old, *new}):
-            if key not in old:  # a driver of an older version did not read it
+            if key not in old:  # the driver did not read it then
                 raise UserError(
                     f"{path}: {role} now has {key} = {new[key]!r}, which the record does not "
                     "name; commission the rig again"
@@ -348,7 +340,7 @@ def _same_controller(path: Path, before: Mapping[str, Any], now: Mapping[str, An
         )
     for table in ("controller", *LIMITS):
         for key, value in now[table].items():
-            tried = before.get(table, {}).get(key, ADDED.get(f"{table}.{key}"))
+            tried = before.get(table, {}).get(key)
             if value != tried and not (table in LIMITS and _tighter(key, tried, value)):
                 raise UserError(f"{path}: covers {table}.{key} = {tried!r}, not {value!r}; {again}")
     arms = list(before.get("arms", {}).values())

@@ -140,9 +140,7 @@ def _record(values: dict[str, Any]) -> RepeatedChecks:
 
 
 def differences(before: Mapping[str, str], now: Mapping[str, str]) -> tuple[str, ...]:
-    """Return in words what is another now; a record of older versions does not say what it was."""
-    if not before:
-        return ("the record does not say under which program and on which computer it was made",)
+    """Return in words what is another now."""
     found = []
     for key in _changed(before, now):
         name = IDENTITY[key][0]

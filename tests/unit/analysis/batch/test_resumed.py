@@ -46,15 +46,6 @@ def test_a_killed_batch_goes_on_where_it_was(
     assert out.read_bytes() == (tmp_path / "whole.parquet").read_bytes()
 
 
-def test_a_table_from_before_the_amplitude_is_read(archive: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out.csv"
-    table = rm.batch(archive, out).table()
-    older = table.drop(columns=["angle_rms_rad", "angle_range_rad"])
-    older.to_csv(out, index=False)
-    (archive / "day-0" / "elbow.csv").unlink()
-    assert rm.batch(archive, out).before == 2
-
-
 @pytest.mark.parametrize("ending", ["parquet", "csv"])
 def test_what_is_in_the_table_is_not_estimated_again(
     archive: Path, tmp_path: Path, estimated: list[Path], ending: str

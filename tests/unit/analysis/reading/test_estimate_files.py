@@ -128,39 +128,6 @@ def test_estimates_are_read_back_equal(tmp_path):
     assert_equal(asdict(read_estimates(tmp_path / "e.json")), asdict(ANALYSIS))
 
 
-def test_a_file_without_the_amplitude_is_read(tmp_path):
-    write_estimates_json(tmp_path / "e.json", ANALYSIS)
-    document = json.loads((tmp_path / "e.json").read_text())
-    for row in (*document["epochs"], *document["fixed_inertia"]["epochs"], document["pooled"]):
-        del row["angle_rms_rad"], row["angle_range_rad"]
-    (tmp_path / "e.json").write_text(json.dumps(document))
-    fit, _ = read_estimates(tmp_path / "e.json").fits
-    assert fit == replace(GOOD, angle_rms_rad=math.nan, angle_range_rad=math.nan)
-
-
-def test_findings_of_the_schema_before_are_read(tmp_path):
-    write_estimates_json(tmp_path / "e.json", ANALYSIS)
-    document = json.loads((tmp_path / "e.json").read_text())
-    older = {
-        "name": "coherence",
-        "level": "doubt",
-        "value": 0.3,
-        "threshold": None,
-        "text": "the coherence is 0.3",
-        "remedy": "ask the subject to relax",
-    }
-    document["schema"] = "rigidimeter.estimates/1"
-    document["epochs"][0]["findings"] = [older]
-    (tmp_path / "e.json").write_text(json.dumps(document))
-    (finding,) = read_estimates(tmp_path / "e.json").fits[0].findings
-    assert (finding.name, finding.level, finding.value) == ("coherence", "caution", 0.3)
-    assert math.isnan(finding.limit)
-    assert (finding.details, finding.remedy) == (
-        "the coherence is 0.3.",
-        "ask the subject to relax",
-    )
-
-
 def test_the_table_has_a_row_an_epoch_in_full_precision(tmp_path):
     write_estimates_csv(tmp_path / "e.csv", ANALYSIS)
     with (tmp_path / "e.csv").open() as file:

@@ -6,7 +6,6 @@ import shutil
 from pathlib import Path
 
 import pytest
-from tests.older_names import older
 
 import rigidimeter.analysis.study.archive
 from rigidimeter.analysis.study import UNCHANGED, analyse_study, keep, read_study
@@ -44,13 +43,6 @@ def test_the_second_time_nothing_is_written(study: Path) -> None:
     assert {"inputs.json", "estimates.json", "comparison.json", "days.csv"} <= set(before)
     assert kept(study) == [UNCHANGED]
     assert state(study) == before
-
-
-def test_a_setting_under_its_older_name_is_nothing_new(study: Path) -> None:
-    path = study / "analysis/inputs.json"
-    inputs = json.loads(path.read_text())
-    path.write_text(json.dumps({**inputs, "settings": older(inputs["settings"])}))
-    assert kept(study) == [UNCHANGED]
 
 
 def test_another_place_gives_the_same_bytes(study: Path, tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pyarrow as pa
 import pytest
-from tests.older_names import with_older_names
 from tests.version_1 import as_version_1
 
 from rigidimeter.core.errors import UserError
@@ -250,22 +249,6 @@ def test_version_1_gives_the_same_numbers(recorded):
         assert (before.label, before.closed) == (after.label, after.closed)
         for name, channel in before.channels.items():
             np.testing.assert_array_equal(channel.values, after.channels[name].values)
-
-
-@pytest.mark.parametrize("version", [1, 2])
-def test_a_session_with_older_names_of_settings_is_read_with_one_notice(recorded, version):
-    epochs, notices = read_session(recorded(name="now"))
-    folder = recorded(name="before")
-    with_older_names(as_version_1(folder) if version == 1 else folder)
-    old, (notice,) = read_session(folder)
-    assert not notices
-    assert len(old) == len(epochs)
-    assert session_settings(folder) == session_settings(folder.with_name("now"))
-    assert notice.level == "warning"
-    assert notice.text.startswith(
-        f"{folder}/manifest.json, settings: guard.least_inertia_kg_m2 is now "
-        "guard.min_inertia_kg_m2, "
-    )
 
 
 def test_version_1_passes_over_a_batch_that_cannot_be_decoded(recorded):

@@ -159,15 +159,6 @@ def test_a_stamp_that_takes_off_too_much_makes_a_reading_old(name):
     parse_settings(values)
 
 
-def test_a_kind_of_interval_is_read_in_an_old_session_and_refused_in_a_file(tmp_path):
-    old = {"estimation": {"intervals": "white", "bootstrap_draws": 99, "trim_s": 0.5}}
-    assert parse_settings(old).estimation.trim_s == 0.5
-    assert "intervals" not in dump_settings(parse_settings(old))["estimation"]
-    (tmp_path / "rig.toml").write_text('[estimation]\nintervals = "white"\n')
-    with pytest.raises(UserError, match=r"rig.toml: estimation.intervals was removed"):
-        load_settings(tmp_path / "rig.toml")
-
-
 def test_a_change_leaves_the_other_defaults_unstated_and_the_default_subjects_there():
     changed = changed_settings(Settings(), {"subject": {"X": {}}, "prbs": {"amplitude_nm": 0.5}})
     assert set(changed.subject) == {"OFF", "DBS", "X"}

@@ -228,6 +228,3 @@ def test_a_clock_that_was_set_back_by_a_day_does_not_renew_a_check(
 def test_a_check_belongs_to_a_program_and_a_computer(rigfile: RigFile, record: DailyRecord) -> None:
     with pytest.raises(UserError, match=r"the kernel was 6\.1 and is now 6\.2; with nobody in the"):
         require(rigfile, identity={**HERE, "kernel": "6.2"})
-    rewritten(rigfile, record, identity={})
-    with pytest.raises(UserError, match="does not say under which program and on which computer"):
-        require(rigfile)

@@ -9,7 +9,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from tests.older_names import older
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings, parse_settings
@@ -356,28 +355,6 @@ def test_tighter_is_covered_and_looser_is_not(
             check(rigfile, settings=tighter)
     else:
         assert check(rigfile, settings=tighter).passed
-
-
-def test_a_record_of_before_settings_were_renamed_covers_what_it_did(
-    rigfile: RigFile, record: CommissioningRecord
-) -> None:
-    before = replace(record, covered=older(covered(Settings())))
-    assert "least_inertia_kg_m2" in before.covered["guard"]
-    write_record(record_path(rigfile.path), before)
-    assert check(rigfile).digest == before.digest  # by which a daily check names it
-    assert check(rigfile, settings=with_value("guard", "min_inertia_kg_m2", 1.01)).passed
-    with pytest.raises(UserError, match=r"covers guard\.min_inertia_kg_m2 = 0\.0005, not "):
-        check(rigfile, settings=with_value("guard", "min_inertia_kg_m2", 0.99))
-
-
-def test_a_record_of_before_a_limit_could_be_set_covers_what_was_so_without_it(
-    rigfile: RigFile, record: CommissioningRecord
-) -> None:
-    values = covered(Settings())
-    del values["guard"]["arrival_speed_deg_s"]
-    write_record(record_path(rigfile.path), replace(record, covered=values))
-    assert check(rigfile).covered == values
-    assert check(rigfile, settings=with_value("guard", "arrival_speed_deg_s", 0.5)).passed
 
 
 @pytest.mark.parametrize("key", type(Settings().controller).model_fields)

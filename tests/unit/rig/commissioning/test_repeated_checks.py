@@ -125,15 +125,6 @@ def test_a_difference_is_named_with_the_checks_that_it_asks_for(
     assert f"rigidimeter commission --rig {held.rigfile.path} --again" in text
 
 
-def test_an_older_record_is_read_and_asks_for_all_of_them(held: Any) -> None:
-    path = record_path(held.rigfile.path)
-    write_record(path, replace(held.record, identity={}))
-    assert "identity" not in path.read_text()  # so the seal of an older one is still its own
-    with pytest.raises(UserError, match="does not say under which program and on which computer"):
-        held()
-    assert parts_to_repeat({}, held.record.identity) == EVERY_PART
-
-
 @pytest.mark.parametrize("key", [*BY_COMPUTER, *BY_PROGRAM])
 def test_what_was_repeated_is_sealed_beside_the_record_and_holds(
     held: Any, fake_rig: Callable[..., FakeRig], key: str

@@ -17,7 +17,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import parse_json
 from rigidimeter.core.records import Epoch, Notice, Outcome
 from rigidimeter.core.session import Sample, epoch_extents, epoch_of_samples, sample_dtypes
-from rigidimeter.core.settings import Settings, parse_settings, with_new_names
+from rigidimeter.core.settings import Settings, parse_settings
 
 SAMPLES_TYPE = "RobotSamples"
 """The type of the stream of samples."""
@@ -31,15 +31,10 @@ def settings_of_samples(described: Mapping[str, Any], source: str) -> Settings:
     UserError
         If they are damaged or missing.
     """
-    return _settings(described, source)[0]
-
-
-def _settings(described: Mapping[str, Any], source: str) -> tuple[Settings, list[Notice]]:
     text = _fact(described, "settings")
     if not text:
         raise UserError(f"{source}: its stream of samples does not hold its settings")
-    values, renamed = with_new_names(parse_json(text.encode(), f"{source}: settings"), source)
-    return parse_settings(values, source=source), [Notice("warning", renamed)] if renamed else []
+    return parse_settings(parse_json(text.encode(), f"{source}: settings"), source=source)
 
 
 def epochs_of_samples(
@@ -65,16 +60,12 @@ def epochs_of_samples(
     UserError
         If a column of a session is missing.
     """
-    later = Sample._field_defaults  # channels that earlier versions did not send
-    missing = [name for name in Sample._fields if name not in columns and name not in later]
+    missing = [name for name in Sample._fields if name not in columns]
     if missing:
         raise UserError(f"{source}: its stream of samples has no channel {missing[0]}")
-    n = len(columns["tick"])
-    samples = {
-        name: columns[name].astype(kind) if name in columns else np.full(n, later[name], kind)
-        for name, kind in sample_dtypes().items()
-    }
-    settings, notices = _settings(described, source)
+    samples = {name: columns[name].astype(kind) for name, kind in sample_dtypes().items()}
+    settings = settings_of_samples(described, source)
+    notices: list[Notice] = []
     virtual = _fact(described, "virtual") == "true"
     ticks_late = samples["lateness_s"] * settings.rig.tick_rate_hz
     lost = _lost(samples["tick"], ticks_late)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.older_names import older
 from tests.small_study import record
 
 from rigidimeter.analysis.reading import read
@@ -60,12 +59,6 @@ def test_the_epochs_are_those_of_the_folder(session: Path, received) -> None:
     assert notices == []
     assert_same_epochs(epochs, read(session).epochs)
     assert settings_of_samples(received["described"], "there") == read(session).settings
-    (facts,) = received["described"]["rigidimeter"]
-    facts["settings"] = [json_text(older(dump_settings(read(session).settings)))]
-    assert settings_of_samples(received["described"], "there") == read(session).settings
-    _, (notice,) = epochs_of_samples("there", **received)
-    assert notice.level == "warning"
-    assert notice.text.startswith("there: guard.least_inertia_kg_m2 is now guard.min_")
 
 
 def test_samples_that_were_not_received_are_counted(session: Path, received) -> None:
