@@ -69,7 +69,7 @@ class Ran:
     def failed(self) -> bool:
         allowed = self.interrupted or self.words[0] in MAY_REFUSE or "--scheduler" in self.words
         return "Traceback (most recent call last)" in self.out + self.err or bool(
-            self.status and not (allowed and self.status in (1, 130))
+            self.status and not (allowed and self.status in (1, 130, -signal.SIGINT))
         )
 
 

@@ -78,7 +78,9 @@ def first_commands(programs: Path, recording: Path, needed: list[Requirement]) -
         [programs / "rigidimeter", "--version"],
         [programs / "rigidimeter", "estimate", recording],
     ):
-        ran = subprocess.run(line, env=ENVIRONMENT, capture_output=True, text=True)
+        # Environments of one version lie at one path, so that each module is compiled once.
+        cache = {"PYTHONPYCACHEPREFIX": str(recording.parent / "bytecode")}
+        ran = subprocess.run(line, env=ENVIRONMENT | cache, capture_output=True, text=True)
         if ran.returncode:
             return (ran.stderr or ran.stdout).strip().splitlines()[-1]
     return ""
@@ -129,13 +131,13 @@ def main() -> int:
         results = []
         for name, (needed, packages) in rows.items():
             row = [
-                cell(place / f"{name}-{version}", python, recording, needed, *packages)
+                cell(place / version, python, recording, needed, *packages)
                 for version, python in pythons.items()
             ]
             print("\t".join([name, *row]), flush=True)
             results += row
         if not only_oldest:
-            results.append(golden(place / f"oldest-{next(iter(pythons))}"))
+            results.append(golden(place / next(iter(pythons))))
     return int(any(result.startswith("failed") for result in results))
 
 

@@ -72,7 +72,10 @@ def _tracked() -> set[str]:
 
 
 def environment(folder: Path, *packages: object, python: object = sys.executable) -> Path:
-    """Make an environment with packages and options of `uv pip install`; return its programs."""
-    uv("venv", "--python", python, folder)
+    """Make an environment with packages and options of `uv pip install`; return its programs.
+
+    One that is there already is replaced.
+    """
+    uv("venv", "--clear", "--python", python, folder)
     uv("pip", "install", "--python", folder / "bin/python", *packages)
     return folder / "bin"

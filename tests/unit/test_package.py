@@ -5,6 +5,7 @@ import tomllib
 from pathlib import Path
 
 import yaml
+from tests.docs.licences import needed_by, plain
 
 from rigidimeter import __version__
 
@@ -39,6 +40,16 @@ def test_the_citation_invents_nothing() -> None:
 def test_the_licence_is_that_of_the_package() -> None:
     assert (ROOT / "LICENSE").read_text("utf-8").startswith("BSD 3-Clause License")
     assert CITATION["license"] == PROJECT["license"].split()[0]
+
+
+def test_every_dependency_has_its_licence_listed_and_copyleft_is_in_extras_alone() -> None:
+    page = ROOT / "docs" / "reference" / "licences.md"
+    direct = page.read_text("utf-8").partition("These need, in turn")[0]
+    rows = re.findall(r"^\| ([\w.-]+) \| [\d.]+ \| (.+) \| ([\w, ]+) \|$", direct, re.M)
+    assert {plain(name): groups.split(", ") for name, _, groups in rows} == needed_by()
+    copyleft = {groups for _, licence, groups in rows if "copyleft" in licence}
+    assert copyleft == {"canopen", "tdms"}
+    assert not [name for name, licence, _ in rows if "not stated" in licence]
 
 
 def test_the_authors_are_those_of_the_citation() -> None:
