@@ -82,7 +82,10 @@ def test_a_command_line_is_one_that_exists(where: str, words: list[str]) -> None
     if words[0] == "make":
         assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text("utf-8"), re.M), where
     elif words[:3] == ["python3", "-m", "pip"]:
-        assert words[3] == "wheel" or f"rigidimeter-{__version__}-py3" in words[-1], where
+        wheel = f"rigidimeter-{__version__}-py3"
+        assert words[3] in ("wheel", "uninstall") or wheel in words[-1], where
+    elif words[:3] == ["python3", "-m", "venv"] or words[0] == ".":
+        pass
     elif words[:2] == ["python", "-m"]:
         module = ROOT / words[2].replace(".", "/")
         assert module.with_suffix(".py").is_file() or (module / "__main__.py").is_file(), where

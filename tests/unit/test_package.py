@@ -6,6 +6,7 @@ from pathlib import Path
 
 import yaml
 from tests.docs.licences import needed_by, plain
+from tests.packages import extras
 
 from rigidimeter import __version__
 
@@ -50,6 +51,13 @@ def test_every_dependency_has_its_licence_listed_and_copyleft_is_in_extras_alone
     copyleft = {groups for _, licence, groups in rows if "copyleft" in licence}
     assert copyleft == {"canopen", "tdms"}
     assert not [name for name, licence, _ in rows if "not stated" in licence]
+
+
+def test_the_page_of_the_installation_has_every_extra() -> None:
+    text = (ROOT / "docs" / "how-to" / "install.md").read_text("utf-8")
+    table = text.partition("| extra |")[2].partition("\n\n")[0]
+    first = "".join(re.findall(r"^\| (`[^|]*) \|", table, re.M))
+    assert sorted(re.findall(r"`(\w+)`", first)) == sorted(extras().keys() - {"core"})
 
 
 def test_the_authors_are_those_of_the_citation() -> None:
