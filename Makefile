@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 OUT ?= demo-study
 
-.PHONY: install demo test quick check docs gallery bench bench-loop hazards mutation golden matrix fuzz docs-pictures example-data clean
+.PHONY: install demo test quick check docs gallery bench bench-loop hazards mutation golden matrix fuzz docs-pictures paper-figures example-data clean
 
 install: $(STAMP)
 
@@ -86,6 +86,10 @@ golden: install
 docs-pictures: install
 	$(BIN)/python -m tests.docs.drawings
 	$(BIN)/python -m tests.docs.pictures
+
+# From the recordings of `rm.data`; printed are the numbers in the text.
+paper-figures: install
+	$(BIN)/python -m tests.docs.paper_figures
 
 # The recordings that `rm.data` returns.
 example-data: install
