@@ -65,6 +65,7 @@ bench: install
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[all,dev,bench]'
 	$(BIN)/python -m pytest -m slow
 	$(BIN)/python -m benchmarks
+	$(BIN)/python -m benchmarks.joint_impedance --packages --jobs 2
 	$(BIN)/python -m benchmarks.verdicts days --studies 20
 
 # Beside cyclictest, of Debian's rt-tests.

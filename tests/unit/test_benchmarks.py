@@ -32,6 +32,8 @@ SMALLEST = {
     "drive_torque": "--hours 1e-5",
     "file_faults": "--files 8",
     "held_at_limit": "--hours 1e-5",
+    "joint_impedance.__main__": "\n--packages lstsq --only relaxed --recordings 1",
+    "joint_impedance.score": "{results}/lstsq.csv",
     "lack_of_fit": "--recordings 1",
     "late_drive": "1",
     "model_terms": "--epochs 1 --only relaxed",
@@ -58,6 +60,8 @@ def smaller(name: str, module: ModuleType, folder: Path) -> Mapping[str, Any]:
         page = folder / "page.md"
         page.write_text("<!-- measured: begin --><!-- measured: end -->", "utf-8")
         return {"TABLE": page, "FIRST_HZ": (100.0,), "FILTERS_HZ": (0.0,)}
+    if name == "joint_impedance.__main__":
+        return {"PAGE": folder / "page.md"}
     if name == "late_drive":
         some = {key: module.RECORDED[key] for key in list(module.RECORDED)[:1]}
         return {"EPOCHS": 2, "LIMBS": {"human": (*module.RIGS,)[1:]}, "RECORDED": some}
@@ -109,7 +113,13 @@ def test_it_runs_to_its_end(
     for what, value in smaller(name, module, tmp_path).items():
         monkeypatch.setattr(module, what, value)
     monkeypatch.setattr(batch, "apart", batch.measured_run)
-    for line in SMALLEST[name].format(folder=tmp_path, study=scored_study).split("\n"):
+    for line in (
+        SMALLEST[name]
+        .format(
+            folder=tmp_path, study=scored_study, results=BENCHMARKS / "joint_impedance" / "results"
+        )
+        .split("\n")
+    ):
         monkeypatch.setattr(sys, "argv", [name, *shlex.split(line)])
         module.main()
     assert re.search(r"\d", capsys.readouterr().out)

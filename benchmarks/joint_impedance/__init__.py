@@ -1,0 +1,1 @@
+"""An open benchmark of estimates of a joint's inertia, damping and stiffness; see README.md."""
