@@ -96,7 +96,7 @@ def formats_table() -> str:
     lines = ["| format | files | units, clock and epochs | needs |", "| --- | --- | --- | --- |"]
     for reader in READERS:
         suffixes = ", ".join(f"`{suffix}`" for suffix in reader.suffixes) or "a folder"
-        extra = f"`rigidimeter[{reader.extra}]`" if reader.extra else "–"
+        extra = f"`[{reader.extra}]`" if reader.extra else "–"
         lines.append(f"| {reader.name} | {suffixes} | {reader.about} | {extra} |")
     return "\n".join(lines)
 
