@@ -41,8 +41,8 @@ def compare(
     by: str = COMPARE.option("--by COLUMN", "With --value: column of conditions.", "condition"),
     session: str | None = COMPARE.further(
         "--session COLUMN",
-        "With --value: the bootstrap resamples the labels of this column. Default: rows, or days "
-        "where several rows are of one.",
+        "With --value: the bootstrap resamples the labels of this column, and they are days where "
+        "there is no column `day`. Default: rows, or days where several rows are of one.",
     ),
     group: str | None = GROUP,
     seed: int = ESTIMATE.further("--seed N", "Seed of the bootstrap.", 1, min=0),
@@ -64,7 +64,7 @@ def compare(
     and every exclusion; its analysis is stored in its folder `analysis`.
 
     With --value the input is one table as CSV. Where its columns `subject` and `day` have several
-    rows of one, it is tested by days.
+    rows of one, such as one in each condition, it is tested by days.
 
     \b
     For example:

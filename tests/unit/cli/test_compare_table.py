@@ -117,6 +117,43 @@ def test_scores_of_a_day_or_a_subject_are_no_independent_values(
     assert "hether OFF and DBS differ in score cannot be decided" in " ".join(ran.out.split())
 
 
+@pytest.mark.parametrize(
+    ("head", "label", "options", "units"),
+    [
+        ("day", lambda k: k, (), "days"),
+        ("day", lambda k: k, ("--session", "day"), "days"),
+        ("visit", lambda k: k, ("--session", "visit"), "days"),
+        ("subject", lambda k: f"M{k}", (), "subjects"),
+        ("subject,day", lambda k: f"M1,{k}", (), "days"),
+        ("subject,day", lambda k: f"M{k},1", (), "subjects"),
+    ],
+)
+def test_one_row_of_a_day_and_condition_is_paired(
+    compared, tmp_path, head, label, options, units
+) -> None:
+    path = tmp_path / "t.csv"
+    g = np.random.default_rng(3)
+    off = g.normal(1.7, 0.4, 8)
+    on = off - g.normal(0.2, 0.05, 8)
+    rows = [f"OFF,{label(k)},{off[k]:.17g}\nDBS,{label(k)},{on[k]:.17g}" for k in range(8)]
+    path.write_text("\n".join([f"condition,{head},k", *rows]) + "\n")
+    ran, found = compared(path, "--value", "k", *options)
+    (row,) = found["comparisons"]
+    assert row["days"]["p"] == pytest.approx(ttest_rel(off, on).pvalue, rel=1e-9)
+    assert row["days"]["p"] < 0.001 < 0.05 < row["p"]  # as if the values were independent
+    assert f"Paired t-test of 8 {units}." in ran.out
+    assert "k is lower in DBS than in OFF" in " ".join(ran.out.split())
+
+
+def test_days_without_a_pair_stay_values(compared, tmp_path) -> None:
+    path = tmp_path / "t.csv"
+    rows = [f"{'OFF' if k < 8 else 'DBS'},{k},{k}.5" for k in range(16)]
+    path.write_text("\n".join(["condition,day,k", *rows]) + "\n")
+    ran, found = compared(path, "--value", "k")
+    assert found["comparisons"][0]["days"] is None
+    assert "Rank-sum test" in ran.out
+
+
 def test_scores_of_one_day_decide_nothing(compared, tmp_path) -> None:
     repeated(tmp_path / "t.csv", "day", lambda k: 1)
     ran, _ = compared(tmp_path / "t.csv", "--value", "score")

@@ -87,8 +87,9 @@ def compare(
     by : str
         The table's column of conditions.
     session : str, optional
-        The table's column whose labels the bootstrap resamples; by default each row, or each
-        subject and day where the table's columns `subject` and `day` have several rows of one.
+        The table's column whose labels the bootstrap resamples, and the days of the test where the
+        table has no column `day`. By default each row, or each subject and day where the table's
+        columns `subject` and `day` have several rows of one, such as one in each condition.
     group : str, optional
         Compare the subjects of this group alone, of the column `group` of the table, or of the
         study's table of sessions. Without it a difference is claimed only where each group shows
@@ -202,8 +203,8 @@ def _compare_columns(
 ) -> StudyResult:
     """Compare two groups of a table in one column or several.
 
-    Several rows of a subject and day in one group are no independent values: they are tested by
-    days too, as the epochs of a study.
+    Several rows of a subject and day, in one group or in two, are no independent values: they are
+    tested by days, as the epochs of a study.
 
     Parameters
     ----------
@@ -216,7 +217,8 @@ def _compare_columns(
         Reference and other group; the first two where not given, ``OFF`` first where it occurs, and
         without the other each further group with the reference.
     session : str, optional
-        A column whose labels are resampled as units; else each row is one.
+        A column whose labels are resampled as units, and are days where there is no column of them;
+        else each row is one.
     group : str, optional
         Take the rows of this group of subjects alone.
     seed, resamples : int
@@ -243,7 +245,7 @@ def _compare_columns(
     )
     further = [name for name in known if name not in names] if pair[1] is None else []
     rows, notices = _kept(table, labels, [*names, *further], by)
-    days = _days(table, labels, rows, by)
+    days = _days(table, rows, by, session)
     if days:
         dayless = [table.lines[k] for k in rows if "" in days[k]]
         rows = [k for k in rows if "" not in days[k]]
@@ -335,18 +337,23 @@ def _kept(
 
 
 def _days(
-    table: TextTable, labels: Sequence[str], rows: Sequence[int], by: str
+    table: TextTable, rows: Sequence[int], by: str, session: str | None
 ) -> list[tuple[str, str]]:
     """Return subject and day of every row, the same for all where there is no column of it.
 
-    Nothing where no subject and day has two of the rows in one group.
+    Nothing where no two of the rows are of one day, or of one of several subjects.
     """
-    there = [name for name in _OF_DAY if name in table.columns and name != by]
-    alike = ("1",) * len(labels)
-    subjects, days = (table.columns[name] if name in there else alike for name in _OF_DAY)
-    found = list(zip(subjects, days, strict=True))
-    seen = [(labels[row], found[row]) for row in rows]
-    return found if there and len(set(seen)) < len(seen) else []
+    subject, day = (table.columns.get(name) if name != by else None for name in _OF_DAY)
+    if day is None and session is not None and session not in (by, _OF_DAY[0]):
+        day = table.columns.get(session)
+    if subject is None and day is None:
+        return []
+    alike = ("1",) * len(table.lines)
+    found = list(zip(subject or alike, day or alike, strict=True))
+    known = [found[row] for row in rows if "" not in found[row]]
+    subjects = {of for of, _ in known}
+    apart = subjects if len(subjects) > 1 else set(known)
+    return found if len(apart) < len(known) else []
 
 
 def _column(
