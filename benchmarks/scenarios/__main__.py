@@ -4,7 +4,7 @@
     python -m benchmarks.scenarios --keep kept.json --jobs 2        # all of it, and the page
 
 With `--keep` the recordings of each row go to that file, row by row, and rows that are in it stay
-unless they are measured again; ``--recordings 0`` only writes. The page
+unless they are measured again; ``--recordings 0`` only writes. The table of
 `docs/development/scenarios.md` is written when every row of it is kept. A recording of four epochs
 by three methods takes about 2.5 s: 100 of each row are two hours on two cores.
 """
@@ -18,10 +18,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from tests.docs.measured import between_the_marks
 from tests.scenarios.catalogue import SCENARIOS
 
 from benchmarks.scenarios.measure import METHODS, measure
-from benchmarks.scenarios.page import page, summary, table
+from benchmarks.scenarios.page import measured, summary, table
 from benchmarks.scenarios.rule import Row, row
 
 PAGE = Path(__file__).parents[2] / "docs" / "development" / "scenarios.md"
@@ -97,7 +98,7 @@ def main() -> None:
     print(f"{time.monotonic() - begun_s:.0f} s")
     everything = rows(found, list(SCENARIOS), list(METHODS))
     if options.keep and len(everything) == len(SCENARIOS) * len(METHODS):
-        PAGE.write_text(page(everything), encoding="utf-8")
+        between_the_marks(PAGE, measured(everything))
         print(f"wrote {PAGE}")
 
 

@@ -1,9 +1,11 @@
-"""The table as Markdown."""
+"""The table and its summary as Markdown."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+
+from tests.docs.measured import folded
 
 from benchmarks.scenarios.measure import EPOCHS
 from benchmarks.scenarios.rule import Answer, Array, Row
@@ -48,15 +50,20 @@ def table(rows: Rows) -> list[str]:
     return lines
 
 
-def page(rows: Rows) -> str:
-    """Return the whole page."""
-    counts = sorted({row.recordings for row in rows.values()})
-    many = " to ".join(str(count) for count in dict.fromkeys((counts[0], counts[-1])))
-    how_many = (
-        f"Each row: {many} recordings of {EPOCHS} epochs of 20 s. The standard error of a share of "
-        f"{counts[0]} recordings is up to {50 / math.sqrt(counts[0]):.0f} %."
-    )
-    return _INTRODUCTION + "\n".join([how_many, "", *summary(rows), "", *table(rows), ""])
+def measured(rows: Rows) -> str:
+    """Return what stands between the marks of the page."""
+    counts: dict[str, list[int]] = {}
+    for (_, method), row in rows.items():
+        counts.setdefault(method, []).append(row.recordings)
+    lines = []
+    for method, said in zip(counts, summary(rows), strict=True):
+        least, most = min(counts[method]), max(counts[method])
+        many = f"{least}" if least == most else f"{least} to {most}"
+        lines.append(
+            f"{said} {many} recordings of {EPOCHS} epochs a row: the standard error of a share is "
+            f"up to {50 / math.sqrt(least):.0f} %."
+        )
+    return "\n".join([*lines, "", *folded(table(rows))])
 
 
 def _cells(scenario: str, method: str, row: Row) -> Iterable[str]:
@@ -88,35 +95,3 @@ def _short(value: float, sign: bool) -> str:
 
 def _whole(answer: Answer) -> str:
     return " ".join("–" if x != x else f"{100 * x:.0f}" for x in answer.coverage)
-
-
-_INTRODUCTION = """\
-# Scenarios
-
-How far estimates and findings can be trusted when the joint, the subject or the rig is not as the
-model has it. The recordings come from a simulator of its own (`tests/scenarios`): joint, cuff,
-drive and sensors in continuous time by Runge–Kutta at 10 kHz, the controller at its ticks. It
-shares no equation with the estimation. Written by
-
-```sh
-python -m benchmarks.scenarios --keep scenarios.json --jobs 2
-python -m benchmarks.scenarios --keep scenarios.json --only relaxed tremor --recordings 10
-```
-
-The second form measures the rows again whose names hold one of the words.
-
-Three numbers in a cell are J, B and K. Bias and scatter (SD) of the single epochs are in % of the
-truth: the intrinsic J, B and K that were simulated, their mean where they changed. Coverage is the
-share of 95 % intervals that hold it. A finding of level caution or exclude flags an epoch. `blind`
-is `bandlimited` on a file of torque and motion alone, without perturbation and command.
-
-The rule: an answer is wrong if the mean error of J, B or K exceeds 10 % or an interval covers less
-than 80 %, in single epochs or pooled. It must then come with the right finding in at least 90 % of
-the recordings; if not, the row is **silent, off** or, within 10 %, **silent, overconfident**, and
-**misnamed** where other findings flag it that often. A right answer may be flagged in at most 5 %
-of the recordings, or it is a **false alarm**. Where the joint is not one J, B and K (it changes, or
-has another term), to say so is never false. A share breaks a limit where chance alone, from a true
-share at the limit, would do so in less than 1 of 20 cases. Which findings are right for a scenario
-is in `tests/scenarios/catalogue.py`.
-
-"""

@@ -91,7 +91,7 @@ def scenarios(method: str) -> Figure:
         row for row in own
         if np.nanmax(np.abs(numbers(row[bias]))) > 1 or "**" in row[-1] or _flagged(row[flags])
     ]  # fmt: skip
-    rest = f"{len(own) - len(shown)} others: within 1 %, not flagged"
+    rest = f"{len(own) - len(shown)} others: within 1 %, silent"
     figure, axes, places = rows_of([*(row[1] for row in shown), rest], 34)
     symlog(axes, 1, (-100, -10, -1, 0, 1, 10, 100), f"bias of {method}, % of the truth")
     for label, y, row in zip(axes.get_yticklabels(), places, shown, strict=False):

@@ -12,9 +12,11 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from benchmarks import batch
+from benchmarks import batch, between_samples
 from benchmarks.loop import late_and_missed
 from benchmarks.quiet import Beside, Others, quiet_words, ratio_words
+from benchmarks.scenarios.__main__ import PAGE
+from benchmarks.scenarios.page import measured, table
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
@@ -146,3 +148,12 @@ def test_a_ratio_has_the_interval_of_its_runs():
     """Logarithms -0.1, 0 and 0.1: their standard error is 0.0577, and t 4.303."""
     assert ratio_words(np.exp([0.9, 1.0, 1.1]), np.exp([1.0] * 3)) == "1.00 (0.78 to 1.28)"
     assert ratio_words([3.0], [2.0]) == "1.50"
+
+
+def test_a_table_is_written_as_it_stands_in_its_page() -> None:
+    page = between_samples.TABLE.read_text("utf-8")
+    assert between_samples.written(between_samples.read(page)) in page
+    of_scenarios = PAGE.read_text("utf-8")
+    header, rule = table({})
+    assert "\n".join(["<details><summary>The table</summary>", "", header, rule]) in of_scenarios
+    assert measured({}).strip().startswith("<details>")
