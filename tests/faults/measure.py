@@ -23,6 +23,7 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
+from tests.docs.measured import MARKS, between_the_marks, folded
 from tests.faults.closed_pages import HOW, closed, moments, pause_table
 from tests.faults.rigs import RIGS
 from tests.faults.torque_faults import table as torque_faults
@@ -31,7 +32,7 @@ ROOT = Path(__file__).parents[2]
 HAZARDS = ROOT / "docs" / "reference" / "hazards.md"
 FAULTS_PAGE = ROOT / "docs" / "development" / "faults.md"
 GUARD_LAWS = ROOT / "docs" / "development" / "guard-laws.md"
-BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
+BEGIN, END = (mark.format(what="measured") for mark in MARKS)
 
 FAULTS: dict[int, tuple[str, str, str]] = {
     1: ("NaN or Inf in torque, angle, parameter, perturbation or command",
@@ -198,14 +199,8 @@ def cases(notes: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def between_the_marks(page: Path, body: str, what: str = "measured") -> None:
-    """Replace what stands between the two marks of a page."""
-    first, last = BEGIN.replace("measured", what), END.replace("measured", what)
-    head, begin, rest = page.read_text(encoding="utf-8").partition(first)
-    _, end, tail = rest.partition(last)
-    if not (begin and end):
-        sys.exit(f"{page.name} has no marks to write between: {first} … {last}")
-    page.write_text(f"{head}{first}\n\n{body}\n\n{last}{tail}", encoding="utf-8")
+def _folded(lines: str) -> str:
+    return "\n".join(folded(lines.splitlines()))
 
 
 def measure_pauses() -> None:
@@ -217,7 +212,7 @@ def measure_pauses() -> None:
                 cases.append(closed(Path(folder), how, phase, at_s))
     found = pause_table(cases)
     print(found)
-    between_the_marks(FAULTS_PAGE, found, "operator gone")
+    between_the_marks(FAULTS_PAGE, _folded(found), "operator gone")
 
 
 def main() -> None:
@@ -233,10 +228,10 @@ def main() -> None:
     load = os.getloadavg()[0]
     python = f"Python {platform.python_version()}, {os.cpu_count()} processors, load {load:.1f}"
     measured = f"Measured with {python}; {len(notes)} cases."
-    between_the_marks(FAULTS_PAGE, f"{measured}\n\n{table(notes)}")
+    between_the_marks(FAULTS_PAGE, f"{measured}\n\n{_folded(table(notes))}")
     between_the_marks(HAZARDS, in_short(table(notes)))
-    between_the_marks(GUARD_LAWS, cases(notes))
-    between_the_marks(GUARD_LAWS, torque_faults(), "torque faults")
+    between_the_marks(GUARD_LAWS, _folded(cases(notes)))
+    between_the_marks(GUARD_LAWS, _folded(torque_faults()), "torque faults")
 
 
 if __name__ == "__main__":
