@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tests.docs.measured import folded
 
 from benchmarks import hard_epochs, two_rigs
 from benchmarks.known_joint import TRUTH, array, sessions, settings_with
@@ -38,13 +39,13 @@ TABLE = Path(__file__).parent.parent / "docs" / "development" / "accuracy.md"
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
-    """Return a Markdown table."""
-    return [
+    """Return a Markdown table, to unfold."""
+    lines = [
         "| " + " | ".join(header) + " |",
         "| " + " | ".join(["---", *["---:"] * (len(header) - 1)]) + " |",
         *("| " + " | ".join(map(str, row)) + " |" for row in rows),
-        "",
     ]
+    return [*folded(lines), ""]
 
 
 def percent(values: Iterable[float], digits: int = 2) -> list[str]:

@@ -1,4 +1,4 @@
-"""Makes the pictures and drawings of the documents, and the output that the tutorials show.
+"""Makes the pictures of the documents, and the output that the tutorials show.
 
     python -m tests.docs.pictures
 
@@ -16,7 +16,6 @@ from pathlib import Path
 
 from playwright.sync_api import Page
 from tests.browser import open_browser
-from tests.docs import drawings
 from tests.docs.blocks import RUN, run, write
 from tests.docs.markdown import ROOT
 
@@ -69,7 +68,6 @@ def main() -> None:
             place.mkdir()
             for picture, shown_words in made(folder, place).items():
                 words[f"{(folder / picture).relative_to(ROOT)}.png"] = shown_words
-    drawings.main()
     PICTURED.write_text(json.dumps(words, indent=1, ensure_ascii=False) + "\n", "utf-8")
 
 
