@@ -68,7 +68,7 @@ def activities(
         stretches.sort()
         left = without
         if settings.estimation.leave_out_active:
-            left = leaving_out(without, _left_out(stretches), settings)
+            left = leaving_out(without, to_leave_out(stretches), settings)
         length_s = max(float(one.time_s[-1] - one.time_s[0]) for one in own.values())
         active = share_percent(joined([one[:2] for one in stretches]), length_s)
         out = [one[:2] for one in left.left_out if one.check == CHECK]
@@ -79,6 +79,7 @@ def activities(
     return found
 
 
-def _left_out(stretches: Sequence[ActiveStretch]) -> list[LeftOut]:
+def to_leave_out(stretches: Sequence[ActiveStretch]) -> list[LeftOut]:
+    """Return what would be left out for active muscles, but for those that follow the motion."""
     own = [(one.start_s, one.stop_s + TORQUE_OUTLASTS_S) for one in stretches if not one.locked]
     return [LeftOut(*span, "a muscle was active", CHECK) for span in joined(own)]

@@ -58,16 +58,27 @@ def leaving_out(epoch: Epoch, found: Sequence[LeftOut], settings: Settings) -> E
 
     That is more than `max_left_out_percent` of it, or less than can be fitted.
     """
-    if not found:
+    if not found or why_kept(epoch, found, settings):
         return epoch
-    diagnostics = settings.diagnostics
-    without = replace(epoch, left_out=(*epoch.left_out, *sorted(found)))
-    trim_s = settings.estimation.trim_s
+    return bridged(_without(epoch, found))
+
+
+def why_kept(epoch: Epoch, found: Sequence[LeftOut], settings: Settings) -> str:
+    """Return why some stretches cannot be left out too, or an empty text."""
+    without, trim_s = _without(epoch, found), settings.estimation.trim_s
     (before_s, _), (left_s, _) = used_s(epoch, trim_s), used_s(without, trim_s)
     taken_percent = 100.0 * (before_s - left_s) / before_s if before_s > 0 else 100.0
-    if taken_percent > diagnostics.max_left_out_percent or too_little(without, settings.estimation):
-        return epoch
-    return bridged(without)
+    most_percent = settings.diagnostics.max_left_out_percent
+    if taken_percent > most_percent:
+        return (
+            f"with {trim_s:g} s on each side that would take {taken_percent:.0f} % of the epoch "
+            f"(at most {most_percent:g} %)"
+        )
+    return too_little(without, settings.estimation)
+
+
+def _without(epoch: Epoch, found: Sequence[LeftOut]) -> Epoch:
+    return replace(epoch, left_out=(*epoch.left_out, *sorted(found)))
 
 
 def bad_stretches(epoch: Epoch, settings: DiagnosticsSettings) -> list[LeftOut]:

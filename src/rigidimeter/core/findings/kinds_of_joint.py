@@ -115,7 +115,7 @@ JOINT_KINDS = (
         "share of the time in which the 6 Hz envelope of a muscle's EMG passes "
         "`emg_baseline_factor` times the quietest fifth of the recording for `min_burst_s`; such "
         "stretches are left out (`--keep-active` fits them), except of a muscle that follows the "
-        "motion, and at most `max_left_out_percent` of an epoch",
+        "motion, and unless that takes more than `max_left_out_percent` of the epoch",
         headline="A muscle was active in {value:.0f} % of the time",
         measured="The EMG of {channel} shows activity in {value:.0f} % of the time (at most "
         "{limit:g} %); nothing is left out for it.",
@@ -139,6 +139,16 @@ JOINT_KINDS = (
                 "meaning": "The estimate is from {used_s:.3g} of {length_s:.3g} s.",
                 "remedy": "Report both; --keep-active fits everything.",
             },
+            "too_much": {
+                "headline": "A muscle was active in {value:.2g} % of the time, too much to leave "
+                "out",
+                "measured": "The EMG of {channel} shows activity in {value:.2g} % of the time, and "
+                "nothing is left out: {why}.",
+                "meaning": "J, B and K are of a joint that was active in part, and how far they "
+                "are from those of a relaxed one is not known.",
+                "remedy": "Repeat while the subject is relaxed, or raise "
+                "`diagnostics.max_left_out_percent`.",
+            },
             "locked": {
                 "headline": "A muscle was active with the motion in {value:.2g} % of the time",
                 "measured": "The EMG of {channel} shows activity in {value:.2g} % of the time, and "
@@ -153,6 +163,7 @@ JOINT_KINDS = (
             "limit": 20.0,
             "channel": "emg_v and emg_2_v",
             "both": "B 0.214 with them and 0.137 without",
+            "why": "with 1 s on each side that would take 52 % of the epoch (at most 50 %)",
         },
     ),
     Kind(

@@ -17,6 +17,7 @@ from rigidimeter.analysis.report.epoch_traces import page_traces
 from rigidimeter.analysis.study import estimate, recording_result, result_table
 from rigidimeter.cli.main import app
 from rigidimeter.core.files import csv_text
+from rigidimeter.core.findings import UNKNOWN_EFFECT
 from rigidimeter.core.settings import changed_settings
 
 TRUTH = np.array([JOINT.inertia_kg_m2, JOINT.damping_nm_s_rad, JOINT.stiffness_nm_rad])
@@ -119,6 +120,34 @@ def test_a_muscle_active_throughout_an_epoch_stands_out_of_the_recording(relaxed
     assert analysis.fits[0].activity.left_out_percent == 0  # too little would be left
     assert analysis.fits[1].activity.active_percent == 0
     assert "nothing is left out" in found(analysis)[0][0].details
+
+
+@pytest.mark.parametrize(
+    ("bursts", "method", "level"),
+    [(2, "iv", "note"), (5, "iv", "caution"), (5, "published", "caution")],
+)
+def test_bursts_that_take_too_much_with_their_sides_are_said(relaxed, bursts, method, level):
+    """Below the limit of the activity too: 5 of 0.6 s, each with 2.2 s around it, of 18 s."""
+    settings, epochs = relaxed
+    epoch = epochs[0].epoch
+    emg = epoch.channels["emg_v"]
+    starts_s = emg.time_s[0] + 2.0 + 16.0 * np.arange(bursts) / (bursts - 0.5)
+    loud = np.any([(emg.time_s > s) & (emg.time_s < s + 0.6) for s in starts_s], axis=0)
+    channel = replace(emg, values=np.where(loud, 20.0, 1.0) * emg.values)
+    pulled = replace(epoch, channels={**epoch.channels, "emg_v": channel})
+    analysis = estimate([pulled], method, settings=settings)
+    (fit,), ((finding,),) = analysis.fits, found(analysis)
+    assert fit.activity.active_percent < 20 == settings.diagnostics.max_emg_active_percent
+    assert finding.level == level
+    assert (fit.activity.left_out_percent == 0) == (level == "caution")
+    if level == "note":
+        return
+    assert "nothing is left out: with 1 s on each side that would take" in finding.details
+    assert "(at most 50 %)" in finding.details
+    assert finding.effect == UNKNOWN_EFFECT
+    stricter = {"diagnostics": {"levels": {"emg_activity": "exclude"}}}
+    (strict,) = estimate([pulled], method, settings=changed_settings(settings, stricter)).fits
+    assert not strict.outcome.included
 
 
 def test_activity_is_in_files_and_read_back(pushed, tmp_path):

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.active_stretches import CHECK
+from rigidimeter.analysis.estimation.active_stretches import CHECK, to_leave_out
+from rigidimeter.analysis.estimation.bad_stretches import why_kept
 from rigidimeter.analysis.estimation.bandlimited import zero_phase_band
 from rigidimeter.analysis.estimation.diagnostics.channel_checks import rest_of
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
@@ -28,7 +29,7 @@ from rigidimeter.analysis.estimation.diagnostics.check_record import (
 from rigidimeter.analysis.estimation.found import half_widths
 from rigidimeter.analysis.estimation.power_lines import lines_inside, power_lines
 from rigidimeter.analysis.estimation.signals import Array, Signals
-from rigidimeter.core.findings import Effect, Fact
+from rigidimeter.core.findings import UNKNOWN_EFFECT, Effect, Fact
 from rigidimeter.core.records import PARAMETERS
 from rigidimeter.core.settings import DiagnosticsSettings
 from rigidimeter.core.words import number
@@ -117,6 +118,8 @@ def emg_activity(case: Case) -> Look | None:
         return Look(value, most, True, facts, "moved", effect)
     if _locked(case):
         return Look(value, most, True, facts)
+    if why := _kept(case):
+        return Look(value, most, True, {**facts, "why": why}, "too_much")
     return at_most(value, most, **facts)
 
 
@@ -126,7 +129,23 @@ def _left_out_or_push(case: Case, look: Look) -> Harmless:
         return HARMFUL
     if case.prepared is not None and case.prepared.with_active is not None:
         return "left_out", {}
+    if _kept(case):
+        return HARMFUL  # what the joint was while the muscle pulled no method can tell
     return ("locked", {}) if _locked(case) else push_harmless(case, look)
+
+
+def _effect(case: Case) -> Effect:
+    return UNKNOWN_EFFECT if _kept(case) else push_effect(case)
+
+
+def _kept(case: Case) -> str:
+    """Return why stretches stay in that were to be left out, or an empty text."""
+    prepared = case.prepared
+    if prepared is None or prepared.activity is None or prepared.with_active is not None:
+        return ""
+    found = to_leave_out(prepared.activity.stretches)
+    wanted = bool(found) and prepared.settings.estimation.leave_out_active
+    return why_kept(prepared.epoch, found, prepared.settings) if wanted else ""
 
 
 def _locked(case: Case) -> bool:
@@ -156,6 +175,6 @@ MOVEMENT_CHECKS = (
         (),
         emg_activity,
         harmless=_left_out_or_push,
-        effect=push_effect,
+        effect=_effect,
     ),
 )
