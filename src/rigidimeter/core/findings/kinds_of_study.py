@@ -57,7 +57,7 @@ STUDY_KINDS = (
         remedy="Repeat these epochs, or use a method that the finding does not bias.",
         variants={
             "hides": {
-                "headline": "{cause} can hide a difference: {counts}",
+                "headline": "{cause} can hide differences: {counts}",
                 "measured": "There is {cause}{others} in {counts}.",
                 "meaning": "What it does to J, B and K can hide a difference.",
             },

@@ -89,7 +89,7 @@ def test_a_doubt_that_can_hide_a_difference_is_said(study):
     found = of(doubted(study, "lack_of_fit", in_dbs), "inertia_kg_m2")
     assert found.verdict == "cannot be decided"
     assert (
-        found.reason == "lack_of_fit can hide a difference: 0 of 23 epochs in OFF, 19 of 19 in DBS"
+        found.reason == "lack_of_fit can hide differences: 0 of 23 epochs in OFF, 19 of 19 in DBS"
     )
 
 
