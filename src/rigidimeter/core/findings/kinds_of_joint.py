@@ -142,10 +142,9 @@ JOINT_KINDS = (
             "too_much": {
                 "headline": "A muscle was active in {value:.2g} % of the time, too much to leave "
                 "out",
-                "measured": "The EMG of {channel} shows activity in {value:.2g} % of the time, and "
+                "measured": "The EMG of {channel} shows activity in {value:.2g} % of the time; "
                 "nothing is left out: {why}.",
-                "meaning": "J, B and K are of a joint that was active in part, and how far they "
-                "are from those of a relaxed one is not known.",
+                "meaning": "How far J, B and K are from those of a relaxed joint is not known.",
                 "remedy": "Repeat while the subject is relaxed, or raise "
                 "`diagnostics.max_left_out_percent`.",
             },

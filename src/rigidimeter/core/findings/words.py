@@ -22,6 +22,7 @@ WHEN: Mapping[str, str] = {
     "not_known": "When the controller is not known",
     "at_rest": "When the joint did not move",
     "chance": "When it may be due to chance",
+    "too_much": "When more was active than may be left out",
     "noise": "When not all of the intervals lie below zero",
     "reaction": "When all of the intervals lie below zero",
     "with_term": "When a missing term was found as well",
