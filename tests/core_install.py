@@ -29,7 +29,7 @@ from typer.main import get_command
 
 from rigidimeter.cli.main import app
 
-LIMIT_S = 60.0
+LIMIT_S = 30.0
 """What takes longer is interrupted, as by Ctrl-C; the demo, which the others read, is not."""
 
 DEMO = "demo-study/"
