@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.docs import measured, measured_figures
+from tests.docs import figures_of_estimates, measured, measured_figures
 from tests.docs.drawings import FILES, draw
 from tests.docs.markdown import DOCUMENTS, ROOT
 
@@ -56,7 +56,7 @@ def test_another_number_in_a_table_moves_its_mark(tmp_path: Path, monkeypatch) -
     assert row in page
     (tmp_path / "late-drive.md").write_text(page.replace(row, row.replace("0.06", "0.26")), "utf-8")
     monkeypatch.setattr(measured, "DEVELOPMENT", tmp_path)
-    draw(tmp_path / "now.svg", measured_figures.late_drive)
+    draw(tmp_path / "now.svg", figures_of_estimates.late_drive)
     kept = places(measured_figures.FOLDER / "late-drive.svg")
     assert not np.allclose(places(tmp_path / "now.svg"), kept, atol=SHOWN)
 
