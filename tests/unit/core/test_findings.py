@@ -151,3 +151,13 @@ def test_an_effect_is_a_share_of_what_the_estimate_would_be_without_it_and_of_ha
     effect = Effect.of((-1e-4, 0.02, 0.0), (1e-3, -0.1, 2.0), (2e-4, 0.01, 0.1))
     assert effect.percent == pytest.approx((-100 / 11, 100 / 6, 0.0))
     assert effect.half_intervals == pytest.approx((-0.5, 2.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("percent", "shown"), [(890.0, "K above +100 %"), (-340.0, "K below −100 %"), (99.0, "K +99 %")]
+)
+def test_an_effect_larger_than_what_is_left_has_no_number(percent, shown):
+    """A bias of 2.0 in an estimate of 2.13 leaves 0.13 ± 0.3: of that it is any percentage."""
+    found = Finding("loop_bias", "caution", 180.0, 50.0, "%", effect=Effect((1.0, -2.0, percent)))
+    assert found.headline.endswith(f"J +1 %, B −2 %, {shown}")
+    assert found.effect.percent[2] == percent

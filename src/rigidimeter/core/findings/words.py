@@ -57,6 +57,10 @@ WHEN: Mapping[str, str] = {
 NO_CHANGE = 0.05
 """In %: less is shown as 0."""
 
+MOST_CHANGE = 100.0
+"""In %: more is shown as that, for it is a share of what is left of J, B or K without the effect,
+which is then small and itself not known."""
+
 
 class Words(NamedTuple):
     """Headline (at most 15 words), details (at most 60) and remedy (one sentence, or empty)."""
@@ -109,11 +113,18 @@ def _shown(facts: Mapping[str, Any]) -> dict[str, Any]:
         shown["p"] = p_text(facts["p"])
     if "percent_of" in facts:
         shown["changes"] = ", ".join(
-            f"{symbol} {'0' if abs(percent) < NO_CHANGE else f'{Shown(percent):+.2g}'} %"
+            f"{symbol} {_change(percent)} %"
             for symbol, percent in zip("JBK", facts["percent_of"], strict=True)
             if math.isfinite(percent)
         )
     return shown
+
+
+def _change(percent: float) -> str:
+    if abs(percent) > MOST_CHANGE:
+        side = "above" if percent > 0 else "below"
+        return f"{side} {Shown(math.copysign(MOST_CHANGE, percent)):+.0f}"
+    return "0" if abs(percent) < NO_CHANGE else f"{Shown(percent):+.2g}"
 
 
 def _fields(kind: Kind, variant: str) -> set[str]:

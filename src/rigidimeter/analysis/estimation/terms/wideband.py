@@ -14,6 +14,7 @@ so is a sum of sines, b_k sin(π k i / (n − 1)), so that a sine and a cosine t
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -70,7 +71,8 @@ def wideband_signals(epoch: Epoch, high_hz: float) -> Signals:
     torque = values_at(epoch.channels["torque_nm"], time_s)
     if "velocity_rad_s" not in epoch.channels:
         angle = values_at(epoch.channels["angle_rad"], time_s)
-        return wideband_from_angle(torque, angle, rate_hz, wide_hz)
+        made = wideband_from_angle(torque, angle, rate_hz, wide_hz)
+        return replace(made, time_s=time_s)
     everything = np.stack([torque, *kinematics(epoch, time_s)])
     torque, angle, velocity, acceleration = _Sines(everything, rate_hz, wide_hz).value()
     band_hz = 0.0, min(wide_hz, rate_hz / 2)
