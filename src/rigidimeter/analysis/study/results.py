@@ -17,7 +17,7 @@ from rigidimeter.analysis.study.measures import Measure
 from rigidimeter.analysis.study.ratings_found import RatingsFound
 from rigidimeter.core.records import Analysis, Epoch, FindingGroup, Fit, Notice, Score
 from rigidimeter.core.settings import Settings
-from rigidimeter.core.words import html_table, one_line, with_error
+from rigidimeter.core.words import html_table, one_line, series, with_error
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -278,10 +278,13 @@ class StudyResult:
 
     @property
     def statements(self) -> Statements | None:
-        """What was measured, tested and concluded, in words; None of one condition alone."""
-        from rigidimeter.analysis.study.statements import statements
+        """What was measured, tested and concluded, in words; None of one condition alone.
 
-        return statements(self)
+        Of each comparison with the reference, those of `further` too.
+        """
+        from rigidimeter.analysis.study.statements import statements_of_all
+
+        return statements_of_all(self)
 
     @property
     def findings(self) -> tuple[FindingGroup, ...]:
@@ -359,15 +362,16 @@ class StudyResult:
         return rigidimeter.plot(self, "effects", axes=ax)
 
     def __repr__(self) -> str:
-        """Return the medians of both conditions in each measure as one line."""
+        """Return the medians of the conditions in each measure as one line."""
+        others = dict.fromkeys((self.other, *(c.other for c in self.further)))
+        names = [name for name in (self.reference, *others) if name]
         shown = []
         for c in self.comparisons:
-            found = [c.summaries[name] for name in c.pair if name in c.summaries]
-            medians = " and ".join(with_error(s.median, math.nan) for s in found)
+            found = [c.summaries[name] for name in names or c.pair if name in c.summaries]
+            medians = series([with_error(s.median, math.nan) for s in found])
             shown.append(one_line(c.measure.title, medians, c.measure.unit, joint=" "))
-        pair = " and ".join(name for name in (self.reference, self.other) if name)
         medians = f"medians: {', '.join(shown)}" if shown else ""
-        return one_line(self.title, pair, medians)
+        return one_line(self.title, series(names), medians)
 
     def _repr_html_(self) -> str:
         """Return what the terminal shows of each measure, by pairs of conditions."""

@@ -57,6 +57,35 @@ def statements(result: StudyResult) -> Statements | None:
     return Statements(_measured(concluded), _tested(concluded), tuple(_concluded(concluded)))
 
 
+def statements_of_all(result: StudyResult) -> Statements | None:
+    """Return the statements on each comparison with the reference, beside each other.
+
+    What does not name the other condition begins with the difference that it is of.
+    """
+    told = [
+        (f"{condition_name(pair.other)} − {condition_name(pair.reference)}: ", pair.other, said)
+        for pair in (result, *result.further_pairs)
+        if (said := statements(pair)) is not None
+    ]
+    if len(told) < 2:
+        return told[0][2] if told else None
+    measured = [said.measured.removesuffix(f" {MEASUREMENT_ALONE}") for *_, said in told]
+    if any(said.measured.endswith(MEASUREMENT_ALONE) for *_, said in told):
+        measured.append(MEASUREMENT_ALONE)
+    tested = [said.tested for *_, said in told]
+    if len(set(tested)) > 1:
+        tested = [f"{which}{text}" for (which, *_), text in zip(told, tested, strict=True)]
+    return Statements(
+        " ".join(measured),
+        " ".join(dict.fromkeys(tested)),
+        tuple(
+            sentence if condition_name(other) in sentence else f"{which}{sentence}"
+            for which, other, said in told
+            for sentence in said.concluded
+        ),
+    )
+
+
 def lead(result: StudyResult) -> str:
     """Return the sentence to quote."""
     prefix = ""

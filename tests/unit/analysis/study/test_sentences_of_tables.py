@@ -91,3 +91,26 @@ def test_a_caution_of_the_inertia_has_the_number_of_its_row() -> None:
         if one.comparison.measure.name == "inertia_kg_m2"
     ]
     assert f"inertia differs by {inertia.difference.percent[0]:.2g} %" in concluded(study)
+
+
+def test_each_condition_is_stated_beside_the_reference() -> None:
+    levels = {"OFF": 1.75, "1 mA": 1.75, "2 mA": 1.4, "3 mA": 1.2}
+    rng = np.random.default_rng(4)
+    rows = [
+        {"day": day, "condition": name, "k": value + 0.1 * rng.standard_normal()}
+        for day in range(8)
+        for name, value in levels.items()
+    ]
+    found = compare(pd.DataFrame(rows), value="k", resamples=100)
+    said = found.statements
+    assert said is not None
+    for name in ("1 mA", "2 mA", "3 mA"):
+        assert f"{name} − OFF: k " in said.measured
+        assert sum(name in sentence for sentence in said.concluded) == 1
+    assert said.tested.count("Paired t-test of 8 days") == 1
+    assert "k is lower in 3 mA than in OFF." in said.concluded
+    assert repr(found) == "OFF, 1 mA, 2 mA and 3 mA; medians: k 1.685, 1.741, 1.383 and 1.218"
+    pair = compare(pd.DataFrame(rows), "2 mA", reference="OFF", value="k", resamples=100)
+    assert repr(pair).startswith("OFF and 2 mA; medians: ")
+    assert pair.statements is not None
+    assert pair.statements.concluded == ("k is lower in 2 mA than in OFF.",)
