@@ -54,12 +54,13 @@ docs: install
 	$(BIN)/sphinx-build --fail-on-warning --keep-going -q -b html docs build/site
 	@echo "the site: build/site/index.html"
 
-# The gallery with the scripts that need more packages, too.
+# The gallery anew, with the scripts that need more packages, Octave or R; prints the seconds of each script.
 gallery: install
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[docs,bench]'
-	$(BIN)/sphinx-build --fail-on-warning --keep-going -q -b html \
-		-D sphinx_gallery_conf.filename_pattern=/ docs build/site
-	@echo "the gallery: build/site/gallery/index.html"
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[docs,gallery]'
+	rm -rf docs/gallery build/gallery
+	set -o pipefail; $(BIN)/sphinx-build --fail-on-warning --keep-going --no-color -b html \
+		-D sphinx_gallery_conf.filename_pattern=/ docs build/gallery | sed -n 's|^ *- ../examples/gallery/||p'
+	@echo "the gallery: build/gallery/gallery/index.html"
 
 bench: install
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[all,dev,bench]'

@@ -27,7 +27,7 @@ autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
 numpydoc_show_class_members = False
 
-# Scripts named plot_ run on the core packages; the others are shown, and run by `make gallery`.
+# Scripts named plot_ run on the core packages; those named with_ are run by `make gallery` alone.
 sphinx_gallery_conf = {
     "examples_dirs": "../examples/gallery",
     "gallery_dirs": "gallery",

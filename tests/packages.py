@@ -19,7 +19,7 @@ ENVIRONMENT = {name: text for name, text in os.environ.items() if name != "PYTHO
 LEFT_OUT = shutil.ignore_patterns(
     *(line.strip("/") for line in (ROOT / ".gitignore").read_text("utf-8").split()), ".git"
 )
-NOT_FOR_USERS = {"all", "bench", "dev", "docs"}
+NOT_FOR_USERS = {"all", "bench", "dev", "docs", "gallery"}
 """Extras that hold other extras, or what maintainers need."""
 
 

@@ -19,7 +19,8 @@ def test_every_picture_is_in_a_document() -> None:
         for path in DOCUMENTS
         for target in re.findall(r"!\[[^\]]*\]\(([^)]+\.png)\)", path.read_text("utf-8"))
     }
-    made = {str(path.relative_to(ROOT)) for path in (ROOT / "docs").rglob("*.png")}
+    pictures_of_docs = (path.relative_to(ROOT) for path in (ROOT / "docs").rglob("*.png"))
+    made = {str(path) for path in pictures_of_docs if path.parts[1] != "gallery"}  # `make docs`
     assert shown == made
     of_page = {path for path in made if any(folder in path for folder in OF_THE_PAGE)}
     assert set(PICTURED) == {"docs/images/report.png", *of_page}
