@@ -43,6 +43,7 @@ BOUNDS: Mapping[str, tuple[float, float]] = {
 
 _NAME = re.compile(r"\w[\w.+-]*")
 _LONGEST_NAME = 40
+_COUNT = re.compile(r"\d{1,9}", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -214,10 +215,12 @@ def plan_days_of(texts: Sequence[str]) -> dict[str, int]:
     """
     found = {}
     for text in texts:
-        name, _, count = text.partition("=")
-        if not count.strip().isdigit():
-            raise WrongValue("days_of", "write a condition and its days, such as DBS=4", text)
-        found[name.strip()] = int(count)
+        name, _, count = (part.strip() for part in text.partition("="))
+        if _COUNT.fullmatch(count) is None or name in found:
+            raise WrongValue(
+                "days_of", "write each condition once with its days, such as DBS=4", text[:60]
+            )
+        found[name] = int(count)
     return found
 
 

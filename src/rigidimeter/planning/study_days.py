@@ -18,6 +18,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
@@ -35,6 +36,10 @@ _MOST_SESSIONS = 12
 
 _MOST_ORDERS = 120_000
 """So many orders of a day can still be listed."""
+
+_MOST_SUBJECTS = 1000
+_MOST_PLANNED = 10_000
+"""Sessions of a plan, which is read again before each of them."""
 
 
 class WrongValue(UserError):
@@ -120,6 +125,18 @@ class StudyDays:
                 f"{self.sessions_a_day} sessions a day of {len(self.conditions)} conditions: at "
                 f"most {_MOST_SESSIONS} sessions a day can be planned",
             )
+        if len(self.subjects) > _MOST_SUBJECTS:
+            raise WrongValue(
+                "subjects",
+                f"{len(self.subjects)} subjects: at most {_MOST_SUBJECTS} can be planned at once",
+            )
+        planned = self._planned_count()
+        if planned > _MOST_PLANNED:
+            raise WrongValue(
+                "days",
+                f"{self.days} days of {len(self.subjects)} subjects have {planned} sessions: at "
+                f"most {_MOST_PLANNED} can be planned at once",
+            )
         if not self.order and self._order_count() > _MOST_ORDERS:
             raise WrongValue(
                 "order",
@@ -127,6 +144,11 @@ class StudyDays:
                 "too many orders to draw one; give the order, such as "
                 f"{','.join(self.conditions)}",
             )
+
+    def _planned_count(self) -> int:
+        """Return how many sessions the plan has."""
+        a_subject = sum(self.days_of.get(name, self.days) for name in self.conditions)
+        return a_subject * self.sessions_a_day * len(self.subjects)
 
     def _order_count(self) -> int:
         """Return how many orders a day with all conditions has, alike ones in a row included."""
@@ -176,6 +198,12 @@ def orders(conditions: Sequence[str], times: int) -> list[tuple[str, ...]]:
     return found
 
 
+@lru_cache(maxsize=8)
+def _listed(conditions: tuple[str, ...], times: int) -> tuple[tuple[str, ...], ...]:
+    """Return the same as `orders`, listed once for all days of a plan."""
+    return tuple(orders(conditions, times))
+
+
 def draw_days(plan: StudyDays, seed: int) -> tuple[PlannedBlock, ...]:
     """Return the sessions of a study, those of each subject and day in their order.
 
@@ -211,7 +239,7 @@ def _order_of(
         return tuple(name for name in plan.order if name in names) * plan.sessions_a_day
     if plan.balanced and names in reverse:
         return reverse.pop(names)
-    possible = orders(names, plan.sessions_a_day) if len(names) > 1 else []
+    possible = _listed(names, plan.sessions_a_day) if len(names) > 1 else ()
     order = possible[rng.integers(len(possible))] if possible else names * plan.sessions_a_day
     if plan.balanced and len(names) > 1:
         reverse[names] = order[::-1]

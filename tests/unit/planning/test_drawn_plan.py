@@ -9,7 +9,14 @@ import pytest
 
 from rigidimeter.cli.study_plan import plan_days
 from rigidimeter.core.settings import Settings, load_settings
-from rigidimeter.planning import BOUNDS, PlanValues, WrongValue, day_settings, draw_plan
+from rigidimeter.planning import (
+    BOUNDS,
+    PlanValues,
+    WrongValue,
+    day_settings,
+    draw_plan,
+    plan_days_of,
+)
 
 
 def test_the_command_has_the_bounds_of_the_plan() -> None:
@@ -46,3 +53,24 @@ def test_a_day_for_the_prediction_has_epochs_of_each_condition() -> None:
     assert blocks == [
         ("prbs", "A", 2), ("sinusoid", "A", 3), ("prbs", "B", 2), ("sinusoid", "B", 3)
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", ["DBS=\N{SUPERSCRIPT TWO}", "DBS=" + "9" * 5000, "DBS=", "4"])
+def test_days_of_a_condition_are_a_plain_number(text: str) -> None:
+    with pytest.raises(WrongValue, match="write each condition once with its days"):
+        plan_days_of([text])
+
+
+def test_a_condition_has_its_days_once() -> None:
+    with pytest.raises(WrongValue, match="write each condition once with its days"):
+        plan_days_of(["DBS=1", "DBS=2"])
+
+
+def test_a_plan_that_would_stop_the_page_for_a_minute_is_refused() -> None:
+    many = tuple(f"S{k}" for k in range(50))
+    with pytest.raises(WrongValue, match="have 600000 sessions: at most 10000") as wrong:
+        draw_plan(PlanValues(many, days=1000, sessions=6), Settings())
+    assert wrong.value.key == "days"
+    with pytest.raises(WrongValue, match="1001 subjects: at most 1000") as wrong:
+        draw_plan(PlanValues(tuple(map(str, range(1001))), days=1), Settings())
+    assert wrong.value.key == "subjects"

@@ -188,20 +188,20 @@ def _read_table(study: Path, about: PlanToml) -> StudyPlan:
         raise UserError(
             f"{table}: there is no column {missing[0]}; it must have {', '.join(COLUMNS)}"
         )
-    blocks: list[PlannedBlock] = []
+    blocks: dict[tuple[str, str, int], PlannedBlock] = {}
     for k, line in enumerate(found.lines):
         cells = {column: found.columns[column][k] for column in COLUMNS}
         block = _block(cells, f"{table}, line {line}", about)
         _check_protocol(study, block, f"{table}, line {line}")
-        if block.key in {one.key for one in blocks}:
+        if block.key in blocks:
             raise UserError(
                 f"{table}, line {line}: subject {block.subject}, day {block.day}, order "
                 f"{block.order} is planned twice; give each session of a day its own order"
             )
-        blocks.append(block)
+        blocks[block.key] = block
     if not blocks:
         raise UserError(f"{table}: plans no session; write a row for each, or draw the plan again")
-    return StudyPlan(study, about, _in_order(blocks), noted[table])
+    return StudyPlan(study, about, _in_order(blocks.values()), noted[table])
 
 
 def write_plan(

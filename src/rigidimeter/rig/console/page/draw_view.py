@@ -154,6 +154,9 @@ class DrawView:
 
     def _draw(self) -> None:
         """Draw the plan and show it; nothing is written."""
+        if self._state.busy:  # it takes seconds, in which no page could stop the session
+            ui.notify("not while a session runs")
+            return
         self._drawn = self._entered().plan
         self._shown.set_visibility(self._drawn is not None)
         if self._drawn is None:
@@ -190,8 +193,10 @@ class DrawView:
 
     async def _predict(self) -> None:
         """Take the days and PRBS epochs that `design` asks for."""
+        if not self._may_act():
+            return
         entered = self._entered()
-        if entered.values is None or not self._may_act():
+        if entered.values is None:
             return
         try:
             settings = day_settings(entered.values, self._state.place.settings)

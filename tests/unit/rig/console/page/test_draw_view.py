@@ -167,7 +167,7 @@ def test_what_the_wait_leaves_is_said_for_named_and_other_waits(client, tmp_path
         ({"days": "0"}, "days", "must be from 1 to 1000"),
         ({"conditions": "OFF,OFF"}, "conditions", "write different names"),
         ({"stimulated": "ON"}, "stimulated", "is not one of the conditions OFF, DBS"),
-        ({"days_of": "DBS"}, "days_of", "write a condition and its days, such as DBS=4"),
+        ({"days_of": "DBS"}, "days_of", "write each condition once with its days, such as DBS=4"),
         ({"days_of": "DBS=9"}, "days_of", "must be from 1 to the 8 days of the study"),
         ({"sessions": "7"}, "sessions", "must be from 1 to 6"),
         ({"conditions": "1,2,3,4,5,6,7,8,9"}, "order", "too many orders to draw one"),
@@ -263,3 +263,15 @@ def test_a_blinded_plan_is_shown_and_led_in_codes(client, tmp_path):
     other.delete()
     assert "day 1, number 1, code-" in words
     assert not any(name in words for name in NAMES)
+
+
+def test_nothing_is_drawn_while_a_session_runs(client, tmp_path):
+    """Drawing takes seconds, in which no page could stop the session."""
+    shown = Form(client, tmp_path)
+    shown.enter(subjects="S01")
+    assert shown.state.begin_check("check")
+    shown.click("draw")
+    assert not shown.named("write").parent_slot.parent.visible
+    shown.state.checking = ""
+    shown.click("draw")
+    assert shown.named("write").parent_slot.parent.visible
