@@ -3,9 +3,9 @@ What do other packages estimate from the same recordings?
 =========================================================
 
 Of a relaxed joint nearly the same. Of a subject who pushes, methods that use torque and angle alone
-are wrong, J by up to a factor of 14: the robot yields to the subject, so the subject's torque and
+are wrong, J by a factor of 14 or more: the robot yields to the subject, so the subject's torque and
 the motion are correlated. Methods that use the recorded perturbation are right, within 13 % from
-one epoch: ``rm.estimate``, and a frequency response fitted with lmfit.
+one epoch: ``rm.identify``, and a frequency response fitted with lmfit.
 
 ``make gallery`` runs this script; it needs ``pip install 'rigidimeter[gallery]'``.
 """
@@ -25,7 +25,7 @@ import rigidimeter as rm
 TRUE = np.array([0.0045, 0.1368, 1.751])
 
 # %%
-# Five ways
+# Six ways
 # ---------
 #
 # Each returns J, B and K, and the half-widths of their 95 % intervals where the package gives them.
