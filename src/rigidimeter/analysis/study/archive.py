@@ -39,7 +39,7 @@ from rigidimeter.core.files import (
     text_bytes,
     write_text,
 )
-from rigidimeter.core.settings import dump_settings
+from rigidimeter.core.settings import dump_settings, with_new_names
 from rigidimeter.core.version import __version__
 
 INPUTS_SCHEMA = "rigidimeter.study-inputs/1"
@@ -154,7 +154,7 @@ def _new_inputs(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[s
     for name in ("software", "method", "reference", "other", "seed", "resamples"):
         if before.get(name) != now[name]:
             yield f"{name}: {before.get(name)} → {now[name]}"
-    old, new = dict(_leaves(before["settings"])), dict(_leaves(now["settings"]))
+    old, new = dict(_leaves(with_new_names(before["settings"]))), dict(_leaves(now["settings"]))
     for name in dict.fromkeys([*old, *new]):
         if old.get(name) != new.get(name):
             yield f"setting {name}: {old.get(name)} → {new.get(name)}"

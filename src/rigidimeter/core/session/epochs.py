@@ -33,7 +33,7 @@ from rigidimeter.core.session.folder import (
     read_manifest,
     read_session_files,
 )
-from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.core.settings import Settings, recorded_settings
 
 CHANNELS = ("torque_nm", "angle_rad", "velocity_rad_s", "velocity_command_rad_s", "perturbation_nm")
 """The columns of samples that an epoch has."""
@@ -51,7 +51,7 @@ def session_settings(folder: Path) -> Settings:
 
 
 def _settings(folder: Path, manifest: Mapping[str, Any]) -> Settings:
-    return parse_settings(manifest["settings"], source=f"{folder}/{MANIFEST}, settings")
+    return recorded_settings(manifest["settings"], source=f"{folder}/{MANIFEST}, settings")
 
 
 def read_session(folder: Path) -> tuple[list[Epoch], list[Notice]]:

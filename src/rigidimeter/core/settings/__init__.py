@@ -36,6 +36,7 @@ from rigidimeter.core.settings.loop_settings import (
 )
 from rigidimeter.core.settings.messages import validated
 from rigidimeter.core.settings.models import CommissioningSettings, Settings
+from rigidimeter.core.settings.recorded import recorded_settings, with_new_names
 from rigidimeter.core.settings.rig_settings import (
     DriveSideSettings,
     MotionSensorSettings,

@@ -8,7 +8,14 @@ import pytest
 from tests.version_1 import as_version_1
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import FIELD, ZEROS, checksum_holds, with_checksum
+from rigidimeter.core.files import (
+    FIELD,
+    ZEROS,
+    checksum_holds,
+    json_text,
+    text_bytes,
+    with_checksum,
+)
 from rigidimeter.core.session import (
     SAMPLE_SCHEMA,
     TOGETHER,
@@ -249,6 +256,35 @@ def test_version_1_gives_the_same_numbers(recorded):
         assert (before.label, before.closed) == (after.label, after.closed)
         for name, channel in before.channels.items():
             np.testing.assert_array_equal(channel.values, after.channels[name].values)
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_session_with_older_names_of_settings_is_read(recorded, version):
+    """A manifest is never rewritten, so what a setting was called then is read for ever."""
+    epochs, _ = read_session(recorded(name="now"))
+    folder = recorded(name="before")
+    path = (as_version_1(folder) if version == 1 else folder) / "manifest.json"
+    manifest = json.loads(path.read_text())
+    diagnostics = manifest["settings"]["diagnostics"]
+    diagnostics["emg_window_s"] = diagnostics.pop("min_burst_s")
+    diagnostics["condition_number_most"] = diagnostics.pop("max_condition_number")
+    levels = {
+        key: level.replace("caution", "doubt") for key, level in diagnostics["levels"].items()
+    }
+    assert "doubt" in levels.values()
+    diagnostics["levels"] = levels
+    manifest["settings"]["estimation"]["bootstrap_draws"] = 200
+    manifest["settings"]["guard"]["least_inertia_kg_m2"] = manifest["settings"]["guard"].pop(
+        "min_inertia_kg_m2"
+    )
+    if version == 1:
+        path.write_bytes(text_bytes(json_text(manifest)))
+    else:
+        path.write_bytes(with_checksum(text_bytes(json_text({**manifest, "checksum": ZEROS}))))
+    old, notices = read_session(folder)
+    assert not notices
+    assert len(old) == len(epochs)
+    assert session_settings(folder) == session_settings(folder.with_name("now"))
 
 
 def test_version_1_passes_over_a_batch_that_cannot_be_decoded(recorded):

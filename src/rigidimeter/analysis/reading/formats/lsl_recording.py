@@ -17,7 +17,7 @@ from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import parse_json
 from rigidimeter.core.records import Epoch, Notice, Outcome
 from rigidimeter.core.session import Sample, epoch_extents, epoch_of_samples, sample_dtypes
-from rigidimeter.core.settings import Settings, parse_settings
+from rigidimeter.core.settings import Settings, recorded_settings
 
 SAMPLES_TYPE = "RobotSamples"
 """The type of the stream of samples."""
@@ -34,7 +34,7 @@ def settings_of_samples(described: Mapping[str, Any], source: str) -> Settings:
     text = _fact(described, "settings")
     if not text:
         raise UserError(f"{source}: its stream of samples does not hold its settings")
-    return parse_settings(parse_json(text.encode(), f"{source}: settings"), source=source)
+    return recorded_settings(parse_json(text.encode(), f"{source}: settings"), source=source)
 
 
 def epochs_of_samples(
