@@ -10,6 +10,7 @@ import pytest
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.study_files import (
+    PLAN_FILE,
     PLAN_TABLE,
     PlanToml,
     RecordedBlock,
@@ -55,6 +56,8 @@ def test_plan_is_read_as_it_was_drawn_and_known_to_be_edited(plan: StudyPlan) ->
     [
         ("60.0", "-1", "line 2: wait_min -1 must be from 0 to 1440 min"),
         ("60.0", "soon", "line 2: "),
+        ("S01,1,1,", "S01,1,1e300,", "order 1e300 must be a whole number from 1 to 1000"),
+        ("S01,1,1,", f"S01,{'d' * 300},1,", "day has 300 letters; at most 40"),
         ("S01,1,1,OFF", "S02,1,1,OFF", "subject S02 is not one of those in plan.toml: S01"),
         ("S01,1,1,OFF", "S01,1,1,ON", "condition ON is not one of those in plan.toml: OFF, DBS"),
         ("S01,1,2", "S01,1,1", "day 1, order 1 is planned twice"),
@@ -186,3 +189,45 @@ def test_a_study_file_does_not_say_who_a_subject_is(tmp_path: Path) -> None:
     path.write_text(f"{about}[subjects.S1]\ndate_of_birth = 1950-01-01\n")
     with pytest.raises(UserError, match="date_of_birth would say who the subject is"):
         read_study_toml(path)
+
+
+@pytest.mark.parametrize("left", [("protocols/OFF.toml",), ("protocols/OFF.toml", PLAN_TABLE)])
+def test_a_plan_that_was_not_written_to_its_end_is_written_again(
+    plan: StudyPlan, left: tuple[str, ...]
+) -> None:
+    protocols = {f"protocols/{name}.toml": "" for name in SPEC.conditions}
+    for name in {*protocols, PLAN_TABLE, PLAN_FILE} - {*left}:
+        (plan.folder / name).unlink()
+    if PLAN_TABLE in left:
+        with pytest.raises(UserError, match="was not written to its end; draw it again"):
+            read_plan(plan.folder)
+    blocks = draw_days(SPEC, 1)
+    with pytest.raises(UserError, match="is there already"):
+        write_plan(plan.folder, ABOUT, blocks, {"protocols/OFF.toml": "seed = 2"})
+    assert write_plan(plan.folder, ABOUT, blocks, protocols) == plan
+    with pytest.raises(UserError, match="is there already"):
+        write_plan(plan.folder, ABOUT, blocks, protocols)
+
+
+@pytest.mark.parametrize(
+    "codes",
+    [
+        {"OFF": "code-A"},
+        {"OFF": "code-A", "DBS": "code-A"},
+        {"OFF": "code-A", "DBS": ""},
+        {"OFF": "DBS", "DBS": "OFF"},
+    ],
+)
+def test_codes_that_would_show_or_mix_conditions_are_refused(codes: dict[str, str]) -> None:
+    with pytest.raises(ValueError, match="another code for each condition"):
+        PlanToml(subjects=["S01"], days=2, conditions=["OFF", "DBS"], codes=codes)
+
+
+def test_a_wrong_row_does_not_tell_which_code_is_the_reference(tmp_path: Path) -> None:
+    about = ABOUT.model_copy(update={"codes": {"OFF": "code-B", "DBS": "code-A"}})
+    protocols = {f"protocols/{name}.toml": "" for name in SPEC.conditions}
+    plan = write_plan(tmp_path / "study", about, draw_days(SPEC, 1), protocols)
+    table = plan.folder / PLAN_TABLE
+    table.write_text(table.read_text().replace("S01,1,1,OFF", "S01,1,1,X"))
+    with pytest.raises(UserError, match=r"plan\.toml: code-A, code-B"):
+        read_plan(plan.folder)

@@ -26,6 +26,7 @@ from rigidimeter.core.files import (
     noted_digests,
     read_bytes,
     read_text_table,
+    text_bytes,
     toml_text,
     write_text,
 )
@@ -37,6 +38,7 @@ PLAN_FILE, PLAN_TABLE = "plan.toml", "plan.csv"
 PLAN_SCHEMA = "rigidimeter.plan/1"
 TASKS = ("prbs", "sinusoid")
 LONGEST_WAIT_MIN = 24 * 60.0
+_LONGEST_DAY, _MOST_ORDER = 40, 1000
 
 COLUMNS = ("subject", "day", "order", "condition", "task", "protocol", "wait_min", "raters")
 _MAY_BE_EMPTY = ("raters",)
@@ -120,6 +122,20 @@ class PlanToml(Section):
                 )
         return self
 
+    @model_validator(mode="after")
+    def _codes_hide(self) -> Self:
+        codes = self.codes.values()
+        whole = (
+            len(self.codes)
+            == len(self.conditions)
+            == len({*codes, *self.conditions} - {*self.conditions})
+        )
+        if self.codes and not (whole and all(codes)):
+            raise ValueError(
+                "codes must hold another code for each condition, none of them a name of one"
+            )
+        return self
+
     def stimulation_of(self, condition: str) -> str:
         """Return whether the stimulation is ``on`` or ``off`` in a condition."""
         return "on" if condition in self.stimulated else "off"
@@ -171,6 +187,11 @@ def read_plan(study: Path) -> StudyPlan | None:
     about_path = study / PLAN_FILE
     if not (study / PLAN_TABLE).exists() and not about_path.exists():
         return None
+    if not about_path.exists():
+        raise UserError(
+            f"{study / PLAN_TABLE}: has no {PLAN_FILE} beside it, so the plan was not written to "
+            "its end; draw it again with the same options of rigidimeter study plan, or remove it"
+        )
     about = read_section(about_path, PLAN_SCHEMA, PlanToml)
     try:
         return _read_table(study, about)
@@ -225,10 +246,16 @@ def write_plan(
     ------
     UserError
         If a file is there already, since sessions may have been recorded by it, or cannot be
-        written.
+        written. Files of a plan that was not written to its end are no hindrance to the same plan.
     """
-    names = (PLAN_TABLE, PLAN_FILE, *protocols)
-    there = [name for name in names if (study / name).exists()]
+    table = csv_text(COLUMNS, [asdict(block) for block in blocks])
+    texts = {PLAN_TABLE: table, **protocols}
+    names = (PLAN_FILE, *texts)  # the first is written last, and nothing is recorded without it
+    there = [
+        name
+        for name in names
+        if (study / name).exists() and not _holds(study / name, texts.get(name))
+    ]
     if there:
         raise UserError(
             f"{study / there[0]}: is there already; a plan is never written over, so name another "
@@ -237,15 +264,21 @@ def write_plan(
     with refused(study, "cannot be made"):
         for name in names:
             (study / name).parent.mkdir(parents=True, exist_ok=True)
-    for name, text in protocols.items():
-        write_text(study / name, text)
-    write_text(study / PLAN_TABLE, csv_text(COLUMNS, [asdict(block) for block in blocks]))
+    for name in (*protocols, PLAN_TABLE):
+        write_text(study / name, texts[name])
     digest = hashlib.sha256(read_bytes(study / PLAN_TABLE, DOCUMENT_BYTES)).hexdigest()
     values = about.model_dump() | {"sha256": digest}
     write_text(study / PLAN_FILE, toml_text({"schema": PLAN_SCHEMA, **values}))
     written = read_plan(study)
     assert written is not None
     return written
+
+
+def _holds(path: Path, text: str | None) -> bool:
+    """Whether a file holds just this text."""
+    return (
+        text is not None and path.is_file() and read_bytes(path, DOCUMENT_BYTES) == text_bytes(text)
+    )
 
 
 def _in_order(blocks: Iterable[PlannedBlock]) -> tuple[PlannedBlock, ...]:
@@ -269,14 +302,18 @@ def _block(cells: Mapping[str, str], where: str, about: PlanToml) -> PlannedBloc
     if cells["condition"] not in about.conditions:
         raise UserError(
             f"{where}: condition {cells['condition']} is not one of those in {PLAN_FILE}: "
-            f"{', '.join(about.conditions)}"
+            f"{', '.join(sorted(about.conditions, key=lambda name: about.codes.get(name, '')))}"
         )
     tasks = cells["task"].split()
     if not set(tasks) <= set(TASKS):
         raise UserError(f"{where}: task {cells['task']!r} must be prbs, sinusoid or both")
+    if len(cells["day"]) > _LONGEST_DAY:
+        raise UserError(f"{where}: day has {len(cells['day'])} letters; at most {_LONGEST_DAY}")
     order = cell_number(cells["order"], "order", where)
-    if order is None or order != int(order) or order < 1:
-        raise UserError(f"{where}: order {cells['order']} must be a whole number from 1")
+    if order is None or order != int(order) or not 1 <= order <= _MOST_ORDER:
+        raise UserError(
+            f"{where}: order {cells['order']} must be a whole number from 1 to {_MOST_ORDER}"
+        )
     wait = cell_number(cells["wait_min"], "wait_min", where)
     if wait is None or not 0.0 <= wait <= LONGEST_WAIT_MIN:
         raise UserError(
