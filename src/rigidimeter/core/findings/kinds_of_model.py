@@ -58,10 +58,14 @@ MODEL_KINDS = (
         setting="max_between_samples_percent",
         variants={
             "of_settings": {
-                "measured": "At the samples of the torque the drive of the settings makes {symbol} "
-                "{value:.2g} % wrong (at most {limit:g} %).",
-                "meaning": "Without command and motion that is not corrected, so {symbol} may be "
-                "as much too high or too low.",
+                "measured": "A drive of second order with {bandwidth_hz:g} Hz, commanded "
+                "{ticks_hz:.4g} times a second, makes {symbol} {value:.2g} % wrong at the samples "
+                "of the torque (at most {limit:g} %).",
+                "meaning": "The command is not recorded, so that is not corrected: {symbol} may be "
+                "as much too high or too low, with a faster drive further too low.",
+                "remedy": "Record the velocity command beside angle or velocity, state the drive "
+                "(rig.tick_rate_hz, rig.drive_bandwidth_hz, rig.torque.rate_hz), or "
+                + _SAMPLE_FASTER,
             },
             "unknown_drive": {
                 "headline": "J may be {low_j:.3g} to {high_j:.3g} kg·m²: the drive is not known",
@@ -97,6 +101,7 @@ MODEL_KINDS = (
             "low_j": 0.0721,
             "high_j": 0.075,
             "bandwidth_hz": 50.0,
+            "ticks_hz": 1000.0,
         },
     ),
     Kind(

@@ -38,6 +38,9 @@ and J is that little divided by a small share."""
 SCATTERED = 5.0
 """Stamps keep step with the ticks if their mean direction is so many standard errors long."""
 
+SAME_RATE = 0.05
+"""Rates that differ by a smaller share are the same."""
+
 LOW = 0.01
 """In rad a tick: slow enough that what sampling does no longer depends on it."""
 
@@ -173,16 +176,26 @@ def acceleration_seen(drive: DriveModel, interval_s: float, times_s: Array) -> f
     return float((seen * turn / (1j * omega * velocity)).real.item())
 
 
+def assumed_ticks_hz(rig: RigSettings, torque: Channel) -> float:
+    """Return how often commands are taken to be sent where no command was recorded.
+
+    As the settings say if they are of this recording, which has the rate of torque that they say;
+    else not more often than the torque was sampled.
+    """
+    of_recording = abs(torque.rate_hz / rig.torque.rate_hz - 1.0) < SAME_RATE
+    return rig.tick_rate_hz if of_recording else min(rig.tick_rate_hz, torque.rate_hz)
+
+
 def acceleration_beyond_slope(
-    rig: RigSettings, torque_filter: TorqueFilter | None, omega_rad_s: Array
+    rig: RigSettings, ticks_hz: float, torque_filter: TorqueFilter | None, omega_rad_s: Array
 ) -> Complex:
-    """Return A/V − jω for drive and ticks of the settings, shape (m,).
+    """Return A/V − jω for the drive of the settings and commands at a rate, shape (m,).
 
     That is what the torque at the ticks holds of the acceleration beyond the slope of the velocity
     at the ticks, for each unit of the velocity.
     """
     drive = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
-    beyond = beyond_samples(drive, torque_filter, omega_rad_s, 1.0 / rig.tick_rate_hz, 0.0)
+    beyond = beyond_samples(drive, torque_filter, omega_rad_s, 1.0 / ticks_hz, 0.0)
     return np.asarray(beyond.seen[:, 0] / beyond.velocity[:, 0])
 
 

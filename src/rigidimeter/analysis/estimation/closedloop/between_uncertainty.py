@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rigidimeter.analysis.estimation.closedloop.between_samples import assumed_ticks_hz
 from rigidimeter.analysis.estimation.closedloop.normal_equations import solution, sums
 from rigidimeter.analysis.estimation.closedloop.observation import Observation
 from rigidimeter.analysis.estimation.closedloop.refine import LineFit
@@ -23,7 +24,7 @@ from rigidimeter.analysis.estimation.found import found
 from rigidimeter.analysis.estimation.signals import Array
 from rigidimeter.core.findings import Effect, Finding
 from rigidimeter.core.records import Epoch
-from rigidimeter.core.settings import DiagnosticsSettings
+from rigidimeter.core.settings import Settings
 
 NAME = "between_samples"
 
@@ -60,7 +61,7 @@ def between_samples(
     values: Array,
     between: Array,
     standard_errors: Array,
-    settings: DiagnosticsSettings,
+    settings: Settings,
 ) -> tuple[Finding, ...]:
     """Return the finding `between_samples` of a fit; none where it hangs on nothing unknown.
 
@@ -72,9 +73,10 @@ def between_samples(
         The parameters, J first unless it was held, and how far they may be elsewhere.
     standard_errors : array, shape (p,)
         Where δ is below them the interval is hardly wider by it.
-    settings : DiagnosticsSettings
+    settings : Settings
     """
-    most, known = settings.max_between_samples_percent, observation.drive_known
+    diagnostics, rig = settings.diagnostics, settings.rig
+    most, known = diagnostics.max_between_samples_percent, observation.drive_known
     condition = epoch.condition
     in_loop = observation.perturbation is not None or "velocity_command_rad_s" in epoch.channels
     if in_loop and not known:
@@ -90,12 +92,16 @@ def between_samples(
     return (
         found(
             NAME,
-            settings,
+            diagnostics,
             float(percent[about]),
             most,
             condition=condition,
             effect=Effect((J, B, K)),
-            facts={"symbol": "JBK"[about]},
+            facts={
+                "symbol": "JBK"[about],
+                "bandwidth_hz": rig.drive_bandwidth_hz,
+                "ticks_hz": assumed_ticks_hz(rig, epoch.channels["torque_nm"]),
+            },
             variant="" if known else "of_settings",
         ),
     )

@@ -178,7 +178,6 @@ def _fit_of(
         left += per_line * np.sum(np.abs(torque - one.motion @ numbers["value"]) ** 2)
         total += per_line * np.sum(np.abs(torque) ** 2)
     r_squared = 1.0 - float(left / total)
-    diagnostics = members[0].settings.diagnostics
     return Fit(
         source=", ".join(dict.fromkeys(member.epoch.source for member in members)),
         epoch=epoch.label,
@@ -192,7 +191,7 @@ def _fit_of(
         n_samples=sum(counts),
         band_hz=observations[0].grid.band_hz,
         findings=between_samples(
-            epoch, observations[0], fit.values, between, fit.standard_errors, diagnostics
+            epoch, observations[0], fit.values, between, fit.standard_errors, members[0].settings
         ),
         **numbers,
         **amplitude_together(moved, counts)._asdict(),

@@ -13,6 +13,7 @@ from rigidimeter.analysis.estimation.closedloop.between_samples import (
     INEXACT,
     Beyond,
     acceleration_beyond_slope,
+    assumed_ticks_hz,
     beyond_samples,
     phases_s,
     step_kept_s,
@@ -203,7 +204,9 @@ def _otherwise(prepared: PreparedEpoch, seen: Observation) -> list[Complex]:
     found, sent, omega = prepared.source.drive, seen.sent, seen.grid.omega_rad_s
     torque_filter = torque_filter_of(prepared.settings.estimation)
     if found is None or sent is None:
-        beyond = acceleration_beyond_slope(prepared.settings.rig, torque_filter, omega)
+        rig = prepared.settings.rig
+        ticks_hz = assumed_ticks_hz(rig, prepared.epoch.channels["torque_nm"])
+        beyond = acceleration_beyond_slope(rig, ticks_hz, torque_filter, omega)
         change = np.zeros_like(seen.motion)
         change[:, 0] = beyond * seen.motion[:, 1]
         return [np.zeros_like(change), change]

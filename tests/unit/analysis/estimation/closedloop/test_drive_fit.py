@@ -279,5 +279,5 @@ def test_a_drive_of_second_order_hides_the_square_of_its_bandwidth_times_the_tic
     rig = RigSettings(tick_rate_hz=1000.0, drive_bandwidth_hz=50.0)
     hidden = -((2 * math.pi * 50.0 / 1000.0) ** 2) / 12
     slow = np.array([2 * math.pi * 0.1])
-    beyond = acceleration_beyond_slope(rig, None, slow) / (1j * slow)
+    beyond = acceleration_beyond_slope(rig, rig.tick_rate_hz, None, slow) / (1j * slow)
     assert beyond.real.item() == pytest.approx(hidden, abs=2e-4)
