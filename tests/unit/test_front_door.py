@@ -10,6 +10,7 @@ import pytest
 
 import rigidimeter
 from rigidimeter.core.errors import UserError, arguments_named
+from rigidimeter.core.findings import KINDS, Finding, explained
 
 NAMES = {
     *("batch", "compare", "data", "design", "estimate", "fit_terms", "identify"),
@@ -62,9 +63,34 @@ def test_arguments_in_place_of_options() -> None:
         "say --rate-hz": "say rate_hz",
         "a sensor that needs --reaction": "a sensor that needs reaction=True",
         "give --column 'torque_nm=My Fz'; or not": "give column={'torque_nm': 'My Fz'}; or not",
+        "Use --method iv with it": "Use method='iv' with it",
+        "Include it: rigidimeter model --terms inertia,reflex+.": (
+            "Include it: rigidimeter.fit_terms(recording, 'inertia,reflex+')."
+        ),
+        "try `rigidimeter model --compare`.": "try rigidimeter.fit_terms(recording, compare=True).",
+        "per radian: --controller 0.05 1.6.": (
+            "per radian: settings={'controller': {'inertia_kg_m2': 0.05, 'damping_nm_s_rad': 1.6}}."
+        ),
+        "Report both; --keep-active fits everything.": (
+            "Report both; settings={'estimation': {'leave_out_active': False}} fits everything."
+        ),
+        "by itself: --group NAME, or group= in Python.": "by itself: group='NAME'.",
+        "a processor of its own with `--cpu N`": "a processor of its own with `--cpu N`",
         "names no option -- only a dash--like file": "names no option -- only a dash--like file",
     }.items():
         assert arguments_named(message) == expected
+
+
+def test_remedies_of_findings_name_arguments() -> None:
+    for kind in KINDS.values():
+        for _, words in explained(kind):
+            remedy = arguments_named(words.remedy)
+            assert "--" not in remedy.replace("`--cpu N`", "")
+            assert "rigidimeter model" not in remedy
+    found = Finding("band_sensitivity", "caution", 6.0)
+    assert found.remedy == arguments_named(found.words.remedy)
+    slow = Finding("slow", "note", 1.0, facts={"text": "A", "remedy": "Use --method iv."})
+    assert (slow.remedy, slow.words.remedy) == ("Use method='iv'.", "Use --method iv.")
 
 
 def test_another_name_is_an_attribute_error() -> None:

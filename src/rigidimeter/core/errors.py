@@ -8,7 +8,26 @@ from pathlib import Path
 _PAIR = re.compile(
     r"--(column|unit|scale|offset) (?:([a-z_]+)='?([^\s',;:)]+)'?|'([a-z_]+)=([^']+)')"
 )
-_OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*)")
+_OPTION = re.compile(r"(?<![\w-])--(?!cpu\b)([a-z][a-z-]*)(?: (NAME|iv|sinusoid)\b)?")
+"""One that is not of a rig; with some values it becomes an argument and its value."""
+
+_IN_PYTHON = (
+    (r"`?rigidimeter model --compare`?", "rigidimeter.fit_terms(recording, compare=True)"),
+    (r"`?rigidimeter model --terms ([\w,+-]*[\w+-])`?", r"rigidimeter.fit_terms(recording, '\1')"),
+    (
+        r"--controller (\S+) (\S*\w)",
+        r"settings={'controller': {'inertia_kg_m2': \1, 'damping_nm_s_rad': \2}}",
+    ),
+    ("--keep-active", "settings={'estimation': {'leave_out_active': False}}"),
+    (
+        "--band-hz",
+        "settings={'estimation': {'band_low_hz': …, 'band_high_closed_loop_hz': …}}",
+    ),
+    ("--reaction", "reaction=True"),
+    ("--missing none", "missing='none'"),
+    (", or group= in Python", ""),
+)
+"""Words of the command line, as patterns, and what does the same in Python."""
 
 
 class UserError(Exception):
@@ -47,6 +66,12 @@ def arguments_named(message: str) -> str:
     >>> arguments_named("joint.csv has no column time_s; say --rate-hz or --column time_s=t")
     "joint.csv has no column time_s; say rate_hz or column={'time_s': 't'}"
     """
-    text = _PAIR.sub(r"\1={'\2\4': '\3\5'}", message).replace("--reaction", "reaction=True")
-    text = text.replace("--missing none", "missing='none'")
-    return _OPTION.sub(lambda found: found[1].replace("-", "_"), text)
+    text = _PAIR.sub(r"\1={'\2\4': '\3\5'}", message)
+    for words, there in _IN_PYTHON:
+        text = re.sub(words, there, text)
+    return _OPTION.sub(_argument, text)
+
+
+def _argument(option: re.Match[str]) -> str:
+    name = option[1].replace("-", "_")
+    return f"{name}='{option[2]}'" if option[2] else name

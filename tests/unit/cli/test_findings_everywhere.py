@@ -78,7 +78,7 @@ def test_every_output_says_the_same_words(shown):
     in_table = {(r["epoch"], r["headline"], r["details"], r["remedy"]) for r in table}
     in_cells = {one for row in rows for one in row["findings"].split(" / ")}
     for epoch, one in of_python:
-        assert (epoch, one.headline, one.details, one.remedy) in in_table
+        assert (epoch, one.headline, one.details, one.words.remedy) in in_table
         assert f"{one.level}, {one.name}: {one.headline}" in in_cells
     on_terminal, on_page = " ".join(terminal.split()), " ".join(unescape(page).split())
     for group in estimates.findings:
@@ -88,7 +88,7 @@ def test_every_output_says_the_same_words(shown):
         unfolding = (
             f'<span class="outcome is-{one.level}">{one.level}</span> '
             f"<strong>{one.name}</strong> {one.headline}; {group.where}</summary> "
-            f"<p>{one.details}</p> {f'<p>{one.remedy}</p>' * bool(one.remedy)}"
+            f"<p>{one.details}</p> {f'<p>{one.words.remedy}</p>' * bool(one.remedy)}"
         )
         assert unfolding in on_page
         assert one.harmless or escape(one.headline) in estimates._repr_html_()
@@ -144,7 +144,7 @@ def test_every_output_of_a_study_says_the_same(pushed, rigidimeter, no_figures, 
     assert len(cautions) > 1
     for one, _, where in result.findings:
         assert page.count(f"<strong>{one.name}</strong> {one.headline}; {where}</summary>") == 1
-        todo = f" <p>{one.remedy}</p>" * bool(one.remedy)
+        todo = f" <p>{one.words.remedy}</p>" * bool(one.remedy)
         assert page.count(f"<p>{one.details}</p>{todo}") == 1
         assert one.headline not in ran.err
     assert cautions[0].headline in terminal

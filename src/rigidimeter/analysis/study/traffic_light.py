@@ -101,5 +101,5 @@ def traffic_light(result: StudyResult) -> TrafficLight | None:
         doubt,
         doubt_epochs,
         text,
-        found.remedy if found else "",
+        found.words.remedy if found else "",
     )

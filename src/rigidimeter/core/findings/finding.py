@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from rigidimeter.core.errors import arguments_named
 from rigidimeter.core.findings.kind import Level
 from rigidimeter.core.findings.kinds import KINDS
 from rigidimeter.core.findings.words import Words, words_of
@@ -128,8 +129,11 @@ class Finding:
 
     @property
     def remedy(self) -> str:
-        """What to do about it: one sentence, empty where nothing is to be done."""
-        return self.words.remedy
+        """What to do about it in Python: one sentence, empty where nothing is to be done.
+
+        `words` has that of the command line, as reports and files have it.
+        """
+        return arguments_named(self.words.remedy)
 
     @property
     def harmless(self) -> bool:

@@ -120,7 +120,8 @@ def checked(
     serious = [finding for finding in findings if finding.level == "exclude"]
     outcome = fit.outcome
     if serious and outcome.included:
-        outcome = Outcome("excluded", f"{serious[0].headline}. {serious[0].remedy}".rstrip(". "))
+        said = serious[0].words
+        outcome = Outcome("excluded", f"{said.headline}. {said.remedy}".rstrip(". "))
     return in_half_intervals(replace(fit, outcome=outcome, findings=(*fit.findings, *findings)))
 
 

@@ -148,7 +148,8 @@ def _findings(result: StudyResult) -> Iterator[Block]:
 
 def _unfolding(group: FindingGroup) -> Markup:
     one, _, where = group
-    todo = Markup("<p>{}</p>\n").format(one.remedy) if one.remedy else ""
+    remedy = one.words.remedy
+    todo = Markup("<p>{}</p>\n").format(remedy) if remedy else ""
     shown = {"level": one.level, "name": one.name, "headline": one.headline, "where": where}
     return UNFOLDING.format(**shown, details=one.details, todo=todo)
 
