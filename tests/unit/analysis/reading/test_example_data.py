@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 from tests import example_data as generator
+from tests.replayed import assert_folder_replayed
 
 import rigidimeter as rm
 from rigidimeter.analysis.reading import example_data
@@ -81,6 +82,7 @@ def test_recordings_are_what_the_generator_makes(tmp_path: Path) -> None:
     plan = plan_study(generator.study_design(), generator.SEED)[0]
     session = tmp_path / Path(plan.folder).name
     run_virtual_session(plan.settings, session)
+    assert_folder_replayed(session)
     made = {
         "reflex.parquet": generator.recording("reflex"),
         f"study/{session.name}.parquet": generator.day(session),
