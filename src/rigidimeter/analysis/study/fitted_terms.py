@@ -95,6 +95,8 @@ class FittedTerms:
 def asked(terms: str | Sequence[str] | None, compare: bool) -> tuple[list[tuple[str, ...]], bool]:
     """Return the models that are asked for, and whether terms are added to the best of them."""
     texts = [terms] if isinstance(terms, str) else terms or [COMPARED if compare else USUAL]
+    if not isinstance(texts, Sequence) or not all(isinstance(text, str) for text in texts):
+        raise UserError(f"terms are a text such as '{USUAL}', or a list of them, not {terms!r}")
     named = [parse_terms(text) for text in texts]
     grow = compare and len(named) == 1
     return [*candidates(named[0])] if grow else named, grow
@@ -145,6 +147,8 @@ def fit_terms(
     >>> round(float(table.query("parameter == 'stiffness'")["value"].iloc[0]), 1)
     1.8
     """
+    if not isinstance(recording, Recording):
+        raise UserError("fit_terms takes a Recording; read a path with rigidimeter.read")
     models, grow = asked(terms, compare)
     found = FittedTerms(
         model_recording(

@@ -50,3 +50,14 @@ def test_a_model_that_cannot_be_fitted_beside_one_that_can_is_a_problem(recordin
     found = rm.fit_terms(recording, [JOINT, f"{JOINT},offset"])
     assert len(found.table()) == 3
     assert "leave offset out" in repr(found)
+
+
+@pytest.mark.parametrize("terms", [7, [1, 2], {"inertia"}])
+def test_terms_that_are_no_text_are_refused_in_a_sentence(recording, terms) -> None:
+    with pytest.raises(UserError, match="terms are a text such as 'inertia,damping,stiffness'"):
+        rm.fit_terms(recording, terms)
+
+
+def test_a_path_in_place_of_a_recording_is_refused_in_a_sentence() -> None:
+    with pytest.raises(UserError, match=r"takes a Recording; read a path with rigidimeter\.read"):
+        rm.fit_terms("joint.npz", JOINT)
