@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from pathlib import Path
+
+_PLANNED = re.compile(r"-day-[^-]+-\d+$")
+"""The folder of the first part of a session of a plan."""
 
 
 def resume_command(folder: Path, rig: Path | str | None, out: Path | str) -> str:
@@ -64,9 +68,12 @@ def next_steps(
 
 
 def new_folder(folder: Path) -> Path:
-    """Return a folder beside this one that does not exist: ``session-2`` after ``session``."""
+    """Return a folder beside this one that does not exist: ``session-2`` after ``session``.
+
+    The number at the end of a planned session's folder is its place in the day, not its part.
+    """
     stem, _, number = folder.name.rpartition("-")
-    if not (stem and number.isdigit()):
+    if not (stem and number.isdigit()) or _PLANNED.search(folder.name):
         stem, number = folder.name, "1"
     count = int(number) + 1
     while (made := folder.with_name(f"{stem}-{count}")).exists():

@@ -46,3 +46,13 @@ def test_a_new_folder_is_one_that_is_not_there(tmp_path, name, new):
     assert new_folder(tmp_path / name) == tmp_path / new
     (tmp_path / new).mkdir()
     assert not new_folder(tmp_path / name).exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "new"), [("S01-day-1-1", "S01-day-1-1-2"), ("S01-day-1-1-2", "S01-day-1-1-3")]
+)
+def test_what_is_left_of_a_planned_session_does_not_take_the_folder_of_the_next(
+    tmp_path: Path, name: str, new: str
+) -> None:
+    (tmp_path / name).mkdir()
+    assert new_folder(tmp_path / name) == tmp_path / new
