@@ -22,6 +22,7 @@ from rigidimeter.core.study_files import (
     read_changes,
     read_plan,
     read_study_toml,
+    wait_words,
     write_plan,
 )
 from rigidimeter.planning import StudyDays, draw_days
@@ -231,3 +232,13 @@ def test_a_wrong_row_does_not_tell_which_code_is_the_reference(tmp_path: Path) -
     table.write_text(table.read_text().replace("S01,1,1,OFF", "S01,1,1,X"))
     with pytest.raises(UserError, match=r"plan\.toml: code-A, code-B"):
         read_plan(plan.folder)
+
+
+def test_no_wait_runs_from_a_change_that_has_not_come(plan: StudyPlan) -> None:
+    """The table was edited by hand, or a clock was wrong: minutes since would be negative."""
+    add_change(plan.folder, parse_change("off", "S01", NOW + timedelta(days=365)))
+    due = due_block(plan, (), "S01")
+    assert due is not None
+    assert due.left_min(NOW, 100.0) is None
+    assert due.since_min(NOW, 100.0) is None
+    assert "2027-01-05 11:00 UTC, which has not come; correct it" in wait_words(due, NOW)

@@ -25,6 +25,7 @@ from rigidimeter.core.study_files.plan_progress import (
     named_block,
     recorded_blocks,
 )
+from rigidimeter.core.study_files.stimulation_log import STIMULATION_TABLE
 
 _SESSIONS = 1
 """The stream of the plan's seed from which sessions draw theirs."""
@@ -255,6 +256,12 @@ def next_words(
 def wait_words(due: DueBlock, now: datetime, speed: float = 1.0) -> str:
     """Return how long to wait, without the state of the stimulation and since when it is on."""
     left = due.left_min(now, speed)
+    if due.wait_from is not None and due.wait_from.is_ahead_of(now):
+        return (
+            f"The wait of {due.block.wait_min:g} min has not begun: the last change in "
+            f"{STIMULATION_TABLE} is of {due.wait_from.changed_utc:%Y-%m-%d %H:%M} UTC, which has "
+            "not come; correct it"
+        )
     if left is None and due.change is not None and due.change.stimulation != due.stimulation:
         return "The wait has not begun: the stimulation is not yet as this session needs it"
     if left is None:

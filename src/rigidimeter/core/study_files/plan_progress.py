@@ -97,13 +97,15 @@ class DueBlock:
     def since_min(self, now: datetime, speed: float = 1.0) -> float | None:
         """Return the minutes since the change, on a clock that is `speed` times as fast."""
         known = self.change is not None and self.change.stimulation == self.stimulation
-        return speed * self.change.minutes_until(now) if known and self.change else None
+        if not known or self.change is None or self.change.is_ahead_of(now):
+            return None
+        return speed * self.change.minutes_until(now)
 
     def left_min(self, now: datetime, speed: float = 1.0) -> float | None:
         """Return the minutes of the wait that are left; None where it has not begun."""
         if self.block.wait_min == 0.0 and self.change is None:
             return 0.0
-        if self.wait_from is None:
+        if self.wait_from is None or self.wait_from.is_ahead_of(now):
             return None
         return max(self.block.wait_min - speed * self.wait_from.minutes_until(now), 0.0)
 

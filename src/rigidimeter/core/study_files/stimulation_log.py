@@ -35,6 +35,10 @@ class StimulationChange:
         """Return the minutes from the change to a time."""
         return (when - self.changed_utc).total_seconds() / 60.0
 
+    def is_ahead_of(self, now: datetime) -> bool:
+        """Whether it was written down for a time more than 1 min ahead."""
+        return self.minutes_until(now) < -1.0
+
 
 def parse_change(
     text: str, subject: str, now: datetime, by: str = "", zone: tzinfo | None = None
