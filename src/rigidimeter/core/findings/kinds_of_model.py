@@ -62,10 +62,9 @@ MODEL_KINDS = (
                 "{ticks_hz:.4g} times a second, makes {symbol} {value:.2g} % wrong at the samples "
                 "of the torque (at most {limit:g} %).",
                 "meaning": "The command is not recorded, so that is not corrected: {symbol} may be "
-                "as much too high or too low, with a faster drive further too low.",
+                "as much too high or too low; a faster drive would make J lower still.",
                 "remedy": "Record the velocity command beside angle or velocity, state the drive "
-                "(rig.tick_rate_hz, rig.drive_bandwidth_hz, rig.torque.rate_hz), or "
-                + _SAMPLE_FASTER,
+                "(rig.tick_rate_hz, rig.drive_bandwidth_hz), or " + _SAMPLE_FASTER,
             },
             "unknown_drive": {
                 "headline": "J may be {low_j:.3g} to {high_j:.3g} kg·m²: the drive is not known",

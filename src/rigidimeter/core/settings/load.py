@@ -101,9 +101,10 @@ def changed_settings(
     UserError
         As `parse_settings`; the sentence begins with `source`.
     """
-    # What was not stated and is not changed stays a default, and is not stated by this either.
+    # What was not stated and is not changed stays a default, and is not stated by this either;
+    # the subjects, which are no section, are one default together.
     stated = settings.model_dump(mode="json", exclude_unset=True)
-    touched = {key: value for key, value in dump_settings(settings).items() if key in changes}
+    touched = settings.model_dump(mode="json", include={"subject"}.intersection(changes))
     return parse_settings(_merged({**stated, **touched}, changes), source=source)
 
 

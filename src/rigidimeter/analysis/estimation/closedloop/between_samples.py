@@ -38,9 +38,6 @@ and J is that little divided by a small share."""
 SCATTERED = 5.0
 """Stamps keep step with the ticks if their mean direction is so many standard errors long."""
 
-SAME_RATE = 0.05
-"""Rates that differ by a smaller share are the same."""
-
 LOW = 0.01
 """In rad a tick: slow enough that what sampling does no longer depends on it."""
 
@@ -179,11 +176,10 @@ def acceleration_seen(drive: DriveModel, interval_s: float, times_s: Array) -> f
 def assumed_ticks_hz(rig: RigSettings, torque: Channel) -> float:
     """Return how often commands are taken to be sent where no command was recorded.
 
-    As the settings say if they are of this recording, which has the rate of torque that they say;
-    else not more often than the torque was sampled.
+    As the settings state; where they do not, not more often than the torque was sampled.
     """
-    of_recording = abs(torque.rate_hz / rig.torque.rate_hz - 1.0) < SAME_RATE
-    return rig.tick_rate_hz if of_recording else min(rig.tick_rate_hz, torque.rate_hz)
+    stated = "tick_rate_hz" in rig.model_fields_set
+    return rig.tick_rate_hz if stated else min(rig.tick_rate_hz, torque.rate_hz)
 
 
 def acceleration_beyond_slope(

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 import rigidimeter as rm
+from rigidimeter.core.settings import dump_settings, recorded_settings, settings_from
 
 TRUE_J = 0.0045
 
@@ -35,15 +36,21 @@ def test_the_interval_of_j_holds_what_a_drive_takes_off_it(rate_hz, bandwidth_hz
     assert pool.low[2] < 1.751 < pool.high[2]
     (details,) = said(pool)
     assert f"with 50 Hz, commanded {rate_hz:g} times a second" in details
-    assert "with a faster drive further too low" in details
+    assert "a faster drive would make J lower still" in details
 
 
-def test_settings_of_the_recording_say_how_often_commands_are_sent():
-    """A loop of 2000 ticks/s moves the joint evenly between samples of the torque at 250/s."""
+def test_settings_that_state_it_say_how_often_commands_are_sent():
+    """A loop of 1000 ticks/s moves the joint evenly between samples of the torque at 250/s."""
     epochs = two_channels(250.0, 35.0)
-    fast = {"rig": {"tick_rate_hz": 2000.0, "torque": {"rate_hz": 250.0}}}
-    assert said(rm.estimate(epochs).pooled[0])
-    assert not said(rm.estimate(epochs, settings=fast).pooled[0])
+    unstated = settings_from(rig={"drive_bandwidth_hz": 60.0, "torque": {"rate_hz": 250.0}})
+    stated = settings_from(rig={"tick_rate_hz": 1000.0})
+    recorded = recorded_settings(dump_settings(settings_from()), source="manifest.json")
+    (details,) = said(rm.estimate(epochs, settings=unstated).pooled[0])
+    assert "with 60 Hz, commanded 250 times a second" in details
+    for settings in (stated, settings_from(stated, rig={"drive_bandwidth_hz": 35.0}), recorded):
+        assert not said(rm.estimate(epochs, settings=settings).pooled[0])
+    changed = settings_from(unstated, rig={"drive_damping_ratio": 0.8})
+    assert said(rm.estimate(epochs, settings=changed).pooled[0])  # still not stated
 
 
 def test_at_1000_samples_a_second_nothing_is_said():
