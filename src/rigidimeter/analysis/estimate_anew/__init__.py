@@ -1,0 +1,1 @@
+"""From epochs to J, B and K: offline and pure."""

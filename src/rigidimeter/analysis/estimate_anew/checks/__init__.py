@@ -1,0 +1,146 @@
+"""What an epoch and its fit show: functions from them to findings, and the level of a finding.
+
+A check returns a list, empty where nothing was found or there is nothing to look at. Torque of the
+subject's own comes back by the loop and pulls J, B and K of least squares; whether that matters
+is told by `Pull`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigidimeter.core.findings import KINDS, UNKNOWN_EFFECT, Effect, Fact, Finding, default_level
+from rigidimeter.core.records import Fit
+from rigidimeter.core.settings import DiagnosticsSettings
+
+Array = NDArray[np.float64]
+
+UNKNOWN_WIDTH = 0.1
+"""The share of a parameter that stands for half its interval where a method gives none."""
+
+HELD = 0.05
+"""Of a parameter: a bias that the interval holds is known to the first order, so that the square of
+this share of it is not."""
+
+
+def half_widths(fit: Fit) -> Array:
+    """Return half the 95 % intervals of J, B and K; without intervals `UNKNOWN_WIDTH` of them."""
+    half = 0.5 * (fit.high - fit.low)
+    return np.where(np.isfinite(half), half, np.abs(fit.value) * UNKNOWN_WIDTH)
+
+
+def too_biased(fit: Fit, bias: Array, most_percent: float, in_interval: bool) -> bool:
+    """Return whether the bias of J, B or K is more than so many % of half its interval, or NaN.
+
+    One that the interval holds must also be more than `HELD` of the parameter.
+    """
+    small = np.abs(bias) <= most_percent / 100.0 * half_widths(fit)
+    if in_interval:
+        small |= np.abs(bias) <= HELD * np.abs(fit.value)
+    return not np.all(small)
+
+
+class Pull(NamedTuple):
+    """What torque that is not the robot's does to an estimate.
+
+    Attributes
+    ----------
+    bias : array, shape (3,), or None
+        By how much J, B and K are off because it comes back by the loop, NaN where it is too much
+        to be told; None where no loop is known.
+    in_interval : bool
+        Whether the intervals hold that bias.
+    instruments : bool
+        Whether instruments were used: then there is none.
+    """
+
+    bias: Array | None = None
+    in_interval: bool = False
+    instruments: bool = False
+
+    def harmless(self, fit: Fit, settings: DiagnosticsSettings) -> tuple[str, dict[str, Fact]]:
+        """Return the variant that says why it does not move the estimate, and what that shows.
+
+        The variant is empty where it does.
+        """
+        if self.instruments:
+            return "instrument", {"method": fit.method}
+        most, half = settings.max_loop_bias_percent, half_widths(fit)
+        if self.bias is None or too_biased(fit, self.bias, most, self.in_interval):
+            return "", {}
+        if not self.in_interval:
+            return "small_bias", {"share": float(np.max(100.0 * np.abs(self.bias) / half))}
+        # Torque that shows no joint is not the joint's.
+        return ("in_interval" if np.all(np.abs(fit.value) > half) else ""), {}
+
+    def effect(self, fit: Fit) -> Effect:
+        """Return what it does to the estimate, as far as that is known."""
+        if self.instruments:
+            return Effect((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        bias = self.bias
+        return UNKNOWN_EFFECT if bias is None else Effect.of(bias, fit.value, half_widths(fit))
+
+
+def found(
+    name: str,
+    settings: DiagnosticsSettings,
+    value: float,
+    limit: float = math.nan,
+    *,
+    p: float = math.nan,
+    epochs: tuple[str, ...] = (),
+    condition: str = "",
+    effect: Effect = UNKNOWN_EFFECT,
+    facts: Mapping[str, Fact] | None = None,
+    variant: str = "",
+    harmless: str = "",
+    excludes: bool = False,
+) -> Finding:
+    """Return a finding with the level of the settings.
+
+    It is a note where it is known not to matter, unless the settings set another level than the
+    default.
+
+    Parameters
+    ----------
+    name : str
+    settings : DiagnosticsSettings
+    value, limit, p, epochs, condition, effect, facts
+        As for `Finding`.
+    variant : str
+        Of the wording.
+    harmless : str
+        The variant that says why it does not move J, B or K by more than their intervals; empty
+        where it does.
+    excludes : bool
+        The numbers mean nothing: by default the epoch is excluded.
+    """
+    level = settings.levels.of(name)
+    if level == default_level(name):
+        if not harmless and effect.negligible:
+            harmless = "negligible"
+        level = "exclude" if excludes else "note" if harmless else level
+    named = " ".join(filter(None, (variant, harmless)))
+    shown = {**(facts or {}), **({"variant": named} if named else {})}
+    unit = KINDS[name].unit if name in KINDS else ""
+    return Finding(name, level, value, limit, unit, p, epochs, condition, effect, shown)
+
+
+def in_half_intervals(fit: Fit) -> Fit:
+    """Return the fit with the effects of its findings in half intervals as well."""
+
+    def completed(one: Finding) -> Finding:
+        percent, of_half = one.effect
+        if not any(map(math.isfinite, percent)) or any(map(math.isfinite, of_half)):
+            return one
+        share = np.array(percent) / 100.0
+        bias = np.abs(fit.value) * share / (1.0 + share)  # of what they would be without it
+        return replace(one, effect=Effect.of(bias, fit.value, half_widths(fit)))
+
+    return replace(fit, findings=tuple(map(completed, fit.findings)))
