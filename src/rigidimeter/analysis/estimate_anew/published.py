@@ -27,18 +27,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
 
 from rigidimeter.analysis.estimate_anew.checks import found
-from rigidimeter.analysis.estimate_anew.drive import (
-    Drive,
-    acceleration_seen,
-    phases_s,
-    since_ticks,
-)
+from rigidimeter.analysis.estimate_anew.drive import Drive, since_ticks
+from rigidimeter.analysis.estimate_anew.methods import Ready
 from rigidimeter.analysis.estimate_anew.signals import (
     Array,
     Signals,
@@ -51,14 +47,18 @@ from rigidimeter.analysis.estimate_anew.signals import (
     uniform_grid,
     velocity_at,
 )
-from rigidimeter.analysis.estimate_anew.solve import smoother
+from rigidimeter.analysis.estimate_anew.solve import of_fit, smoother
 from rigidimeter.analysis.estimate_anew.stretches import sound
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Epoch, Fit, Outcome
 from rigidimeter.core.settings import EstimationSettings, Settings
+from rigidimeter.model import ON_EDGE, DriveModel
 
 LARGEST_CONDITION_NUMBER = 1e6
 """Beyond this named columns agree to six digits, more than any sensor knows."""
+
+LOW = 0.01
+"""In rad a tick: slow enough that what sampling does no longer depends on it."""
 
 
 class Solved(NamedTuple):
@@ -126,39 +126,6 @@ def least_squares(columns: Array, target: Array, names: Sequence[str] = ()) -> S
     return Solved(values, lengths, singular, right, len(columns))
 
 
-def of_fit(
-    values: Array,
-    covariance: Array,
-    degrees: Array | float,
-    bound: Array,
-    inertia_kg_m2: float | None = None,
-    away: Array | float = 0.0,
-) -> dict[str, Any]:
-    """Return what a `Fit` holds of its parameters, by name.
-
-    Parameters
-    ----------
-    values : array, shape (p,)
-    covariance : array, shape (p, p)
-    degrees : float or array, shape (p,)
-        Of freedom, for Student's t.
-    bound : array, shape (p,)
-        Least standard errors (Cramér–Rao).
-    inertia_kg_m2 : float, optional
-        J that was held, which has no error, where the parameters are B and K.
-    away : float or array, shape (p,)
-        What both ends of an interval are further out, beside noise.
-    """
-    se = np.sqrt(np.diag(covariance))
-    half = scipy.special.stdtrit(degrees, 0.975) * se + away
-    found = {"value": values, "se": se, "low": values - half, "high": values + half, "bound": bound}
-    if inertia_kg_m2 is not None:
-        held = {"value": inertia_kg_m2, "low": inertia_kg_m2, "high": inertia_kg_m2}
-        found = {name: np.append(held.get(name, 0.0), rest) for name, rest in found.items()}
-        covariance = np.pad(covariance, ((1, 0), (1, 0)))
-    return {**found, "covariance": covariance}
-
-
 def fit_inertia_damping_stiffness(signals: Signals, inertia_kg_m2: float | None = None) -> Fit:
     """Fit Eq. 6, or Eq. 7 when the inertia is given.
 
@@ -205,7 +172,6 @@ def fit_inertia_damping_stiffness(signals: Signals, inertia_kg_m2: float | None 
         residual_sd_nm=float(np.std(residual)),
         n_samples=torque.size,
         band_hz=signals.band_hz,
-        angle_rms_rad=float(np.std(signals.angle_rad)),
     )
 
 
@@ -261,81 +227,72 @@ def published_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
     return Signals(time_s[:n][keep], torque_nm, *motion, rate_hz, (0.0, rate_hz / 2))
 
 
-def fit_published(
-    epoch: Epoch, settings: Settings, inertia_kg_m2: float | None = None, drive: Drive | None = None
-) -> tuple[Fit, Signals]:
-    """Return the fit of an epoch by the published method, and what was fitted.
-
-    Parameters
-    ----------
-    epoch : Epoch
-    settings : Settings
-    inertia_kg_m2 : float, optional
-        J that is held.
-    drive : Drive, optional
-        That the recording shows: it tells whether J comes out wrong from samples as they are.
+def fit_published(epochs: Sequence[Ready], inertia_kg_m2: float | None = None) -> Fit:
+    """Return the fit of epochs, put one after the other, by the published method.
 
     Raises
     ------
     ValueError
         If the motion cannot distinguish the parameters.
     """
-    signals = published_signals(epoch, settings.estimation)
-    as_they_are = _as_they_are(epoch, settings, drive) if inertia_kg_m2 is None else ()
-    fit = replace(
-        fit_inertia_damping_stiffness(signals, inertia_kg_m2),
-        source=epoch.source,
-        epoch=epoch.label,
-        condition=epoch.condition,
-        method="published",
-        findings=as_they_are,
-        angle_range_rad=angle_range_rad(epoch, signals.time_s),
-    )
-    return fit, signals
-
-
-def fit_published_together(
-    condition: str, members: Sequence[tuple[Fit, Signals]], inertia_kg_m2: float | None = None
-) -> Fit:
-    """Return the fit to epochs put one after the other, named by the caller's condition.
-
-    Parameters
-    ----------
-    condition : str
-    members : sequence of (Fit, Signals)
-        As `fit_published` gives them; those that count.
-    inertia_kg_m2 : float, optional
-        J that is held.
-    """
-    fits, parts = zip(*members, strict=True)
-    power = sum(fit.n_samples * fit.angle_rms_rad**2 for fit in fits)
-    ranges_rad = [fit.angle_range_rad for fit in fits if math.isfinite(fit.angle_range_rad)]
+    parts = [published_signals(one.epoch, one.settings.estimation) for one in epochs]
+    power = sum(one.time_s.size * float(np.var(one.angle_rad)) for one in parts)
+    ranges_rad = [
+        angle_range_rad(ready.epoch, one.time_s) for ready, one in zip(epochs, parts, strict=True)
+    ]
     return replace(
         fit_inertia_damping_stiffness(joined(parts), inertia_kg_m2),
-        source=", ".join(dict.fromkeys(fit.source for fit in fits)),
-        epoch="pooled",
-        condition=condition,
-        method="published",
-        findings=fits[0].findings,
-        angle_rms_rad=math.sqrt(power / sum(fit.n_samples for fit in fits)),
-        angle_range_rad=max(ranges_rad, default=math.nan),
+        findings=_as_they_are(epochs[0]) if inertia_kg_m2 is None else (),
+        angle_rms_rad=math.sqrt(power / sum(one.time_s.size for one in parts)),
+        angle_range_rad=max((r for r in ranges_rad if math.isfinite(r)), default=math.nan),
     )
 
 
-def _as_they_are(epoch: Epoch, settings: Settings, drive: Drive | None) -> tuple[Finding, ...]:
+def _as_they_are(ready: Ready) -> tuple[Finding, ...]:
     """Return the finding if the drive shows that J comes out wrong from the samples as they are."""
+    epoch, settings = ready.epoch, ready.settings.diagnostics
     command = epoch.channels.get("velocity_command_rad_s")
-    if drive is None or command is None:
+    if ready.drive is None or command is None:
         return ()
     interval_s = 1.0 / command.mean_rate_hz
     _, after_s = since_ticks(command, epoch.channels["torque_nm"].time_s, 0.0)
-    seen = acceleration_seen(drive.model, interval_s, phases_s(after_s, interval_s))
-    percent = 100.0 * abs(1.0 - seen)
-    most = settings.diagnostics.max_between_samples_percent
-    facts = {"seen": 100.0 * seen, "side": "small" if seen < 1 else "large"}
-    name, about = "between_samples", {"condition": epoch.condition, "facts": facts}
-    finding = found(name, settings.diagnostics, percent, most, **about, variant="as_sampled")
-    return (finding,) if percent > most else ()
+    seen = acceleration_seen(ready.drive.model, interval_s, after_s)
+    percent, most = 100.0 * abs(1.0 - seen), settings.max_between_samples_percent
+    if not percent > most:
+        return ()
+    return (
+        found(
+            "between_samples",
+            settings,
+            percent,
+            most,
+            condition=epoch.condition,
+            facts={"seen": 100.0 * seen, "side": "small" if seen < 1 else "large"},
+            variant="as_sampled",
+        ),
+    )
+
+
+def acceleration_seen(drive: DriveModel, interval_s: float, after_s: Array) -> float:
+    """Return the acceleration at the torque's samples as a share of its mean, at low frequency.
+
+    Parameters
+    ----------
+    drive : DriveModel
+    interval_s : float
+        Of the ticks.
+    after_s : array
+        How long after a tick each sample came. Those that do not keep step with the ticks see the
+        acceleration at many times, and ten stand for all.
+    """
+    times_s = np.mean(after_s, keepdims=True)
+    if np.ptp(after_s) >= 2 * ON_EDGE * interval_s:
+        times_s = np.quantile(after_s, np.linspace(0.05, 0.95, 10))
+    omega = np.array([LOW / interval_s])
+    z = np.exp(1j * omega * interval_s)
+    seen = np.mean([drive.transfer(z, interval_s, one)[0] for one in times_s.tolist()], axis=0)
+    turn = np.exp(-1j * omega * np.mean(times_s))
+    return float((seen * turn / (1j * omega * drive.transfer(z, interval_s)[1])).real.item())
 
 
 def epoch_signals(
