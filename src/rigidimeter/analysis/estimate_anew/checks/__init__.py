@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,6 +130,20 @@ def found(
     shown = {**(facts or {}), **({"variant": named} if named else {})}
     unit = KINDS[name].unit if name in KINDS else ""
     return Finding(name, level, value, limit, unit, p, epochs, condition, effect, shown)
+
+
+def at_most(
+    name: str, settings: DiagnosticsSettings, value: float, most: float, **more: Any
+) -> list[Finding]:
+    """Return what is `found` where a value is above a limit, or no number."""
+    return [] if value <= most else [found(name, settings, value, most, **more)]
+
+
+def at_least(
+    name: str, settings: DiagnosticsSettings, value: float, least: float, **more: Any
+) -> list[Finding]:
+    """Return what is `found` where a value is below a limit, or no number."""
+    return [] if value >= least else [found(name, settings, value, least, **more)]
 
 
 def in_half_intervals(fit: Fit) -> Fit:
