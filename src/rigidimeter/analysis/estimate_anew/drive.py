@@ -27,13 +27,13 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimate_anew.stretches import Array, sound
+from rigidimeter.analysis.estimate_anew.stretches import Array, Rows, sound
 from rigidimeter.core.records import Channel, Epoch
 from rigidimeter.core.settings import RigSettings, Settings
 from rigidimeter.model import (
@@ -49,89 +49,56 @@ from rigidimeter.model import (
 )
 
 Complex = NDArray[np.complex128]
+Values = TypeVar("Values", Array, Complex)
 
-MOST_TRIED = 5
-"""So many epochs of a recording may fail to show the drive before it is taken for unknown."""
-
+MOST_TRIED = 5  # epochs of a recording, before its drive is taken for unknown
 FEWEST_SAMPLES, MOST_SAMPLES, MOST_TICKS = 50, 3000, 8000
 """Of the velocity, and of command and angle; more do not make a drive known any better that is not
 quite linear."""
+SETTLED_S = 0.3  # after the start, and after commands are lost, the state is not known
 
-SETTLED_S = 0.3
-"""The state of the drive is not known for so long after the start and after commands are lost."""
+MOST_POLES = 4  # a velocity PI has two; a lag and a position loop add one each
+SLOWEST, FASTEST, QUICKEST, SEEN = 5e-4, 6.0, 3.0, 4.6
+"""In rad a tick: poles are between the first two; an oscillation beyond π looks like a slower one;
+the samples show poles up to the last, of which 1 % is left at the next tick."""
+DOUBLE = 1e-4  # poles this close, as a share of their size, are taken for so far apart
+BESIDE = 0.3  # where the search for a further pole begins, in times the first
+LONGEST_S, LONGEST_TICKS, SHORTEST_TICKS = 0.1, 4.0, 0.25  # of delays
+PASSED_HZ = 10.0  # an angle is used as the velocity through a low-pass with this corner
+EDGES_TICKS = (0, *sorted(step << octave for octave in range(13) for step in (2, 3)))
+"""Of stretches of past commands, ever longer the longer ago."""
 
-MOST_POLES = 4
-"""A velocity PI has two; a lag and a position loop add one each."""
-
-FASTEST, SLOWEST, QUICKEST, FORGOTTEN = 6.0, 5e-4, 3.0, 0.01
-"""In rad a tick, poles are between the first two; an oscillation beyond π looks like a slower one;
-a pole of which no more than the last is left at the next tick is not seen."""
-
-DOUBLE = 1e-4
-"""Two poles that are this close, as a share of their size, are taken for so far apart."""
-
-LONGEST_S, LONGEST_TICKS, SHORTEST_TICKS = 0.1, 4.0, 0.25
-"""The longest delay is the larger of the first two; a search begins at the last or later."""
-
-SPEEDS = tuple(2.0**-n for n in range(6))
-"""Of the drive of the settings, at which a search begins where no instruments serve."""
-
-LAGS = 24
-"""Past commands that are instruments."""
-
+WORTH = 0.02  # a further pole is tried where past commands explain this share of what is left
 AS_GOOD, UNSEEN = 1.05, 2e-5
 """A drive that leaves no more than so many times the power of the best, and this share of the SD of
 the velocity, explains as well."""
-
-WORTH = 0.02
-"""A further pole is worth a try where past commands explain this share of what is left."""
-
-LAGS_TICKS = (0, *sorted(step << octave for octave in range(13) for step in (2, 3)))
-"""Edges of stretches of the command, ever longer the longer ago."""
-
 RIVAL, COLOURED = 4.0, 1 / 3
-"""If what the best leaves is not noise, but correlated by so much from sample to sample, one that
-leaves so many times its power might be there."""
-
+"""If what the best leaves is correlated by so much from sample to sample it is not noise, and one
+that leaves so many times its power might be there."""
 UNLIKELY, SLOW = 6.0, 1.0
-"""Where it is noise and no pole is faster, in rad a tick, a drive whose information criterion is
-above the best by more (Kass and Raftery 1995: strong evidence against it) does not explain it."""
-
+"""Where it is noise and no pole is faster than so many rad a tick, a drive whose information
+criterion is above the best by more (Kass and Raftery 1995: strong evidence) is no rival."""
+NOISY, MISFIT = 0.01, 0.1
+"""Shares of the velocity's SD: where noise is larger the angle may show the drive better; where
+more is left the command does not explain it."""
 QUIET, RUBS, RUBBED, SIGNS = 3e-4, 0.8, 4.0, 3
-"""What is left below this share of the SD needs no friction, which must bring its power down to the
-second share. With it, drives are alike up to so many times the power: poles bend to what the law of
-friction leaves. The last: how often the sign is made from the drive and the drive from the sign."""
-
+"""A share of the SD below which nothing needs friction; to what share it must bring the power; how
+much more power is as good with it, for poles bend to what its law leaves; how often the sign is
+made of the drive and the drive of the sign."""
 STAIRS, FINER = 0.5, 4
 """A command that was logged more slowly than it was sent goes on between its samples: if lines
 between them, in so many steps, leave this share of what stairs leave, the stairs are not known."""
 
-NOISY = 0.01
-"""Where a velocity leaves noise above this share of its SD, the angle may show the drive better."""
-
-LARGEST_MISFIT = 0.1
-"""Above this share of the velocity's SD the command does not explain it."""
-
-PASSED_HZ = 10.0
-"""An angle is used as the velocity through a low-pass of first order and this corner."""
-
-ERRORS = 2.0
-"""A delay is there if it is longer than so many standard errors; neighbours are so far away."""
-
-BLOCKS = 32
-"""Sums of the scores over so many stretches tell their scatter, whatever colour the noise has."""
-
-STEP, LONG, CURVED, HALVINGS = 1e-4, 5.0, 2.0, 8
+ERRORS, BLOCKS = 2.0, 32
+"""A delay must be longer than so many standard errors, and rivals are so many away; they are those
+of sums over so many stretches, whatever the colour of the noise."""
+MOST_STEPS, ENOUGH = 20, 1e-6  # of a search, and the last share of the power to gain
+STEP, LONG, CURVED = 1e-4, 5.0, 2.0
 """Of a coordinate, for its slope; the longest move of one; a move that changes the velocity by more
-times what the slopes say is too long, and is halved up to so often."""
-
-INEXACT = 0.005
-"""No drive is quite linear: so much of what it tells of the motion between samples is uncertain."""
-
-SCATTERED = 5.0
-"""Stamps keep step with the ticks if their mean direction is so many standard errors long."""
-
-TINY = float(np.finfo(np.float64).tiny)
+times what the slopes say is halved."""
+INEXACT = 0.005  # no drive is quite linear: so much of what it tells is uncertain
+SCATTERED = 5.0  # stamps keep step if their mean direction is so many standard errors long
+TINY = 1e-300
 
 
 class TorqueFilter(NamedTuple):
@@ -165,7 +132,7 @@ class Drive:
 
 def since_ticks(
     command: Channel, time_s: Array, delay_s: float, even: float = ON_EDGE
-) -> tuple[NDArray[np.intp], Array]:
+) -> tuple[Rows, Array]:
     """Return the last tick whose command acts at the times, and for how long it has.
 
     A time that is `even` of an interval or less before a tick is that tick.
@@ -201,7 +168,7 @@ def find_drive(epochs: Sequence[Epoch], settings: Settings) -> Drive | None:
     epochs : sequence of Epoch
         Of one recording, in order; of those that can be used a few are tried.
     settings : Settings
-        Of its rig, the drive is where a search may begin.
+        A search may begin at the drive of its rig.
 
     Returns
     -------
@@ -209,17 +176,15 @@ def find_drive(epochs: Sequence[Epoch], settings: Settings) -> Drive | None:
         None if the command was not recorded, if no drive explains the motion, or if the command
         seems to have been logged more slowly than it was sent, which a loop of ours does not do.
     """
-    start = DriveModel.second_order(
-        settings.rig.drive_bandwidth_hz, settings.rig.drive_damping_ratio
-    )
+    rig = settings.rig
+    start = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
     for epoch in epochs[:MOST_TRIED]:
-        best: _Identified | None = None
+        found: list[tuple[float, bool, Drive]] = []
         for name in ("velocity_rad_s", "angle_rad"):
-            if name in epoch.channels and (best is None or (best.noise and best.power > NOISY**2)):
-                one = _identified(epoch, epoch.channels[name], start)
-                best = min((one, best), key=lambda x: math.inf if x is None else x.power)
-        if best is not None:
-            return best.drive
+            if name in epoch.channels and (not found or (found[0][1] and found[0][0] > NOISY**2)):
+                found += _identified(epoch, epoch.channels[name], start)
+        if found:
+            return min(found, key=lambda one: one[0])[2]
     return None
 
 
@@ -229,26 +194,24 @@ class _Record:
 
     Attributes
     ----------
-    command : Channel
+    inputs : tuple of (Channel, float or array)
+        The command and, with dry friction, the sign of the velocity; and how long each was held.
     interval_s : float
         Of the ticks.
     time_s, measured : array, shape (n,)
         The velocity at its stamps, as a share of its SD.
     scale : float
         Its SD.
-    of_angle : bool
-        Whether the angle was measured and `measured` is `_from_angle`.
-    sign : Channel or None
-        Of the velocity, in parts of a tick, where dry friction acts on the drive.
+    every_s : float
+        Where the angle was measured and `measured` is `_from_angle`: the interval of its stamps.
     """
 
-    command: Channel
+    inputs: tuple[tuple[Channel, float | Array], ...]
     interval_s: float
     time_s: Array
     measured: Array
     scale: float
-    of_angle: bool = False
-    sign: Channel | None = None
+    every_s: float = 0.0
 
 
 class _Fitted(NamedTuple):
@@ -284,12 +247,8 @@ class _Fitted(NamedTuple):
         return _model(self.record, self.place, self.numerator[: self.zeros + 1])
 
 
-class _Identified(NamedTuple):
-    """A drive, the power that it leaves of the motion, and whether that is noise."""
-
-    drive: Drive
-    power: float
-    noise: bool
+def _power(one: _Fitted) -> float:
+    return one.power
 
 
 def _record(epoch: Epoch, motion: Channel) -> _Record | None:
@@ -297,70 +256,68 @@ def _record(epoch: Epoch, motion: Channel) -> _Record | None:
     command = epoch.channels.get("velocity_command_rad_s")
     if command is None or len(command) < 2 * FEWEST_SAMPLES:
         return None
-    time_s, of_angle = motion.time_s, motion.name == "angle_rad"
-    inside = (time_s >= command.time_s[0] + SETTLED_S) & (time_s <= command.time_s[:MOST_TICKS][-1])
-    inside &= sound(epoch, time_s)
+    stamps_s, of_angle = motion.time_s, motion.name == "angle_rad"
+    first_s, last_s = command.time_s[0] + SETTLED_S, command.time_s[:MOST_TICKS][-1]
+    inside = (stamps_s >= first_s) & (stamps_s <= last_s) & sound(epoch, stamps_s)
     for hole in epoch.left_out:
         if hole.lost:
-            inside &= (time_s < hole.stop_s) | (time_s > hole.stop_s + SETTLED_S)
-    most = MOST_TICKS if of_angle else MOST_SAMPLES
-    time_s, measured = time_s[inside][:most], motion.values[inside][:most]
-    if time_s.size < FEWEST_SAMPLES:
+            inside &= (stamps_s < hole.stop_s) | (stamps_s > hole.stop_s + SETTLED_S)
+    rows = np.flatnonzero(inside)[: MOST_TICKS if of_angle else MOST_SAMPLES]
+    if rows.size < FEWEST_SAMPLES:
         return None
+    time_s, measured, every_s = stamps_s[rows], motion.values[rows], 0.0
     if of_angle:
-        measured = _from_angle(measured, _mean_interval_s(time_s))
-    scale = float(np.std(measured))
+        every_s = float(time_s[-1] - time_s[0]) / (rows.size - 1)
+        measured = _from_angle(measured, every_s)
+    scale, used = float(np.std(measured)), command.time_s <= time_s[-1]
     if scale == 0.0:
         return None
-    used = command.time_s <= time_s[-1]
     sent = Channel(command.name, command.time_s[used], command.values[used])
-    return _Record(sent, 1.0 / command.mean_rate_hz, time_s, measured / scale, scale, of_angle)
+    interval_s = 1.0 / command.mean_rate_hz
+    return _Record(
+        ((sent, _lengths_s(sent)),), interval_s, time_s, measured / scale, scale, every_s
+    )
 
 
-def _identified(epoch: Epoch, motion: Channel, start: DriveModel) -> _Identified | None:
-    """Return the drive that one channel of the motion shows; None where it shows none."""
+def _identified(
+    epoch: Epoch, motion: Channel, start: DriveModel
+) -> list[tuple[float, bool, Drive]]:
+    """Return the drive that one channel shows, the power it leaves and whether that is noise."""
     record = _record(epoch, motion)
     if record is None:
-        return None
+        return []
     found = _climbed(record, start)
-    least = min(found, key=_power)
-    rubbed = _rubbed(least) if least.power > QUIET**2 else None
-    if rubbed is not None:
-        record, found = rubbed, _climbed(rubbed, least.model)
-    found = [one for one in found if _ticks_show(one)]
+    best = min(found, key=_power)
+    if best.power > QUIET**2 and (rubbed := _rubbed(best)) is not None:
+        found = _climbed(rubbed.record, rubbed.model)
+    times = AS_GOOD if len(found[0].record.inputs) == 1 else RUBBED
+    found = [one for one in found if _fastest(one) < SEEN]
     if not found:
-        return None
+        return []
     best = min(found, key=_power)
     if epoch.ticks is None and best.power > QUIET**2 and _between_lines(best) < STAIRS:
-        return None
-    times = AS_GOOD if record.sign is None else RUBBED
+        return []
     chosen = next(one for one in found if one.power <= times * best.power + UNSEEN**2)
-    model = chosen.model
-    if chosen.power > LARGEST_MISFIT**2 or not 0.5 < model.gain < 2.0:
-        return None
-    noise = best.left[1:] @ best.left[:-1] < COLOURED * best.left.size * best.power
+    if chosen.power > MISFIT**2 or not 0.5 < chosen.model.gain < 2.0:
+        return []
+    noise = bool(best.left[1:] @ best.left[:-1] < COLOURED * best.left.size * best.power)
     most = (times if noise else RIVAL) * best.power + UNSEEN**2
-    others = [one for one in found if one is not chosen and one.power <= most]
-    if noise and max(map(abs, model.poles_rad_s)) * record.interval_s < SLOW:
+    rivals = [one for one in found if one is not chosen and one.power <= most]
+    if noise and _fastest(chosen) < SLOW:
         likely = min(map(_information, found)) + UNLIKELY
-        others = [one for one in others if _information(one) <= likely]
-    rivals = [*(one.model for one in others), *_neighbours(chosen)]
+        rivals = [one for one in rivals if _information(one) <= likely]
     if not noise:  # where a drive is not linear its halves differ
-        middle = record.time_s.size // 2
+        one, middle = chosen.record, chosen.left.size // 2
         for part in (slice(middle), slice(middle, None)):
-            half = replace(record, time_s=record.time_s[part], measured=record.measured[part])
-            rivals.append(_searched(half, chosen.place, chosen.zeros, chosen.place[-1] > 0).model)
-    return _Identified(Drive(model, tuple(rivals)), chosen.power, noise)
+            half = replace(one, time_s=one.time_s[part], measured=one.measured[part])
+            rivals.append(_searched(half, chosen.place, chosen.zeros, chosen.place[-1] > 0))
+    others = (*(one.model for one in rivals), *_neighbours(chosen))
+    return [(chosen.power, noise, Drive(chosen.model, others))]
 
 
-def _power(one: _Fitted) -> float:
-    return one.power
-
-
-def _ticks_show(one: _Fitted) -> bool:
-    """Return whether the samples show every pole."""
-    fastest = max(-pole.real for pole in one.model.poles_rad_s)
-    return math.exp(-fastest * one.record.interval_s) > FORGOTTEN
+def _fastest(one: _Fitted) -> float:
+    """Return the fastest decay, in rad a tick."""
+    return max(-pole.real for pole in one.model.poles_rad_s) * one.record.interval_s
 
 
 def _information(one: _Fitted) -> float:
@@ -375,22 +332,27 @@ def _climbed(record: _Record, start: DriveModel) -> list[_Fitted]:
     Each with two zeros fewer than poles (it smooths the steps of the command) and with one fewer
     (its acceleration jumps at them). One pole more where the best has a delay: a lag looks like it.
     """
-    models = [replace(start, poles_rad_s=tuple(share * p for p in start.poles_rad_s))
-              for share in SPEEDS]  # fmt: skip
-    models = [*_regressed(record), *models]
+    regressed = _regressed(record)
+    speeds = [] if regressed else [2.0**-n for n in range(6)]
+    models = [replace(start, poles_rad_s=tuple(x * p for p in start.poles_rad_s)) for x in speeds]
     found: list[_Fitted] = []
     enough = False
     for poles in range(1, MOST_POLES + 1):
-        begins = [_coordinates(one, record.interval_s, poles) for one in models]
+        begins = [
+            _coordinates(one, record.interval_s, poles)
+            for one in (
+                start,
+                *models,
+                *regressed[poles - 1 : poles],
+                *(x.model for x in found[-2:]),
+            )
+        ]
         for zeros in range(max(poles - 2, 0), poles):
             found.append(_best(record, begins, zeros))
             begins.append(found[-1].place[:-1])
-        models += [one.model for one in found[-2:]]
-        if poles == 1:
-            continue
         best = min(found, key=_power)
         spent = _explainable(best) < WORTH
-        if enough or (spent and best.place[-1] == 0.0):
+        if poles > 1 and (enough or (spent and best.place[-1] == 0.0)):
             break
         enough = spent
     return found
@@ -400,40 +362,41 @@ def _best(record: _Record, begins: Sequence[Array], zeros: int) -> _Fitted:
     """Return the drive that explains the velocity best, with a delay only where one is shown."""
     at = [_answer(record, np.append(begin, 0.0), zeros) for begin in begins]
     still = _searched(record, min(at, key=_power).place, zeros, False)
-    matrix = np.concatenate([_slopes(still), still.table])
+    step, scatter, _ = _scatter(still)
     delay = still.place.size - 1
-    step = np.linalg.lstsq(matrix @ matrix.T, -matrix @ still.left)[0][delay]
-    if step <= 0 or step <= ERRORS * math.sqrt(
-        max(_covariance(matrix, still.left)[delay, delay], 0)
-    ):
+    if step[delay] <= ERRORS * np.linalg.norm(scatter[delay]):
         return still
-    ticks = np.geomspace(SHORTEST_TICKS, _longest(record), 12)
-    late = [_answer(record, np.append(still.place[:-1], one), zeros) for one in ticks]
+    late = [
+        _answer(record, np.append(still.place[:-1], ticks), zeros)
+        for ticks in np.geomspace(SHORTEST_TICKS, _longest(record), 12)
+    ]
     moved = _searched(record, min(late, key=_power).place, zeros, True)
-    shown = 1.0 - ERRORS**2 / record.measured.size if record.sign is None else 1.0 / RUBBED
+    shown = 1.0 - ERRORS**2 / record.measured.size if len(record.inputs) == 1 else 1.0 / RUBBED
     return moved if moved.place[-1] > 0 and moved.power < shown * still.power else still
 
 
 def _searched(record: _Record, begin: Array, zeros: int, delayed: bool) -> _Fitted:
-    """Return the best drive near a place, whose delay is searched too or stays."""
-    free = begin.size if delayed else begin.size - 1
+    """Return the best drive near a place, whose delay is searched too or stays.
 
-    def at(x: Array) -> _Fitted:
-        return _answer(record, np.append(x, begin[free:]), zeros)
-
-    def left(x: Array) -> Array:
-        return at(x).left
-
-    def slopes(x: Array) -> Array:
-        one = at(x)
-        along = _slopes(one)[:free]
-        size = np.linalg.norm(one.table, axis=1, keepdims=True) + TINY
-        table = one.table / size
-        return along - np.linalg.lstsq(table @ table.T, table @ along.T)[0].T @ table
-
-    x, *_ = scipy.optimize.leastsq(left, begin[:free], Dfun=slopes, col_deriv=True,
-                                   ftol=1e-6, xtol=1e-6, maxfev=30)  # fmt: skip
-    return at(x)
+    By steps of Levenberg and Marquardt.
+    """
+    one, damping = _answer(record, begin, zeros), 1e-3
+    for _ in range(MOST_STEPS):
+        along = _slopes(one)[: begin.size - 1 + delayed]
+        table = one.table / (np.linalg.norm(one.table, axis=1, keepdims=True) + TINY)
+        along = along - np.linalg.lstsq(table @ table.T, table @ along.T)[0].T @ table
+        gram, down = along @ along.T, along @ one.left
+        before = one
+        while one is before and damping < 1e6:
+            damped = gram + np.diag(damping * np.diag(gram) + TINY)
+            step = np.zeros(begin.size)
+            step[: down.size] = np.linalg.solve(damped, -down)
+            tried = _answer(record, before.place + step, zeros)
+            one = tried if tried.power < before.power else before
+            damping *= 0.1 if one is tried else 10.0
+        if before.power - one.power <= ENOUGH * before.power:
+            break
+    return one
 
 
 def _answer(record: _Record, place: Array, zeros: int) -> _Fitted:
@@ -441,7 +404,7 @@ def _answer(record: _Record, place: Array, zeros: int) -> _Fitted:
     degrees = np.resize([1.0, 2.0], place.size - 1)
     lower = np.append(degrees * math.log(SLOWEST), 0.0)
     upper = np.append(degrees * math.log(FASTEST), _longest(record))
-    place = np.clip(place, lower, upper)
+    place = np.minimum(np.maximum(place, lower), upper)
     weights, modes = _modes(record, place, zeros)
     table = weights @ modes
     size = np.linalg.norm(table, axis=1) + TINY
@@ -453,80 +416,69 @@ def _answer(record: _Record, place: Array, zeros: int) -> _Fitted:
 
 def _slopes(one: _Fitted) -> Array:
     """Return how the velocity changes along each coordinate of the place, shape (p, n)."""
-    explained, rows = one.numerator @ one.table, []
-    for by in STEP * np.eye(one.place.size):
-        weights, modes = _modes(one.record, one.place + by, one.zeros)
-        rows.append((one.numerator @ weights @ modes - explained) / STEP)
-    return np.stack(rows)
+    explained = one.numerator @ one.table
+    steps = STEP * np.eye(one.place.size)
+    return (
+        np.stack([_velocity(one, one.place + by, one.numerator) - explained for by in steps]) / STEP
+    )
+
+
+def _velocity(one: _Fitted, place: Array, numerator: Array) -> Array:
+    """Return the velocity of a numerator at another place."""
+    weights, modes = _modes(one.record, place, one.zeros)
+    return np.asarray(numerator @ weights @ modes)
 
 
 def _modes(record: _Record, place: Array, zeros: int) -> tuple[Array, Array]:
-    """Return the velocities of the poles, shape (m, n), and what each numerator has of them."""
+    """Return what each term of a numerator has of each mode, and the modes, shape (m, n)."""
     poles = _poles(place[:-1], record.interval_s)
-    acting = [(zeros, float(place[-1]) * record.interval_s, False)]
-    if record.sign is not None:  # friction acts behind the controller, whose zeros are not its own
-        acting.append((place.size - 2, 0.0, True))
-    rows, parts = [], []
-    for own_zeros, delay_s, of_sign in acting:
-        own = []
-        for pole, shape in zip(poles, _shapes(poles, own_zeros), strict=True):
-            mode = _mode(record, pole, delay_s, of_sign)
-            if pole.imag:
-                rows += [mode.real, mode.imag]
-                own += [2 * shape.real, -2 * shape.imag]
-            else:
-                rows.append(mode)
-                own.append(shape.real)
-        parts.append(np.array(own).T)
-    return scipy.linalg.block_diag(*parts), np.stack(rows)
+    delay_s, count = float(place[-1]) * record.interval_s, place.size - 1
+    modes, parts = [], []
+    # Friction acts behind the controller, whose zeros are not its own.
+    for which, own in enumerate((zeros, count - 1)[: len(record.inputs)]):
+        rows = []
+        for pole, shape in zip(poles, _shapes(poles, own), strict=True):
+            mode = _mode(record, which, pole, 0.0 if which else delay_s)
+            modes += [mode.real, mode.imag] if pole.imag else [mode.real]
+            rows += [2 * shape.real, -2 * shape.imag] if pole.imag else [shape.real]
+        parts.append(np.array(rows).T)
+    if len(parts) == 1:
+        return parts[0], np.stack(modes)
+    return scipy.linalg.block_diag(*parts), np.stack(modes)
 
 
 @lru_cache(maxsize=64)
-def _mode(record: _Record, pole: complex, delay_s: float, of_sign: bool) -> Array | Complex:
-    """Return x of x' = λ x + c at the stamps of the velocity; for an angle as it is made of it."""
-    channel = record.sign if of_sign and record.sign is not None else record.command
-    tick, held_s = _since(record, delay_s, of_sign)
-    sent, lengths_s = channel.values, _lengths(record, of_sign)
-    before = np.asarray(state_at_ticks(pole, sent, lengths_s))
-    state = np.asarray(state_later(pole, before[tick], sent[tick], held_s))
-    if not record.of_angle:
-        return state
-    # ∫ x dt, as x' = λ x + c
-    summed = np.concatenate(([0.0], np.cumsum(sent[:-1] * lengths_s)))
-    integral = (state - summed[tick] - held_s * sent[tick]) / (pole if pole.imag else pole.real)
-    return _from_angle(integral, _mean_interval_s(record.time_s))
+def _mode(record: _Record, which: int, pole: complex, delay_s: float) -> Complex:
+    """Return x of x' = λ x + c at the stamps; for an angle what `_from_angle` makes of ∫ x dt."""
+    channel, lengths_s = record.inputs[which]
+    tick, held_s = _since(record, which, delay_s)
+    sent = channel.values[tick]
+    state = state_later(pole, state_at_ticks(pole, channel.values, lengths_s)[tick], sent, held_s)
+    if record.every_s:  # from x' = λ x + c
+        summed = np.append(0.0, np.cumsum(channel.values[:-1] * lengths_s))
+        whole = (state - summed[tick] - held_s * sent) / (pole if pole.imag else pole.real)
+        state = _from_angle(whole, record.every_s)
+    return state
 
 
-@lru_cache(maxsize=16)
-def _since(
-    record: _Record, delay_s: float, of_sign: bool
-) -> tuple[NDArray[np.intp], Array | float]:
-    channel = record.sign if of_sign and record.sign is not None else record.command
-    tick, after_s = since_ticks(channel, record.time_s, delay_s, even=0.0)
+@lru_cache(maxsize=8)
+def _since(record: _Record, which: int, delay_s: float) -> tuple[Rows, Array | float]:
+    tick, after_s = since_ticks(record.inputs[which][0], record.time_s, delay_s, even=0.0)
     return tick, same_time(after_s)
-
-
-@lru_cache(maxsize=16)
-def _lengths(record: _Record, of_sign: bool) -> float | Array:
-    return _lengths_s(record.sign if of_sign and record.sign is not None else record.command)
 
 
 def _longest(record: _Record) -> float:
     return max(LONGEST_S / record.interval_s, LONGEST_TICKS)
 
 
-def _mean_interval_s(time_s: Array) -> float:
-    return float(time_s[-1] - time_s[0]) / (time_s.size - 1)
-
-
-def _from_angle(angle_rad: Array, interval_s: float) -> Array:
+def _from_angle(angle_rad: Values, interval_s: float) -> Values:
     """Return the velocity through a low-pass, made of the angle without a derivative.
 
     y_k = e^(−aT) y_(k−1) + θ_k − θ_(k−1), with a the corner: white noise of the angle stays white
     above it, and neither where the angle begins nor a slow drift counts.
     """
     steps = np.diff(angle_rad, prepend=angle_rad[:1])
-    return np.asarray(scipy.signal.lfilter([1.0], [1.0, -_kept(interval_s)], steps))
+    return scipy.signal.lfilter([1.0], [1.0, -_kept(interval_s)], steps)
 
 
 def _kept(interval_s: float) -> float:
@@ -560,83 +512,89 @@ def _shapes(poles: tuple[complex, ...], zeros: int) -> Complex:
     """Return the residues of s^j / Π(s − λ), s in units of the first pole, shape (poles, j)."""
     unit = abs(poles[0])
     everyone = with_conjugates(poles)
-    rows = []
-    for pole in poles:
-        rest = math.prod(((pole - p) / unit for p in everyone if p != pole), start=complex(1))
-        rows.append([unit * (pole / unit) ** j / rest for j in range(zeros + 1)])
-    return np.array(rows)
+    rests = [math.prod(((pole - p) / unit for p in everyone if p != pole), start=complex(1))
+             for pole in poles]  # fmt: skip
+    return np.array([[unit * (pole / unit) ** j / rest for j in range(zeros + 1)]
+                     for pole, rest in zip(poles, rests, strict=True)])  # fmt: skip
 
 
 def _coordinates(drive: DriveModel, interval_s: float, poles: int) -> Array:
-    """Return where a search with so many poles begins at a drive; what it lacks is slower."""
-    pairs = [pole for pole in with_conjugates(drive.poles_rad_s) if pole.imag]
-    single = sorted((pole for pole in drive.poles_rad_s if not pole.imag), key=abs)
-    if poles % 2 and not single:
-        single = [complex(-abs(pairs[0]) * 0.3) * interval_s / interval_s]
-    everyone = [pole * interval_s for pole in (*pairs, *single)]
-    everyone += [complex(-abs(everyone[0]) * 0.3**n) for n in range(1, poles - len(everyone) + 1)]
+    """Return where a search with so many poles begins at a drive."""
+    everyone = with_conjugates(sorted(drive.poles_rad_s, key=lambda pole: -abs(pole.imag)))[:poles]
+    everyone += [complex(-abs(everyone[0]) * BESIDE**n)
+                 for n in range(1, poles - len(everyone) + 1)]  # fmt: skip
     found: list[float] = []
-    for a, b in zip(everyone[:poles][::2], everyone[:poles][1::2], strict=False):
-        found += [math.log(-(a + b).real), math.log((a * b).real)]
-    if poles % 2:
-        found.append(math.log(-everyone[poles - 1].real))
-    return np.array(found)
+    for a, b in zip(everyone[::2], everyone[1::2], strict=False):
+        found += [-(a + b).real * interval_s, (a * b).real * interval_s**2]
+    if poles % 2:  # one of a pair does not stand alone
+        found.append(abs(everyone[-1]) * interval_s)
+    return np.log(found)
 
 
-def _regressed(record: _Record) -> Iterator[DriveModel]:
-    """Yield drives with the poles that regressions of even samples have; none of uneven ones."""
-    tick, held_s = _since(record, 0.0, False)
-    if not isinstance(held_s, float) or not isinstance(_lengths(record, False), float):
-        return
-    rows = np.arange(MOST_POLES, tick.size)
-    rows = rows[(tick[rows] - tick[rows - MOST_POLES] == MOST_POLES) & (tick[rows] >= LAGS)]
-    if rows.size < 4 * LAGS:
-        return
-    sent = record.command.values
-    if record.of_angle:
-        sent = scipy.signal.lfilter([1.0], [1.0, -_kept(record.interval_s)], sent)
-    columns = [sent[tick[rows] - lag] for lag in range(LAGS)]
-    columns += [record.measured[rows - lag] for lag in range(MOST_POLES + 1)]
-    through = np.linalg.qr(np.stack(columns, axis=1), mode="r")[:LAGS]
-    for poles in range(1, MOST_POLES + 1):
-        own = [*range(poles + 2), *range(LAGS + 1, LAGS + 1 + poles)]
-        values = np.linalg.lstsq(through[:, own], through[:, LAGS], rcond=1e-10)[0][poles + 2 :]
-        roots = [complex(z) for z in np.roots([1.0, *-values])]
-        good = [z for z in roots if z.imag >= 0 and 1e-3 < abs(z) < 1 and (z.imag or z.real > 0)]
-        if good:
-            yield DriveModel(
-                tuple(cmath.log(z) / record.interval_s for z in good), (0j,) * len(good)
-            )
+@lru_cache(maxsize=2)
+def _past(record: _Record) -> Array:
+    """Return independent sums of past commands at the stamps, shape (n, e)."""
+    command = record.inputs[0][0].values
+    sums = np.append(0.0, np.cumsum(command))
+    tick, _ = _since(record, 0, 0.0)
+    edges = [sums[np.maximum(tick + 1 - lag, 0)] for lag in EDGES_TICKS if lag <= tick[-1]]
+    table = np.diff(edges, axis=0).T
+    return np.linalg.qr(table / (np.linalg.norm(table, axis=0) + TINY))[0]
 
 
 def _explainable(one: _Fitted) -> float:
     """Return how much of what is left any linear drive might explain, as a share of its power.
 
-    Whatever its poles, it adds up past commands: so do their means over `LAGS_TICKS`. What chance
-    gives so many of them is taken off.
+    Whatever its poles, it adds up past commands. What chance gives so many is taken off.
     """
-    sums = np.concatenate(([0.0], np.cumsum(one.record.command.values)))
-    tick, _ = _since(one.record, 0.0, False)
-    edges = [sums[np.maximum(tick + 1 - lag, 0)] for lag in LAGS_TICKS if lag <= tick[-1]]
-    table = np.diff(edges, axis=0)
-    table /= np.linalg.norm(table, axis=1, keepdims=True) + TINY
-    along = table @ one.left
-    explained = float(along @ np.linalg.lstsq(table @ table.T, along)[0])
-    free = max(one.left.size - len(table), 1)
-    return 1.0 - (1.0 - explained / (one.power * one.left.size)) * one.left.size / free
+    past = _past(one.record)
+    n, e = past.shape
+    share = np.sum((one.left @ past) ** 2) / (one.power * n + TINY)
+    return float(1.0 - (1.0 - share) * n / max(n - e, 1))
 
 
-def _rubbed(one: _Fitted) -> _Record | None:
-    """Return the record with the sign of its velocity, where dry friction explains what is left."""
-    record, least = one.record, one.power
-    record = replace(record, sign=_sign(one))
+def _regressed(record: _Record) -> list[DriveModel]:
+    """Return drives with the poles of regressions on even samples, by their number; or none."""
+    tick, held_s = _since(record, 0, 0.0)
+    rows = np.arange(MOST_POLES, tick.size)
+    rows = rows[tick[rows] - tick[rows - MOST_POLES] == MOST_POLES]
+    command, lengths_s = record.inputs[0]
+    if (
+        isinstance(held_s, np.ndarray)
+        or isinstance(lengths_s, np.ndarray)
+        or rows.size < FEWEST_SAMPLES
+    ):
+        return []
+    sent = command.values
+    if record.every_s:
+        sent = scipy.signal.lfilter([1.0], [1.0, -_kept(record.every_s)], sent)
+    columns = [record.measured[rows - lag] for lag in range(MOST_POLES + 1)]
+    columns += [sent[np.maximum(tick[rows] - lag, 0)] for lag in range(MOST_POLES + 2)]
+    through = _past(record)[rows].T @ np.stack(columns, axis=1)
+    found = []
+    for poles in range(1, MOST_POLES + 1):
+        own = [*range(1, poles + 1), *range(MOST_POLES + 1, MOST_POLES + poles + 3)]
+        values = np.linalg.lstsq(through[:, own], through[:, 0], rcond=1e-12)[0]
+        roots = np.roots([1.0, *-values[:poles]])
+        roots = roots[(roots.imag >= 0) & (np.abs(roots) < 1)] + 0j
+        roots = roots[(roots.imag > 0) | (roots.real > 1e-3)]
+        if not roots.size:
+            return []
+        lasting = tuple((np.log(roots) / record.interval_s).tolist())
+        found.append(DriveModel(lasting, (0j,) * len(lasting)))
+    return found
+
+
+def _rubbed(one: _Fitted) -> _Fitted | None:
+    """Return a drive with friction, where the sign of its velocity explains what another leaves."""
+    place = np.append(_coordinates(one.model, one.record.interval_s, 2), 0.0)
+    rubbed = one
     for _ in range(SIGNS):
-        first = _searched(
-            record, np.append(_coordinates(one.model, record.interval_s, 2), 0.0), 1, False
-        )
-        one = first
-        record = replace(record, sign=_sign(one))
-    return None if one.power > RUBS * least else record
+        sign = _sign(rubbed)
+        record = replace(one.record, inputs=(one.record.inputs[0], (sign, _lengths_s(sign))))
+        rubbed = _searched(record, place, 1, False)
+        place = rubbed.place
+    return rubbed if rubbed.power < RUBS * one.power else None
 
 
 def _sign(one: _Fitted) -> Channel:
@@ -645,15 +603,14 @@ def _sign(one: _Fitted) -> Channel:
     The velocity is what a drive makes there, and straight between the samples what it leaves; of
     an angle, what the drive makes.
     """
-    time_s = _finer(one.record.command.time_s)
-    there = replace(one.record, time_s=time_s, of_angle=False)
-    weights, modes = _modes(there, one.place, one.zeros)
-    velocity = one.numerator @ weights @ modes
-    if not one.record.of_angle:
-        velocity = velocity - np.interp(time_s, one.record.time_s, one.left)
+    time_s = _finer(one.record.inputs[0][0].time_s)
+    there = replace(one.record, time_s=time_s, every_s=0.0)
+    velocity = _velocity(one._replace(record=there), one.place, one.numerator)
+    if not one.record.every_s:
+        velocity -= np.interp(time_s, one.record.time_s, one.left)
     after = np.append(velocity[1:], velocity[-1])
-    larger = np.maximum(np.abs(velocity) + np.abs(after), TINY)
-    return Channel("velocity_rad_s", time_s, (velocity + after) / larger)
+    mean = (velocity + after) / (np.abs(velocity) + np.abs(after) + TINY)
+    return Channel("velocity_rad_s", time_s, mean)
 
 
 def _finer(ticks_s: Array) -> Array:
@@ -664,50 +621,51 @@ def _finer(ticks_s: Array) -> Array:
 
 def _between_lines(one: _Fitted) -> float:
     """Return what a drive leaves whose command went straight between samples, of what it left."""
-    sent = one.record.command
+    sent, record = one.record.inputs[0][0], one.record
     time_s = _finer(sent.time_s)
     middle = np.interp(time_s + 0.5 * (time_s[1] - time_s[0]), sent.time_s, sent.values)
-    finer = replace(one.record, command=Channel(sent.name, time_s, middle), sign=None,
-                    interval_s=one.record.interval_s / FINER)  # fmt: skip
-    begin = np.append(_coordinates(one.model, finer.interval_s, 2), 0.0)
+    lines = Channel(sent.name, time_s, middle)
+    interval_s = record.interval_s / FINER
+    finer = replace(record, inputs=((lines, _lengths_s(lines)),), interval_s=interval_s)
+    begin = np.append(_coordinates(one.model, interval_s, 2), 0.0)
     return min(_searched(finer, begin, zeros, False).power for zeros in (0, 1)) / one.power
 
 
-def _covariance(matrix: Array, left: Array) -> Array:
-    """Return the covariance of place and numerator, whose slopes are the rows, shape (p, p)."""
-    size = np.linalg.norm(matrix, axis=1)
-    size = np.where(size > 0, size, 1.0)
-    scaled = (matrix / size[:, None]).T
-    _, singular, right = np.linalg.svd(scaled, full_matrices=False)
-    shown = singular > np.finfo(np.float64).eps * singular[0]  # one at its limit changes nothing
-    inverse = right[shown].T / singular[shown]
-    sums = np.add.reduceat(scaled * left[:, None], np.arange(0, left.size, left.size // BLOCKS))
-    half = (inverse @ inverse.T @ sums.T) / size[:, None]
-    return half @ half.T
+def _scatter(one: _Fitted) -> tuple[Array, Array, Array]:
+    """Return a step of place and numerator to where less is left, the scatter, and the slopes.
+
+    The covariance is that of the step, s sᵀ with the scatter s of shape (p, blocks).
+    """
+    slopes = np.concatenate([_slopes(one), one.table])
+    size = np.linalg.norm(slopes, axis=1)
+    size[size == 0] = 1.0
+    basis, upper = np.linalg.qr((slopes / size[:, None]).T)
+    inverse = np.linalg.pinv(upper, rcond=1e-15) / size[:, None]  # one at its limit changes nothing
+    block = np.arange(0, one.left.size, -(-one.left.size // BLOCKS))
+    sums = np.add.reduceat(basis * one.left[:, None], block)
+    return -inverse @ (one.left @ basis), inverse @ sums.T, slopes
 
 
 def _neighbours(one: _Fitted) -> Iterator[DriveModel]:
     """Yield the drive moved by two standard errors either way along each axis of its covariance.
 
     A move is halved until it changes the velocity about as its slopes say, and leaves no delay
-    below zero.
+    below zero. At few samples a tick constant one axis is long: delay, fastest pole and numerator
+    change together, hardly the velocity at the samples, and the acceleration between them a lot.
     """
-    matrix = np.concatenate([_slopes(one), one.table])
-    size = np.linalg.norm(matrix, axis=1)
-    size = np.where(size > 0, size, 1.0)
-    variances, axes = np.linalg.eigh(_covariance(matrix, one.left) * np.outer(size, size))
+    _, scatter, slopes = _scatter(one)
+    size = np.linalg.norm(slopes, axis=1, keepdims=True)
+    size[size == 0] = 1.0
+    axes, errors, _ = np.linalg.svd(scatter * size, full_matrices=False)
     explained, p = one.numerator @ one.table, one.place.size
-    for variance, axis in zip(variances, axes.T, strict=True):
-        longest = ERRORS * math.sqrt(max(variance, 0.0)) * axis / size
-        most = CURVED * np.linalg.norm(longest @ matrix)
+    for longest in (ERRORS * errors * axes / size).T:
+        most = CURVED * np.linalg.norm(longest @ slopes)
         for move in (longest, -longest):
-            for halved in range(HALVINGS):
-                by = move / 2**halved
+            for by in (move / 2**halved for halved in range(8)):
                 place, numerator = one.place + by[:p], one.numerator + by[p:]
                 if place[-1] < 0.0 or np.max(np.abs(by[:p])) > LONG:
                     continue
-                weights, modes = _modes(one.record, place, one.zeros)
-                if np.linalg.norm(numerator @ weights @ modes - explained) <= most:
+                if np.linalg.norm(_velocity(one, place, numerator) - explained) <= most:
                     yield _model(one.record, place, numerator[: one.zeros + 1])
                     break
 
