@@ -1,0 +1,346 @@
+"""How late the torque of a recording is, before anything is fitted or scored.
+
+An amplifier's filter or a bus that stamps late shifts one channel against the other: 10 ms take 7 %
+off the work of a cycle and turn stiffness into damping. With the delay τ as a further parameter
+
+    y = e^(−iωτ) X p        columns e^(−iωτ) X and −iω e^(−iωτ) X p
+
+it is solved for like J, B and K, by the perturbation where that was recorded. Friction, a reflex and
+a soft cuff turn the torque against the motion as a delay does: each is put in its place, and the
+torque is moved only if the delay is the likelier of them, by Whittle's likelihood, −Σ log S over
+the lines of all epochs, and is the same in the lower half of the band.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from rigidimeter.analysis.estimate_anew.grid import Array
+from rigidimeter.analysis.estimate_anew.methods import (
+    Ready,
+    all_caused,
+    direct,
+    instrumental,
+    start_of,
+    torque_earlier,
+)
+from rigidimeter.analysis.estimate_anew.observation import Observation
+from rigidimeter.analysis.estimate_anew.solve import (
+    Pose,
+    Problem,
+    Solution,
+    noise_powers,
+    shortest,
+    solve,
+    sums,
+)
+from rigidimeter.analysis.estimate_anew.terms import CUFF, TERMS, Motion, Term
+from rigidimeter.core.records import Delay, Epoch
+
+MOST_EPOCHS = 12
+"""A delay is common to its recording; from so many epochs it is known well enough."""
+
+SCAN_STEP_S, SCAN_HIGH_HZ, MOST_VALLEYS, REWEIGHTED = 0.005, 20.0, 3, 3
+"""The search begins at the best of steps this far apart, a quarter of a period at 50 Hz, below this
+frequency; so many valleys are tried, each with weights found so often."""
+
+ROUNDS, SETTLED_S = 6, 1e-5
+"""The torque is moved and the rest estimated again until less is left: between coarse samples the
+first estimate sees the torque against motion that was not recorded."""
+
+MOST_STRETCH = 6.0
+"""A secant may go so many times as far as what is left."""
+
+SIGNIFICANT, LEAST_S = 3.0, 1e-4
+"""A delay within so many standard errors of zero is not corrected, nor one below this: it changes B
+by less than 1e-4 K seconds."""
+
+SAME_S, SAME_SHARE = 3e-4, 0.1
+"""Delays of two bands that differ by less than this, or by three standard errors, are one."""
+
+CLEAR = 10.0
+"""Of the log-likelihood: a delay that is not better than a term by this is not told from it."""
+
+REFLEXES_S = 0.03, 0.045, 0.06
+CUFF_RATIOS = 5.0, 20.0, 80.0, 320.0
+"""Stiffness of a cuff over that of the joint."""
+
+CUFF_LAGS_S = 0.0, 0.005, 0.01
+"""Damping over stiffness of the cuff: one that is damped looks like a delay."""
+
+
+class Found(NamedTuple):
+    """The delay of epochs, with its standard error, and the solution of which it is the last."""
+
+    delay_s: float
+    error_s: float
+    solution: Solution
+
+
+Observe = Callable[[Sequence[Ready]], list[Observation]]
+
+
+def delay_of(source: str, epochs: Sequence[Ready], known: bool, observed: Observe) -> Delay:
+    """Return how late the torque of a recording is, and whether that is corrected.
+
+    Parameters
+    ----------
+    source : str
+    epochs : sequence of Ready
+        Of the recording, those that can be fitted.
+    known : bool
+        Whether their perturbation was recorded, so that it is the instrument.
+    observed : callable
+        Observes epochs so; ValueError says why it cannot.
+    """
+    used = list(epochs[:MOST_EPOCHS])
+    if not used:
+        return Delay(source, remark="no perturbation epoch tells the channels' delay")
+    estimation, pose = used[0].settings.estimation, instrumental if known else direct
+    longest_s = estimation.max_delay_s
+    try:
+        plain = observed(used)
+        found = _settled(used, plain, pose, observed, longest_s)
+    except ValueError as error:
+        return Delay(source, remark=f"the delay of the torque was not estimated: {error}")
+    if found is None or abs(found.delay_s) > longest_s - SCAN_STEP_S / 2:
+        return Delay(
+            source,
+            remark=f"no delay of the torque within ±{1e3 * longest_s:g} ms explains it "
+            "(estimation.max_delay_s)",
+        )
+    delay = Delay(source, found.delay_s, found.error_s)
+    if not matters(found.delay_s, found.error_s):
+        why = f"shorter than {1e3 * LEAST_S:g} ms or not significantly different from zero"
+        return replace(delay, remark=f"not corrected: {why}")
+    if why := _of_half_the_band(found, pose) or _of_terms(plain, found, pose):
+        return replace(delay, remark=f"not corrected: {why}")
+    if not estimation.correct_delay:
+        return replace(delay, remark="not corrected: estimation.correct_delay is false")
+    return replace(delay, corrected=True)
+
+
+def matters(delay_s: float, error_s: float) -> bool:
+    """Return whether a delay is significant, and long enough to be worth a shift."""
+    return abs(delay_s) >= max(SIGNIFICANT * error_s, LEAST_S)
+
+
+def aligned(epoch: Epoch, delays: Sequence[Delay]) -> Epoch:
+    """Return the epoch with its torque moved by the delay of its source, if that is corrected."""
+    return torque_earlier(epoch, corrected_s(epoch.source, delays))
+
+
+def corrected_s(source: str, delays: Sequence[Delay]) -> float:
+    """Return by how much the torque of a source is moved, in s."""
+    return sum(one.delay_s for one in delays if one.source == source and one.corrected)
+
+
+def _settled(
+    used: Sequence[Ready],
+    plain: Sequence[Observation],
+    pose: Pose,
+    observed: Observe,
+    longest_s: float,
+) -> Found | None:
+    """Return the delay at which none is left; None where there is none.
+
+    Its zero is sought by secants, and its error is that of what is left over its slope.
+    """
+    first = _searched(plain, pose, longest_s)
+    if first is None:
+        return None
+    left_s, error_s = float(first.values[-1]), float(first.se[-1])
+    jumps = any(one.drive is not None and one.drive.model.jump for one in used)
+    if not matters(left_s, error_s) and (jumps or pose is direct):
+        return Found(left_s, error_s, first)  # it shows without a move
+    tried, total_s, stretch, solution = [(0.0, left_s)], left_s, 1.0, first
+    for _ in range(ROUNDS):
+        if abs(left_s) < SETTLED_S or abs(total_s) > longest_s:
+            break
+        moved = observed([one.moved(total_s) for one in used])
+        solution = solve(moved, delayed(pose), np.append(solution.values[:-1], 0.0))
+        left_s, error_s = float(solution.values[-1]), float(solution.se[-1])
+        if abs(left_s) < abs(tried[-1][1]):
+            gone_s = tried[-1][1] - left_s
+            stretch = (total_s - tried[-1][0]) / gone_s if gone_s else 1.0
+            stretch = float(np.clip(stretch, -MOST_STRETCH, MOST_STRETCH))
+        tried.append((total_s, left_s))
+        total_s += stretch * left_s
+    if abs(left_s) > max(error_s, LEAST_S) and abs(total_s) <= longest_s:
+        raise ValueError(
+            f"it did not settle in {ROUNDS} rounds: {1e3 * left_s:.2g} ms are left at "
+            f"{1e3 * total_s:.3g} ms"
+        )
+    return Found(total_s, error_s * max(abs(stretch), 1.0), solution)
+
+
+def _searched(observations: Sequence[Observation], pose: Pose, longest_s: float) -> Solution | None:
+    """Return J, B, K and the delay of the torque, the likeliest within ± `longest_s`."""
+    begin = start_of(observations)
+    problems = pose(observations, begin)
+    delays_s = np.linspace(-longest_s, longest_s, 2 * max(round(longest_s / SCAN_STEP_S), 1) + 1)
+    left = _unexplained(problems, delays_s)
+    # The valleys of the scan, the deepest first, and none: the subject may have dug the deepest.
+    inner = np.r_[True, left[1:] < left[:-1]] & np.r_[left[:-1] < left[1:], True]
+    valleys = sorted(np.flatnonzero(inner), key=lambda i: float(left[i]))[:MOST_VALLEYS]
+    best: Solution | None = None
+    for near_s in dict.fromkeys([*(round(float(delays_s[i]), 9) for i in valleys), 0.0]):
+        turned = [_turned(one, near_s) for one in problems]
+        near = shortest(*sums(turned))
+        for _ in range(REWEIGHTED):  # torque of the subject decides where lines count alike
+            near = shortest(*sums(turned, noise_powers(turned, near)))
+        try:
+            found = solve(observations, delayed(pose), np.append(near, near_s))
+        except ValueError:
+            continue  # nothing settles from there
+        if abs(found.values[-1]) > longest_s or found.values[0] <= 0:
+            continue  # no joint has a negative inertia
+        if best is None or likelihood(found) > likelihood(best):
+            best = found
+    return best
+
+
+def likelihood(found: Solution) -> float:
+    """Return −Σ log S over the lines of all epochs: Whittle's log-likelihood, but a constant.
+
+    Every line counts by the logarithm of what is left in it, so a subject who pushes slowly and
+    strongly does not outvote the lines above.
+    """
+    return -float(sum(np.sum(np.log(power)) for power in found.powers))
+
+
+def delayed(pose: Pose) -> Pose:
+    """Return the problems with the delay as the last parameter."""
+
+    def with_delay(observations: Sequence[Observation], values: Array) -> list[Problem]:
+        joint, delay_s = values[:-1], values[-1]
+        problems = []
+        for one in pose(observations, joint):
+            omega = one.observation.grid.omega_rad_s
+            turn = np.exp(-1j * omega * delay_s)[:, None]
+            own, seen = (
+                np.hstack([turn * part, -1j * omega[:, None] * turn * (part @ joint)[:, None]])
+                for part in (one.instruments, one.regressors)
+            )
+            target = one.target + seen[:, -1] * delay_s
+            problems.append(one._replace(instruments=own, regressors=seen, target=target))
+        return problems
+
+    return with_delay
+
+
+def _turned(one: Problem, delay_s: float) -> Problem:
+    """Return the problem with its torque earlier by a delay."""
+    turn = np.exp(1j * one.observation.grid.omega_rad_s * delay_s)
+    return one._replace(target=one.target * turn)
+
+
+def _unexplained(problems: Sequence[Problem], delays_s: Array) -> Array:
+    """Return the power of the torque that the instruments leave at each delay, shape (k,)."""
+    left = np.zeros(delays_s.size)
+    for one in problems:
+        omega = one.observation.grid.omega_rad_s
+        low = omega < 2 * np.pi * SCAN_HIGH_HZ
+        rows = one.instruments[low]
+        basis = np.linalg.qr(np.vstack([rows.real, rows.imag]))[0]
+        turned = one.target[low, None] * np.exp(1j * omega[low, None] * delays_s)
+        both = np.vstack([turned.real, turned.imag])
+        left += np.sum(both**2, axis=0) - np.sum((basis.T @ both) ** 2, axis=0)
+    return left
+
+
+def _of_half_the_band(found: Found, pose: Pose) -> str:
+    """Return that the delay is another one in the lower half of the band, or an empty text."""
+    seen = [one.observation for one in found.solution.problems]
+    halves = []
+    for one in seen:
+        low_hz, high_hz = one.grid.band_hz
+        highest_hz = max(0.5 * high_hz, 2.0 * low_hz)
+        lines = np.searchsorted(one.grid.line, highest_hz * one.grid.duration_s, side="right")
+        halves.append(one.part(slice(int(lines))))
+    try:
+        half = solve(halves, delayed(pose), np.append(found.solution.values[:-1], 0.0))
+    except ValueError as error:
+        return f"of the lower half of the band, {error}"
+    # What is left of it where the torque was moved by it already.
+    moved_s = found.delay_s - float(found.solution.values[-1])
+    half_s, half_error_s = moved_s + float(half.values[-1]), float(half.se[-1])
+    allowed_s = SIGNIFICANT * float(np.hypot(found.error_s, half_error_s))
+    if abs(half_s - found.delay_s) <= max(allowed_s, SAME_S + SAME_SHARE * abs(found.delay_s)):
+        return ""
+    return (
+        f"in the lower half of the band it is {1e3 * half_s:.3g} ms; a delay is the same at all "
+        "frequencies, a soft cuff between drive and joint is not"
+    )
+
+
+def _of_terms(plain: Sequence[Observation], found: Found, pose: Pose) -> str:
+    """Return that a term explains the torque as well as the delay, or an empty text."""
+    joint = found.solution.values[:3]
+    best, name = -np.inf, ""
+    for term, inner in _rivals(float(joint[2])):
+        begin = np.append(start_of(plain), np.zeros(_columns(term, inner)))
+        try:
+            rival = solve(plain, beside(pose, term, inner), begin)
+        except ValueError:
+            continue
+        if likelihood(rival) > best:
+            best, name = likelihood(rival), term.label
+    better_by = best - likelihood(found.solution)
+    if better_by <= -CLEAR:
+        return ""
+    than = "explains it better" if better_by > CLEAR else "explains it as well"
+    return (
+        f"{name} {than}, by {better_by:.2g} of the log-likelihood; `rigidimeter model --compare` "
+        "fits such terms"
+    )
+
+
+def _rivals(stiffness_nm_rad: float) -> Iterator[tuple[Term, Array]]:
+    for term in TERMS:
+        if term.name == "friction":
+            yield term, term.first[0]
+        elif term.muscle:
+            yield from ((term, np.array([delay_s, 0.0])) for delay_s in REFLEXES_S)
+    for ratio in CUFF_RATIOS:
+        give = 1 / (ratio * abs(stiffness_nm_rad))
+        yield from ((CUFF, np.array([give, lag_s, 0.0])) for lag_s in CUFF_LAGS_S)
+
+
+def _columns(term: Term, inner: Array) -> int:
+    return 1 if term.bent is None else 1
+
+
+def beside(pose: Pose, term: Term, inner: Array) -> Pose:
+    """Return the problems with the columns of a term as further parameters."""
+
+    def with_term(observations: Sequence[Observation], values: Array) -> list[Problem]:
+        joint, problems = values[:3], []
+        own = pose(observations, joint)
+        caused = all_caused(observations, joint) if observations[0].cause is not None else None
+        for place, one in enumerate(own):
+            seen, grid = one.observation, one.observation.grid
+            turn = 1j * grid.omega_rad_s[:, None] ** np.arange(3)
+            measured = Motion(grid, *seen.coarse, one.regressors, one.target[:, None] * turn, joint)
+            motions = [measured, measured]
+            if caused is not None:
+                answered = (one.instruments @ joint)[:, None] * turn
+                motions[0] = Motion(
+                    grid, *caused[place].coarse, one.instruments, answered, joint, False
+                )
+            columns = [term.columns(motion, inner)[:1].T for motion in motions]
+            if term.bent is not None:
+                motions = [term.bent(motion, inner) for motion in motions]
+            problems.append(
+                one._replace(
+                    instruments=np.hstack([motions[0].lines, columns[0]]),
+                    regressors=np.hstack([motions[1].lines, columns[1]]),
+                )
+            )
+        return problems
+
+    return with_term

@@ -1,0 +1,541 @@
+"""The methods: what each observes and solves, what its error is beside noise, and its fits.
+
+Least squares (``bandlimited``). The measured motion is its own instrument. Torque u of the subject
+comes back by the loop as motion H u and pulls the estimate by
+
+    b = (Σ Re(Xᴴ X)/S)⁻¹ Σ Re(H*) |u|²/S
+
+Where S is that of u this is of the second order in the standard error, whatever the size of u. With
+u = y − X (p̂ − b) both sides depend on b alone, found by iteration from b = 0.
+
+Instrumental variables (``iv``). The instruments are the motion that the perturbation alone causes
+(`observation`), which carries nothing of the subject. At the lines of a periodic perturbation alone
+(``spectral``) the lines between hold nothing but noise and set S.
+
+Another drive that explains the velocity as well gives other parameters. The largest change is δ;
+where that is more than a tenth of the parameter, what the drive says is itself uncertain, its sign
+included, and δ is at least twice what the drive changes. Both ends of an interval are further out
+by δ and by b; neither becomes smaller by pooling.
+
+Epochs of one condition share instruments and the shape of their noise: the pooled estimate comes
+first. What an epoch says of J, B and K is its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from rigidimeter.analysis.estimate_anew.checks import found
+from rigidimeter.analysis.estimate_anew.drive import Drive, ticks_hz
+from rigidimeter.analysis.estimate_anew.grid import Array, Complex
+from rigidimeter.analysis.estimate_anew.observation import LEAST, Caused, Observation
+from rigidimeter.analysis.estimate_anew.signals import angle_range_rad
+from rigidimeter.analysis.estimate_anew.solve import (
+    Pose,
+    Problem,
+    Solution,
+    of_fit,
+    on_lines,
+    shortest,
+    solve,
+    solve_once,
+    sums,
+)
+from rigidimeter.analysis.estimate_anew.stretches import after_fit, unusable
+from rigidimeter.core.findings import Effect, Finding
+from rigidimeter.core.records import Activity, Channel, Epoch, Fit
+from rigidimeter.core.settings import Settings
+from rigidimeter.model import Loop, OpenLoop
+
+WORST_R_SQUARED = -10.0
+"""A subject who pushes may turn R² negative; one far below says that a channel is wrong."""
+
+SHARED_FROM = 4
+"""From so many epochs on, they share the shape of their noise."""
+
+DEPENDS = 0.1
+"""A parameter that another drive changes by more than this share depends on the drive."""
+
+PULL_ITERATIONS, PULL_DAMPING, PULL_SETTLED, PULL_MOST = 50, 0.5, 1e-3, 1e3
+"""A step of less than the third, as a share of every parameter, ends the search for b; so does a
+b of so many times a parameter, as the last says."""
+
+
+class Ready(NamedTuple):
+    """An epoch ready to be fitted.
+
+    Attributes
+    ----------
+    epoch : Epoch
+        Screened, on one clock.
+    settings : Settings
+    drive : Drive or None
+        Of its recording.
+    obstacle : str
+        Why no method can fit it, or an empty text.
+    activity : Activity or None
+        What the EMG shows; None without EMG.
+    with_active : Epoch or None
+        With the stretches that are left out for an active muscle; None where none is.
+    """
+
+    epoch: Epoch
+    settings: Settings
+    drive: Drive | None = None
+    obstacle: str = ""
+    activity: Activity | None = None
+    with_active: Epoch | None = None
+
+    def moved(self, delay_s: float) -> Ready:
+        """Return it with its torque this much earlier."""
+        whole = self.with_active and torque_earlier(self.with_active, delay_s)
+        return self._replace(epoch=torque_earlier(self.epoch, delay_s), with_active=whole)
+
+
+def torque_earlier(epoch: Epoch, delay_s: float) -> Epoch:
+    """Return the epoch with its torque this much earlier."""
+    torque = epoch.channels.get("torque_nm")
+    if torque is None or delay_s == 0.0:
+        return epoch
+    earlier = Channel(torque.name, torque.time_s - delay_s, torque.values)
+    return replace(epoch, channels={**epoch.channels, torque.name: earlier})
+
+
+FitTogether = Callable[[Sequence[Ready], float | None], Fit]
+"""From epochs, and J where it is held, to one fit of all; ValueError says why there is none."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """An estimator of J, B and K: a pose at the lines, or a function of its own.
+
+    Parameters
+    ----------
+    name : str
+        As `--method` takes it.
+    title : str
+        What it does, in a few words.
+    needs : tuple of str
+        The channels it needs besides torque and a measured motion. A method that needs
+        `perturbation_nm` is taken for one that voluntary torque does not bias.
+    methods_text : str
+        How the estimates were made, for a methods section: completes "J, B and K were estimated".
+    pose : Pose, optional
+        Makes the linear problems at the lines.
+    periodic : bool
+        At the lines of a periodic perturbation alone.
+    fit : FitTogether, optional
+        Of a method that has no pose.
+    references : tuple of str
+        Keys of `analysis.report.references` that the methods text cites.
+    intervals_text, pooled_text : str
+        What the intervals hold for, and those of the pooled estimates.
+    by_noise : bool
+        Whether each frequency counts by its noise, and what torque of the subject does to least
+        squares by the loop is in the intervals.
+    as_recorded : bool
+        Fit the channels as they are, without correcting the delay of the torque.
+    in_sensitivity : bool
+        Whether every study is analysed by it, beside the method chosen.
+    """
+
+    name: str
+    title: str
+    needs: tuple[str, ...]
+    methods_text: str
+    pose: Pose | None = None
+    periodic: bool = False
+    fit: FitTogether | None = None
+    references: tuple[str, ...] = ()
+    intervals_text: str = "Intervals are those that the method gives"
+    pooled_text: str = "Those of all epochs together are its own too"
+    by_noise: bool = False
+    as_recorded: bool = False
+    in_sensitivity: bool = False
+
+    @property
+    def uses_perturbation(self) -> bool:
+        """Whether the perturbation is the instrument, so that voluntary torque does not bias it."""
+        return "perturbation_nm" in self.needs
+
+
+def direct(observations: Sequence[Observation], values: Array) -> list[Problem]:
+    """Return the problems of least squares.
+
+    Noise of the motion sensor must not be its own instrument: on every second line the motion is
+    that of the even samples and the instrument that of the odd ones, on the others the reverse.
+    """
+    del values  # they do not depend on the parameters
+    problems = []
+    for one in observations:
+        motion = instruments = one.motion
+        if one.noise is not None:
+            apart = one.noise * np.where(one.grid.line % 2, 1.0, -1.0)[:, None]
+            motion, instruments = one.motion + apart, one.motion - apart
+        problems.append(Problem(instruments, motion, one.torque_nm, one))
+    return problems
+
+
+def instrumental(observations: Sequence[Observation], values: Array) -> list[Problem]:
+    """Return the problems with what the perturbation causes at J, B and K as the instruments."""
+    return [
+        Problem(one.of_lines(caused.lines), one.motion, one.torque_nm, one)
+        for one, caused in zip(observations, all_caused(observations, values), strict=True)
+    ]
+
+
+def all_caused(observations: Sequence[Observation], joint: Array) -> list[Caused]:
+    """Return what the perturbation causes in each; epochs that share it are simulated once."""
+    causes = [one.cause for one in observations]
+    made = {id(one): one.at(joint[:3]) for one in dict.fromkeys(causes) if one is not None}
+    return [made[id(one)] for one in causes]
+
+
+def excited(observations: Sequence[Observation], values: Array) -> list[Problem]:
+    """Return `instrumental` at the excited lines: the others show the noise alone."""
+    return [
+        one._replace(instruments=one.instruments * one.observation.excited[:, None])
+        for one in instrumental(observations, values)
+    ]
+
+
+def holding(pose: Pose, inertia_kg_m2: float) -> Pose:
+    """Return the problems of B and K alone (Eq. 7)."""
+
+    def held(observations: Sequence[Observation], values: Array) -> list[Problem]:
+        return [
+            one._replace(
+                instruments=one.instruments[:, 1:],
+                regressors=one.regressors[:, 1:],
+                target=one.target - inertia_kg_m2 * one.regressors[:, 0],
+                held=(inertia_kg_m2,),
+            )
+            for one in pose(observations, np.append(inertia_kg_m2, values))
+        ]
+
+    return held
+
+
+def start_of(observations: Sequence[Observation]) -> Array:
+    """Return where an iteration begins: J, B and K with every line alike, shape (3,)."""
+    own = [one._replace(instruments=one.regressors) for one in direct(observations, LEAST)]
+    return np.maximum(shortest(*sums(own)), 10 * LEAST)
+
+
+def by_other_drives(solution: Solution) -> Array:
+    """Return δ, shape (p,)."""
+    values = solution.values
+    count = max(len(one.observation.changes) for one in solution.problems)
+    moved = []
+    for place in range(count):
+        gram, moment = solution.gram.copy(), solution.gram @ values
+        for one, power in zip(solution.problems, solution.powers, strict=True):
+            if place >= len(one.observation.changes):
+                continue
+            change, held = one.observation.changes[place], len(one.held)
+            target = -(change[:, :held] @ np.array(one.held)) if held else 0 * one.target
+            other = one._replace(regressors=change[:, held:], target=target)
+            more = sums([other], [power])
+            gram, moment = gram + more[0], moment + more[1]
+        moved.append(np.abs(shortest(gram, moment) - values))
+    if len(moved) < 2:
+        return np.zeros(values.size)
+    most = np.max(moved[1:], axis=0)
+    return np.where(most > DEPENDS * np.abs(values), np.maximum(most, 2 * moved[0]), most)
+
+
+def loop_pull(
+    problems: Sequence[Problem], powers: Sequence[Array], values: Array, inverse: Array
+) -> Array:
+    """Return b of least squares, shape (p,); NaN where no joint fits recording and loop.
+
+    It is 0 for instruments, and where no loop is known, so that b is not either.
+    """
+    bias = np.zeros(values.size)
+    observations = [one.observation for one in problems]
+    if any(one.cause is not None or one.loop is None for one in observations):
+        return bias
+    opened = [_opened(one) for one in observations]
+    for _ in range(PULL_ITERATIONS):
+        moment = np.zeros(values.size)
+        for one, power, loop in zip(problems, powers, opened, strict=True):
+            joint = np.concatenate([np.array(one.held), values - bias])
+            J, B, K = np.maximum(joint, LEAST).tolist()
+            back = loop.motion_per_torque((J, B, K)).real[len(one.held) :]
+            moment += back @ (np.abs(one.residual(values - bias)) ** 2 / power)
+        step = inverse @ moment - bias
+        bias = bias + PULL_DAMPING * step
+        if not np.all(np.abs(bias) < PULL_MOST * np.abs(values)):
+            break
+        if np.all(np.abs(step) < PULL_SETTLED * np.abs(values)):
+            return bias
+    return np.full(values.size, np.nan)
+
+
+def _opened(observation: Observation) -> OpenLoop:
+    loop, grid = observation.loop, observation.grid
+    assert loop is not None  # else there is no b
+    spacing_hz = float(f"{1 / grid.duration_s:.9g}")
+    return _opened_at(loop, int(grid.line[0]), grid.line.size, spacing_hz)
+
+
+@lru_cache(maxsize=8)
+def _opened_at(loop: Loop, first: int, count: int, spacing_hz: float) -> OpenLoop:
+    highest_hz = 0.49 * loop.rig.tick_rate_hz
+    return loop.at_frequency(np.minimum(spacing_hz * np.arange(first, first + count), highest_hz))
+
+
+class Fitted(NamedTuple):
+    """What a method makes of epochs.
+
+    Attributes
+    ----------
+    fits : list of Fit
+        One for each epoch, in order; one that could not be fitted has failed, with the reason.
+    pooled : list of Fit
+        One for each condition with an epoch that counts; of several one for all of them together,
+        without a condition.
+    shared : dict of str to Solution
+        What the epochs of each condition share, where they were fitted at their lines; of all of
+        them without a condition.
+    """
+
+    fits: list[Fit]
+    pooled: list[Fit]
+    shared: dict[str, Solution]
+
+
+def fit_epochs(
+    method: Method,
+    epochs: Sequence[Ready],
+    observed: Sequence[Observation | str],
+    inertia_kg_m2: float | None = None,
+    *,
+    pooled: bool = True,
+) -> Fitted:
+    """Fit J, B and K, or B and K at a given inertia, to every epoch and to each condition.
+
+    Parameters
+    ----------
+    method : Method
+    epochs : sequence of Ready
+    observed : sequence of Observation or str
+        The epochs at their lines, or why they cannot be; unused by a method without a pose.
+    inertia_kg_m2 : float, optional
+        J that is held.
+    pooled : bool
+        Whether the fits of several epochs together are wanted.
+    """
+    fits: list[Fit] = [_failed(one.epoch, method, "") for one in epochs]
+    together: list[Fit] = []
+    shared: dict[str, Solution] = {}
+    conditions = dict.fromkeys(one.epoch.condition for one in epochs)
+    pose = _pose(method, inertia_kg_m2)
+    for condition in conditions:
+        places = [i for i, one in enumerate(epochs) if one.epoch.condition == condition]
+        for i, fit in zip(places, _alone(method, pose, epochs, observed, places, shared, inertia_kg_m2), strict=True):  # fmt: skip
+            fits[i] = fit
+    wanted = [*conditions, *([""] if len(conditions) > 1 else [])]
+    for condition in wanted if pooled else ():
+        members = [
+            i for i, one in enumerate(epochs)
+            if one.epoch.closed.included and not one.obstacle
+            and condition in ("", one.epoch.condition)
+        ]  # fmt: skip
+        fit = _pooled(method, pose, epochs, observed, members, shared, condition, inertia_kg_m2)
+        if fit is not None:
+            together.append(replace(fit, epoch="pooled", condition=condition))
+    return Fitted(fits, together, shared)
+
+
+def _pose(method: Method, inertia_kg_m2: float | None) -> Pose | None:
+    if method.pose is None or inertia_kg_m2 is None:
+        return method.pose
+    return holding(method.pose, inertia_kg_m2)
+
+
+def _alone(
+    method: Method,
+    pose: Pose | None,
+    epochs: Sequence[Ready],
+    observed: Sequence[Observation | str],
+    places: Sequence[int],
+    shared: dict[str, Solution],
+    inertia_kg_m2: float | None,
+) -> list[Fit]:
+    """Return the fits of the epochs of a condition; what they share is added to `shared`."""
+    if pose is None:
+        return [_by_function(method, [epochs[i]], inertia_kg_m2) for i in places]
+    seen = {i: one for i in places if isinstance(one := observed[i], Observation)}
+    good = [i for i in seen if epochs[i].epoch.closed.included]
+    begin = start_of([seen[i] for i in (good or seen)]) if seen else np.empty(0)
+    begin = begin if inertia_kg_m2 is None else begin[1:]
+    whole: Solution | None = None
+    if good:
+        try:
+            whole = solve([seen[i] for i in good], pose, begin)
+            shared[epochs[places[0]].epoch.condition] = whole
+        except ValueError:
+            whole = None  # as each epoch will say
+    # Few epochs do not know the shape of their noise together any better than each alone.
+    known = whole if len(good) >= SHARED_FROM else None
+    found = []
+    for i in places:
+        one = observed[i]
+        if not isinstance(one, Observation):
+            found.append(_failed(epochs[i].epoch, method, one))
+            continue
+        try:
+            if known is not None and i in good:
+                at = good.index(i)
+                solution = solve_once([known.problems[at]], [known.powers[at]])
+            else:
+                powers = None
+                if known is not None:
+                    first = known.problems[0].observation.grid
+                    powers = [on_lines(one.grid, first, known.powers[0])]
+                solution = solve([one], pose, begin if whole is None else whole.values, powers)
+            found.append(_of_solution(method, [one], solution, inertia_kg_m2))
+        except ValueError as error:
+            found.append(_failed(epochs[i].epoch, method, str(error)))
+    return found
+
+
+def _pooled(
+    method: Method,
+    pose: Pose | None,
+    epochs: Sequence[Ready],
+    observed: Sequence[Observation | str],
+    places: Sequence[int],
+    shared: dict[str, Solution],
+    condition: str,
+    inertia_kg_m2: float | None,
+) -> Fit | None:
+    if pose is None:
+        fit = _by_function(method, [epochs[i] for i in places], inertia_kg_m2) if places else None
+        return fit if fit is not None and fit.n_samples else None
+    seen = [one for i in places if isinstance(one := observed[i], Observation)]
+    if condition not in shared and seen:
+        begin = start_of(seen)
+        try:
+            shared[condition] = solve(seen, pose, begin if inertia_kg_m2 is None else begin[1:])
+        except ValueError:
+            return None
+    if condition not in shared:
+        return None
+    fit = _of_solution(method, seen, shared[condition], inertia_kg_m2)
+    return fit if condition else replace(fit, findings=())
+
+
+def _by_function(method: Method, epochs: Sequence[Ready], inertia_kg_m2: float | None) -> Fit:
+    assert method.fit is not None  # it has no pose
+    first = epochs[0].epoch
+    sound = [one for one in epochs if not one.obstacle]
+    if not sound:
+        return _failed(first, method, epochs[0].obstacle)
+    try:
+        fit = method.fit(sound, inertia_kg_m2)
+    except ValueError as error:
+        return _failed(first, method, str(error))
+    source = ", ".join(dict.fromkeys(one.epoch.source for one in sound))
+    outcome = after_fit(first, fit.r_squared, fit.condition_number)
+    named = {"source": source, "epoch": first.label, "condition": first.condition}
+    return replace(fit, **named, method=method.name, outcome=outcome)
+
+
+def _failed(epoch: Epoch, method: Method, reason: str) -> Fit:
+    return Fit(epoch.source, epoch.label, epoch.condition, method.name, unusable(epoch, reason))
+
+
+def _of_solution(
+    method: Method,
+    observations: Sequence[Observation],
+    solution: Solution,
+    inertia_kg_m2: float | None,
+) -> Fit:
+    """Return a solution as it is recorded, named after the first of its epochs."""
+    epoch = observations[0].epoch
+    elsewhere = by_other_drives(solution)
+    pulled = loop_pull(solution.problems, solution.powers, solution.values, solution.inverse)
+    numbers = of_fit(
+        solution.values,
+        solution.covariance,
+        solution.degrees,
+        np.sqrt(np.diag(solution.bound)),
+        inertia_kg_m2,
+        elsewhere + np.nan_to_num(np.abs(pulled)),
+    )
+    left = total = moved = 0.0
+    samples = sum(one.grid.samples for one in observations)
+    for one in observations:
+        # Parseval: the window's energy is spread over all samples.
+        per_line = 2 * one.grid.samples / (one.grid.time_s.size * one.grid.energy)
+        left += per_line * _power(one.torque_nm - one.motion @ numbers["value"])
+        total += per_line * _power(one.torque_nm)
+        moved += per_line * _power(one.motion[:, 2])
+    r_squared = 1.0 - left / total
+    ranges_rad = [angle_range_rad(one.epoch, one.grid.time_s) for one in observations]
+    return Fit(
+        source=", ".join(dict.fromkeys(one.epoch.source for one in observations)),
+        epoch=epoch.label,
+        condition=epoch.condition,
+        method=method.name,
+        outcome=after_fit(
+            epoch, r_squared, solution.condition_number, least_r_squared=WORST_R_SQUARED
+        ),
+        r_squared=r_squared,
+        vaf_percent=100.0 * r_squared,
+        condition_number=solution.condition_number,
+        residual_sd_nm=float(np.sqrt(left / samples)),
+        n_samples=samples,
+        band_hz=observations[0].grid.band_hz,
+        angle_rms_rad=float(np.sqrt(moved / samples)),
+        angle_range_rad=max((r for r in ranges_rad if np.isfinite(r)), default=np.nan),
+        findings=between_samples(observations[0], solution, elsewhere),
+        **numbers,
+    )
+
+
+def between_samples(
+    observation: Observation, solution: Solution, elsewhere: Array
+) -> tuple[Finding, ...]:
+    """Return the finding of a parameter that depends on what the drive does between the samples.
+
+    Its δ is more than a share of the parameter, and more than its standard error.
+    """
+    settings, known, held = observation.settings, observation.drive_known, 3 - solution.values.size
+    channels, most = observation.epoch.channels, settings.diagnostics.max_between_samples_percent
+    if not known and (observation.cause is not None or "velocity_command_rad_s" in channels):
+        return ()  # the check of the drive says more
+    share = np.append(np.zeros(held), 100.0 * elsewhere / np.abs(solution.values))
+    shows = np.where(np.append(np.zeros(held), elsewhere > solution.se), share, 0.0)
+    # Of a drive that is not known J says most: it is what the torque does not see between samples.
+    about = int(np.argmax(shows)) if known else 0
+    if shows[about] <= most:
+        return ()
+    J, B, K = share.tolist()
+    return (
+        found(
+            "between_samples",
+            settings.diagnostics,
+            float(share[about]),
+            most,
+            condition=observation.epoch.condition,
+            effect=Effect((J, B, K)),
+            facts={
+                "symbol": "JBK"[about],
+                "bandwidth_hz": settings.rig.drive_bandwidth_hz,
+                "ticks_hz": ticks_hz(settings.rig, channels["torque_nm"]),
+            },
+            variant="" if known else "of_settings",
+        ),
+    )
+
+
+def _power(lines: Complex) -> float:
+    return float(np.vdot(lines, lines).real)
