@@ -93,35 +93,28 @@ def screened(epoch: Epoch, settings: Settings) -> Epoch:
     if not fitted_channels(epoch):
         return epoch
     found = [one for one in _bad(epoch, settings.diagnostics) if levels.of(one.check) == "exclude"]
-    return leaving_out(epoch, found, settings)
+    return leaving_out(epoch, found, settings)[0]
 
 
-def leaving_out(epoch: Epoch, found: Sequence[LeftOut], settings: Settings) -> Epoch:
-    """Return a bridged epoch without some stretches too; as it is where it must keep them."""
-    if not found or why_kept(epoch, found, settings):
-        return epoch
-    return bridged(_without(epoch, found))
+def leaving_out(epoch: Epoch, found: Sequence[LeftOut], settings: Settings) -> tuple[Epoch, str]:
+    """Return a bridged epoch without some stretches too; as it is, and why, where they stay in.
 
-
-def why_kept(epoch: Epoch, found: Sequence[LeftOut], settings: Settings) -> str:
-    """Return why some stretches cannot be left out too, or an empty text.
-
-    That would be more than `max_left_out_percent` of the epoch, or leave less than can be fitted.
+    They do where that would take more than `max_left_out_percent` of it, or leave less than can be
+    fitted.
     """
-    without, trim_s = _without(epoch, found), settings.estimation.trim_s
+    if not found:
+        return epoch, ""
+    without = replace(epoch, left_out=(*epoch.left_out, *sorted(found)))
+    trim_s, most_percent = settings.estimation.trim_s, settings.diagnostics.max_left_out_percent
     before_s, left_s = used_s(epoch, trim_s), used_s(without, trim_s)
     taken_percent = 100.0 * (before_s - left_s) / before_s if before_s > 0 else 100.0
-    most_percent = settings.diagnostics.max_left_out_percent
+    why = too_little(without, settings.estimation)
     if taken_percent > most_percent:
-        return (
+        why = (
             f"with {trim_s:g} s on each side that would take {taken_percent:.0f} % of the epoch "
             f"(at most {most_percent:g} %)"
         )
-    return too_little(without, settings.estimation)
-
-
-def _without(epoch: Epoch, found: Sequence[LeftOut]) -> Epoch:
-    return replace(epoch, left_out=(*epoch.left_out, *sorted(found)))
+    return (epoch, why) if why else (bridged(without), "")
 
 
 def bridged(epoch: Epoch) -> Epoch:
@@ -142,8 +135,7 @@ def bridged(epoch: Epoch) -> Epoch:
         kept = sound(epoch, one.time_s)
         if np.any(kept):  # else there is nothing to hang a line on
             line = np.interp(one.time_s, one.time_s[kept], one.values[kept])
-            values = np.where(kept, one.values, line)
-            channels[one.name] = Channel(one.name, one.time_s, values)
+            channels[one.name] = replace(one, values=np.where(kept, one.values, line))
     return replace(epoch, channels=channels)
 
 
@@ -166,7 +158,7 @@ def _evenly(channel: Channel, lost: Sequence[LeftOut]) -> Channel:
     place = np.interp(np.arange(first[-1] + 1), first, rows)
     time_s, line = (np.interp(place, rows, one) for one in (channel.time_s, channel.values))
     held = channel.values[place.astype(np.intp)]
-    return Channel(channel.name, time_s, held if channel.name == CAUSES[1] else line)
+    return replace(channel, time_s=time_s, values=held if channel.name == CAUSES[1] else line)
 
 
 def longest_part(epoch: Epoch) -> Epoch:
@@ -191,7 +183,7 @@ def longest_part(epoch: Epoch) -> Epoch:
     for one in fitted_channels(epoch):
         # The ends of a stretch are left out with it.
         rows = (one.time_s >= low_s) & (one.time_s <= high_s) & sound(epoch, one.time_s)
-        channels[one.name] = Channel(one.name, one.time_s[rows], one.values[rows])
+        channels[one.name] = replace(one, time_s=one.time_s[rows], values=one.values[rows])
     return replace(epoch, channels=channels, left_out=())
 
 
