@@ -92,7 +92,7 @@ between them, in so many steps, leave this share of what stairs leave, the stair
 ERRORS, BLOCKS = 2.0, 32
 """A delay must be longer than so many standard errors, and rivals are so many away; they are those
 of sums over so many stretches, whatever the colour of the noise."""
-MOST_STEPS, ENOUGH = 20, 1e-6  # of a search, and the last share of the power to gain
+MOST_STEPS, ENOUGH = 20, 1e-4  # of a search, and the last share of the power to gain
 STEP, LONG, CURVED = 1e-4, 5.0, 2.0
 """Of a coordinate, for its slope; the longest move of one; a move that changes the velocity by more
 times what the slopes say is halved."""
@@ -287,15 +287,13 @@ def _identified(
     if record is None:
         return []
     found = _climbed(record, start)
-    best = min(found, key=_power)
-    if best.power > QUIET**2 and (rubbed := _rubbed(best)) is not None:
-        found = _climbed(rubbed.record, rubbed.model)
     times = AS_GOOD if len(found[0].record.inputs) == 1 else RUBBED
-    found = [one for one in found if _fastest(one) < SEEN]
+    found = [one for one in found if _fastest(one) < SEEN]  # the samples show every pole
     if not found:
         return []
     best = min(found, key=_power)
-    if epoch.ticks is None and best.power > QUIET**2 and _between_lines(best) < STAIRS:
+    slowly = epoch.ticks is None and best.power > QUIET**2 and _explainable(best) > 0.5 * STAIRS
+    if slowly and _between_lines(best) < STAIRS:
         return []
     chosen = next(one for one in found if one.power <= times * best.power + UNSEEN**2)
     if chosen.power > MISFIT**2 or not 0.5 < chosen.model.gain < 2.0:
@@ -332,29 +330,33 @@ def _climbed(record: _Record, start: DriveModel) -> list[_Fitted]:
     Each with two zeros fewer than poles (it smooths the steps of the command) and with one fewer
     (its acceleration jumps at them). One pole more where the best has a delay: a lag looks like it.
     """
-    regressed = _regressed(record)
-    speeds = [] if regressed else [2.0**-n for n in range(6)]
+    rubs = len(record.inputs) > 1
+    regressed = [] if rubs else _regressed(record)
+    speeds = [1.0] if rubs or regressed else [2.0**-n for n in range(6)]
     models = [replace(start, poles_rad_s=tuple(x * p for p in start.poles_rad_s)) for x in speeds]
     found: list[_Fitted] = []
     enough = False
-    for poles in range(1, MOST_POLES + 1):
-        begins = [
-            _coordinates(one, record.interval_s, poles)
-            for one in (
-                start,
-                *models,
-                *regressed[poles - 1 : poles],
-                *(x.model for x in found[-2:]),
-            )
-        ]
+    for poles in range(1 + rubs, MOST_POLES + 1):
+        before = min((one.power for one in found), default=1.0)
+        near = [*models, *regressed[poles - 1 : poles], *(one.model for one in found[-2:])]
+        begins = [_coordinates(one, record.interval_s, poles) for one in near]
         for zeros in range(max(poles - 2, 0), poles):
             found.append(_best(record, begins, zeros))
             begins.append(found[-1].place[:-1])
         best = min(found, key=_power)
+        if rubs:
+            if poles > 2 and RUBBED * best.power > before:
+                break
+            continue
         spent = _explainable(best) < WORTH
-        if poles > 1 and (enough or (spent and best.place[-1] == 0.0)):
-            break
+        done = poles > 1 and (enough or (spent and best.place[-1] == 0.0))
         enough = spent
+        if best.power > QUIET**2 and (done or poles > 2):
+            least = best.power / (1.0 if done or poles == MOST_POLES else RUBBED)
+            if (rubbed := _rubbed(found[2], least)) is not None:
+                return _climbed(rubbed.record, rubbed.model)
+        if done:
+            break
     return found
 
 
@@ -368,7 +370,7 @@ def _best(record: _Record, begins: Sequence[Array], zeros: int) -> _Fitted:
         return still
     late = [
         _answer(record, np.append(still.place[:-1], ticks), zeros)
-        for ticks in np.geomspace(SHORTEST_TICKS, _longest(record), 12)
+        for ticks in np.geomspace(SHORTEST_TICKS, _longest(record), 8)
     ]
     moved = _searched(record, min(late, key=_power).place, zeros, True)
     shown = 1.0 - ERRORS**2 / record.measured.size if len(record.inputs) == 1 else 1.0 / RUBBED
@@ -382,7 +384,7 @@ def _searched(record: _Record, begin: Array, zeros: int, delayed: bool) -> _Fitt
     """
     one, damping = _answer(record, begin, zeros), 1e-3
     for _ in range(MOST_STEPS):
-        along = _slopes(one)[: begin.size - 1 + delayed]
+        along = _slopes(one, begin.size - 1 + delayed)
         table = one.table / (np.linalg.norm(one.table, axis=1, keepdims=True) + TINY)
         along = along - np.linalg.lstsq(table @ table.T, table @ along.T)[0].T @ table
         gram, down = along @ along.T, along @ one.left
@@ -394,7 +396,7 @@ def _searched(record: _Record, begin: Array, zeros: int, delayed: bool) -> _Fitt
             tried = _answer(record, before.place + step, zeros)
             one = tried if tried.power < before.power else before
             damping *= 0.1 if one is tried else 10.0
-        if before.power - one.power <= ENOUGH * before.power:
+        if before.power - one.power <= ENOUGH * (before.power + UNSEEN**2):
             break
     return one
 
@@ -414,13 +416,14 @@ def _answer(record: _Record, place: Array, zeros: int) -> _Fitted:
     return _Fitted(record, place, zeros, numerator, table, left, float(left @ left) / left.size)
 
 
-def _slopes(one: _Fitted) -> Array:
-    """Return how the velocity changes along each coordinate of the place, shape (p, n)."""
+def _slopes(one: _Fitted, count: int) -> Array:
+    """Return how the velocity changes along coordinates of the place, shape (count, n)."""
     explained = one.numerator @ one.table
-    steps = STEP * np.eye(one.place.size)
-    return (
-        np.stack([_velocity(one, one.place + by, one.numerator) - explained for by in steps]) / STEP
-    )
+    moved = [
+        _velocity(one, one.place + by, one.numerator)
+        for by in STEP * np.eye(one.place.size)[:count]
+    ]
+    return (np.stack(moved) - explained) / STEP
 
 
 def _velocity(one: _Fitted, place: Array, numerator: Array) -> Array:
@@ -433,18 +436,18 @@ def _modes(record: _Record, place: Array, zeros: int) -> tuple[Array, Array]:
     """Return what each term of a numerator has of each mode, and the modes, shape (m, n)."""
     poles = _poles(place[:-1], record.interval_s)
     delay_s, count = float(place[-1]) * record.interval_s, place.size - 1
-    modes, parts = [], []
-    # Friction acts behind the controller, whose zeros are not its own.
-    for which, own in enumerate((zeros, count - 1)[: len(record.inputs)]):
-        rows = []
-        for pole, shape in zip(poles, _shapes(poles, own), strict=True):
+    terms = (zeros + 1, count)[: len(record.inputs)]  # friction acts behind the controller's zeros
+    weights, modes = np.zeros((sum(terms), count * len(terms))), []
+    for which, own in enumerate(terms):
+        rows = weights[zeros + 1 :] if which else weights[: zeros + 1]
+        for pole, shape in zip(poles, _shapes(poles, own - 1), strict=True):
             mode = _mode(record, which, pole, 0.0 if which else delay_s)
-            modes += [mode.real, mode.imag] if pole.imag else [mode.real]
-            rows += [2 * shape.real, -2 * shape.imag] if pole.imag else [shape.real]
-        parts.append(np.array(rows).T)
-    if len(parts) == 1:
-        return parts[0], np.stack(modes)
-    return scipy.linalg.block_diag(*parts), np.stack(modes)
+            rows[:, len(modes)] = shape.real * (2 if pole.imag else 1)
+            modes.append(mode.real)
+            if pole.imag:
+                rows[:, len(modes)] = -2 * shape.imag
+                modes.append(mode.imag)
+    return weights, np.stack(modes)
 
 
 @lru_cache(maxsize=64)
@@ -585,16 +588,17 @@ def _regressed(record: _Record) -> list[DriveModel]:
     return found
 
 
-def _rubbed(one: _Fitted) -> _Fitted | None:
-    """Return a drive with friction, where the sign of its velocity explains what another leaves."""
-    place = np.append(_coordinates(one.model, one.record.interval_s, 2), 0.0)
-    rubbed = one
-    for _ in range(SIGNS):
-        sign = _sign(rubbed)
+def _rubbed(one: _Fitted, least: float) -> _Fitted | None:
+    """Return a drive with friction, where the sign of its velocity explains what others leave."""
+    for again in range(SIGNS):
+        sign = _sign(one)
         record = replace(one.record, inputs=(one.record.inputs[0], (sign, _lengths_s(sign))))
-        rubbed = _searched(record, place, 1, False)
-        place = rubbed.place
-    return rubbed if rubbed.power < RUBS * one.power else None
+        one = _answer(record, np.append(one.place[:-1], 0.0), one.zeros)
+        step, _, slopes = _scatter(one)
+        if not again and np.mean((one.left + step @ slopes) ** 2) > RUBS * least:
+            return None
+        one = _searched(record, one.place, one.zeros, False)
+    return one if one.power < RUBS * least else None
 
 
 def _sign(one: _Fitted) -> Channel:
@@ -636,7 +640,7 @@ def _scatter(one: _Fitted) -> tuple[Array, Array, Array]:
 
     The covariance is that of the step, s sᵀ with the scatter s of shape (p, blocks).
     """
-    slopes = np.concatenate([_slopes(one), one.table])
+    slopes = np.concatenate([_slopes(one, one.place.size), one.table])
     size = np.linalg.norm(slopes, axis=1)
     size[size == 0] = 1.0
     basis, upper = np.linalg.qr((slopes / size[:, None]).T)
