@@ -5,20 +5,23 @@ off the work of a cycle and turn stiffness into damping. With the delay τ as a 
 
     y = e^(−iωτ) X p        columns e^(−iωτ) X and −iω e^(−iωτ) X p
 
-it is solved for like J, B and K, by the perturbation where that was recorded. Friction, a reflex and
-a soft cuff turn the torque against the motion as a delay does: each is put in its place, and the
+it is solved for like J, B and K, by the perturbation where that was recorded. Friction, a reflex
+and a soft cuff turn the torque against the motion as a delay does: each is put in its place, and the
 torque is moved only if the delay is the likelier of them, by Whittle's likelihood, −Σ log S over
 the lines of all epochs, and is the same in the lower half of the band.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
+from rigidimeter.analysis.estimate_anew.checks import found, half_widths
 from rigidimeter.analysis.estimate_anew.grid import Array
 from rigidimeter.analysis.estimate_anew.methods import (
     Ready,
@@ -28,7 +31,7 @@ from rigidimeter.analysis.estimate_anew.methods import (
     start_of,
     torque_earlier,
 )
-from rigidimeter.analysis.estimate_anew.observation import Observation
+from rigidimeter.analysis.estimate_anew.observation import Observation, no_instrument
 from rigidimeter.analysis.estimate_anew.solve import (
     Pose,
     Problem,
@@ -39,7 +42,8 @@ from rigidimeter.analysis.estimate_anew.solve import (
     sums,
 )
 from rigidimeter.analysis.estimate_anew.terms import CUFF, TERMS, Motion, Term
-from rigidimeter.core.records import Delay, Epoch
+from rigidimeter.core.findings import Effect, Finding
+from rigidimeter.core.records import Delay, Epoch, Fit
 
 MOST_EPOCHS = 12
 """A delay is common to its recording; from so many epochs it is known well enough."""
@@ -139,6 +143,143 @@ def corrected_s(source: str, delays: Sequence[Delay]) -> float:
     return sum(one.delay_s for one in delays if one.source == source and one.corrected)
 
 
+def with_clock_error(
+    epochs: Sequence[Ready],
+    fits: Sequence[Fit],
+    pooled: Sequence[Fit],
+    delays: Sequence[Delay],
+    again: Callable[[Sequence[float]], list[Fit]],
+) -> tuple[list[Fit], list[Fit]]:
+    """Return fits whose errors and intervals contain that of the clocks of torque and motion.
+
+    Torque that is late by δ makes J wrong by −B δ and B by −K δ + J δ ω², of which band and method
+    decide what remains: the epochs are fitted again with the torque moved by the standard error of
+    the offset forth and back. At the ticks the acceleration alone is late, by half a tick with a
+    motor that holds its torque between them: where the drive is not known, that much of a delay
+    that was taken out may have been the acceleration's, and one within it that was not taken out
+    may be all the acceleration's or all the torque's. All epochs of a source share the error.
+
+    Parameters
+    ----------
+    epochs : sequence of Ready
+    fits, pooled : sequence of Fit
+        Of each epoch, and of several.
+    delays : sequence of Delay
+        Where one was corrected, its standard error counts: of two clocks, in place of the offset's.
+    again : callable
+        Fits the epochs with the torque of each so much earlier, in s.
+    """
+    of = {delay.source: delay for delay in delays}
+    sources = [one.epoch.source for one in epochs]
+    own = [of.get(source, Delay(source)) for source in sources]
+    errors_s = np.array([_error_s(one, late) for one, late in zip(epochs, own, strict=True)])
+    if not np.any(errors_s):
+        return list(fits), list(pooled)
+    early, late = again(errors_s.tolist()), again((-errors_s).tolist())
+    by_error = [(a.value - b.value) / 2 for a, b in zip(early, late, strict=True)]
+    by_drive = [
+        _of_drive(one, fit) if delay.corrected else np.zeros(3)
+        for one, fit, delay in zip(epochs, fits, own, strict=True)
+    ]
+    alone = [_widened(fit, both) for fit, *both in zip(fits, by_error, by_drive, strict=True)]
+    changes = [(fits, by_error, sources), (fits, by_drive, sources)]
+    together = [
+        _widened(one, [change for each in changes for change in _of_sources(one, *each)])
+        for one in pooled
+    ]
+    return alone, together
+
+
+def late_torque(observation: Observation, fit: Fit, delay: Delay | None) -> list[Finding]:
+    """Return that a delay which was not taken out moves J, B or K beyond their intervals.
+
+    Moved to its place the torque gains (e^(iωτ) − 1) y, and p̂ gains G⁻¹ Σ Re(Zᴴ (e^(iωτ) − 1) y)/S.
+    Where the perturbation was recorded its cause is known. Where the drive is not known, as much as
+    half a tick of it may be the drive's, which is in the intervals.
+    """
+    if delay is None or delay.corrected or not matters(delay.delay_s, delay.delay_s_se):
+        return []
+    if not no_instrument(observation.epoch):
+        return []
+    problems = direct([observation], fit.value)
+    turn = np.exp(1j * observation.grid.omega_rad_s * delay.delay_s) - 1.0
+    added = [one._replace(target=turn * one.target) for one in problems]
+    bias = -shortest(*sums(added, noise_powers(problems, fit.value)))
+    half, late_ms = half_widths(fit), 1e3 * abs(delay.delay_s)
+    share = float(np.max(np.abs(bias) / half))
+    if not share > 1.0:
+        return []
+    return [
+        found(
+            "torque_delay",
+            observation.settings.diagnostics,
+            late_ms,
+            late_ms / share,
+            condition=fit.condition,
+            effect=Effect.of(bias, fit.value, half),
+            facts={"late_ms": 1e3 * delay.delay_s},
+        )
+    ]
+
+
+def _followed(ready: Ready) -> bool:
+    """Return whether the motion between the samples is that of a known drive and its command."""
+    return ready.drive is not None and "velocity_command_rad_s" in ready.epoch.channels
+
+
+def _error_s(ready: Ready, delay: Delay) -> float:
+    """Return the standard error of the offset between torque and motion, in s."""
+    late_s, error_s = delay.delay_s, delay.delay_s_se
+    if delay.corrected:
+        return error_s
+    most_s = 0.5 / ready.settings.rig.tick_rate_hz + SIGNIFICANT * error_s
+    unknown = matters(late_s, error_s) and 0.0 < late_s < most_s and not _followed(ready)
+    return max(ready.epoch.clock_error_s, late_s / math.sqrt(3.0) if unknown else 0.0)
+
+
+def _of_drive(ready: Ready, fit: Fit) -> Array:
+    """Return what the standard error of half a tick changes; nothing where the drive is known."""
+    if _followed(ready):
+        return np.zeros(3)
+    delay_s = 0.5 / ready.settings.rig.tick_rate_hz / math.sqrt(3.0)
+    _, B, K = fit.value
+    return np.where(fit.se > 0, np.array([B, K, 0.0]) * delay_s, 0.0)
+
+
+def _of_sources(
+    pooled: Fit, alone: Sequence[Fit], changes: Sequence[Array], sources: Sequence[str]
+) -> list[Array]:
+    """Return what the error of each source changes in a pooled fit.
+
+    A pooled fit is nearly the mean of its epochs, each weighted by the inverse of its covariance.
+    """
+    total = np.zeros((3, 3))
+    weighted: dict[str, Array] = {}
+    for one, change, source in zip(alone, changes, sources, strict=True):
+        free = one.se > 0  # an inertia that is held has no error
+        known = np.all(np.isfinite(one.covariance)) and np.all(np.isfinite(change))
+        if pooled.condition in ("", one.condition) and one.outcome.included and known:
+            weight = np.zeros((3, 3))
+            weight[np.ix_(free, free)] = np.linalg.pinv(one.covariance[np.ix_(free, free)])
+            total += weight
+            weighted[source] = weighted.get(source, np.zeros(3)) + weight @ change
+    return [np.linalg.pinv(total) @ one for one in weighted.values()]
+
+
+def _widened(fit: Fit, changes: Sequence[Array]) -> Fit:
+    """Return a fit with changes of one standard error each, which are independent, added."""
+    if not changes or not np.all(np.isfinite(changes)):
+        return fit
+    together = np.sqrt(np.sum(np.square(changes), axis=0))
+    return replace(
+        fit,
+        se=np.hypot(fit.se, together),
+        low=fit.value - np.hypot(fit.value - fit.low, scipy.special.ndtri(0.975) * together),
+        high=fit.value + np.hypot(fit.high - fit.value, scipy.special.ndtri(0.975) * together),
+        covariance=fit.covariance + sum(np.outer(change, change) for change in changes),
+    )
+
+
 def _settled(
     used: Sequence[Ready],
     plain: Sequence[Observation],
@@ -164,9 +305,9 @@ def _settled(
         moved = observed([one.moved(total_s) for one in used])
         solution = solve(moved, delayed(pose), np.append(solution.values[:-1], 0.0))
         left_s, error_s = float(solution.values[-1]), float(solution.se[-1])
-        if abs(left_s) < abs(tried[-1][1]):
-            gone_s = tried[-1][1] - left_s
-            stretch = (total_s - tried[-1][0]) / gone_s if gone_s else 1.0
+        gone_s = tried[-1][1] - left_s
+        if abs(gone_s) > error_s:  # else its slope is noise
+            stretch = (total_s - tried[-1][0]) / gone_s
             stretch = float(np.clip(stretch, -MOST_STRETCH, MOST_STRETCH))
         tried.append((total_s, left_s))
         total_s += stretch * left_s
@@ -283,7 +424,7 @@ def _of_terms(plain: Sequence[Observation], found: Found, pose: Pose) -> str:
     joint = found.solution.values[:3]
     best, name = -np.inf, ""
     for term, inner in _rivals(float(joint[2])):
-        begin = np.append(start_of(plain), np.zeros(_columns(term, inner)))
+        begin = np.append(start_of(plain), 0.0)
         try:
             rival = solve(plain, beside(pose, term, inner), begin)
         except ValueError:
@@ -311,10 +452,6 @@ def _rivals(stiffness_nm_rad: float) -> Iterator[tuple[Term, Array]]:
         yield from ((CUFF, np.array([give, lag_s, 0.0])) for lag_s in CUFF_LAGS_S)
 
 
-def _columns(term: Term, inner: Array) -> int:
-    return 1 if term.bent is None else 1
-
-
 def beside(pose: Pose, term: Term, inner: Array) -> Pose:
     """Return the problems with the columns of a term as further parameters."""
 
@@ -324,13 +461,14 @@ def beside(pose: Pose, term: Term, inner: Array) -> Pose:
         caused = all_caused(observations, joint) if observations[0].cause is not None else None
         for place, one in enumerate(own):
             seen, grid = one.observation, one.observation.grid
-            turn = 1j * grid.omega_rad_s[:, None] ** np.arange(3)
-            measured = Motion(grid, *seen.coarse, one.regressors, one.target[:, None] * turn, joint)
+            turn = (1j * grid.omega_rad_s[:, None]) ** np.arange(3)
+            measured = Motion(grid, seen.coarse[0], seen.coarse[1], one.regressors, one.target[:, None] * turn, joint)
             motions = [measured, measured]
             if caused is not None:
+                made = caused[place].coarse[0], caused[place].coarse[1]
                 answered = (one.instruments @ joint)[:, None] * turn
                 motions[0] = Motion(
-                    grid, *caused[place].coarse, one.instruments, answered, joint, False
+                    grid, *made, one.instruments, answered, joint, measured=False
                 )
             columns = [term.columns(motion, inner)[:1].T for motion in motions]
             if term.bent is not None:

@@ -84,7 +84,7 @@ class Grid:
     @property
     def omega_rad_s(self) -> Array:
         """Angular frequencies of the lines, shape (m,)."""
-        return 2 * np.pi / self.duration_s * self.line
+        return np.asarray(2 * np.pi / self.duration_s * self.line)
 
     @property
     def band_hz(self) -> tuple[float, float]:

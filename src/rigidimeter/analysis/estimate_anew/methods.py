@@ -36,6 +36,7 @@ from rigidimeter.analysis.estimate_anew.grid import Array, Complex
 from rigidimeter.analysis.estimate_anew.observation import LEAST, Caused, Observation
 from rigidimeter.analysis.estimate_anew.signals import angle_range_rad
 from rigidimeter.analysis.estimate_anew.solve import (
+    ENOUGH_EPOCHS,
     Pose,
     Problem,
     Solution,
@@ -224,7 +225,7 @@ def holding(pose: Pose, inertia_kg_m2: float) -> Pose:
 def start_of(observations: Sequence[Observation]) -> Array:
     """Return where an iteration begins: J, B and K with every line alike, shape (3,)."""
     own = [one._replace(instruments=one.regressors) for one in direct(observations, LEAST)]
-    return np.maximum(shortest(*sums(own)), 10 * LEAST)
+    return np.asarray(np.maximum(shortest(*sums(own)), 10 * LEAST))
 
 
 def by_other_drives(solution: Solution) -> Array:
@@ -246,7 +247,8 @@ def by_other_drives(solution: Solution) -> Array:
     if len(moved) < 2:
         return np.zeros(values.size)
     most = np.max(moved[1:], axis=0)
-    return np.where(most > DEPENDS * np.abs(values), np.maximum(most, 2 * moved[0]), most)
+    depends = most > DEPENDS * np.abs(values)
+    return np.asarray(np.where(depends, np.maximum(most, 2 * moved[0]), most))
 
 
 def loop_pull(
@@ -338,7 +340,8 @@ def fit_epochs(
     pose = _pose(method, inertia_kg_m2)
     for condition in conditions:
         places = [i for i, one in enumerate(epochs) if one.epoch.condition == condition]
-        for i, fit in zip(places, _alone(method, pose, epochs, observed, places, shared, inertia_kg_m2), strict=True):  # fmt: skip
+        own = _alone(method, pose, epochs, observed, places, shared, inertia_kg_m2)
+        for i, fit in zip(places, own, strict=True):
             fits[i] = fit
     wanted = [*conditions, *([""] if len(conditions) > 1 else [])]
     for condition in wanted if pooled else ():
@@ -347,9 +350,9 @@ def fit_epochs(
             if one.epoch.closed.included and not one.obstacle
             and condition in ("", one.epoch.condition)
         ]  # fmt: skip
-        fit = _pooled(method, pose, epochs, observed, members, shared, condition, inertia_kg_m2)
-        if fit is not None:
-            together.append(replace(fit, epoch="pooled", condition=condition))
+        pool = _pooled(method, pose, epochs, observed, members, shared, condition, inertia_kg_m2)
+        if pool is not None:
+            together.append(replace(pool, epoch="pooled", condition=condition))
     return Fitted(fits, together, shared)
 
 
@@ -444,8 +447,10 @@ def _by_function(method: Method, epochs: Sequence[Ready], inertia_kg_m2: float |
         return _failed(first, method, str(error))
     source = ", ".join(dict.fromkeys(one.epoch.source for one in sound))
     outcome = after_fit(first, fit.r_squared, fit.condition_number)
-    named = {"source": source, "epoch": first.label, "condition": first.condition}
-    return replace(fit, **named, method=method.name, outcome=outcome)
+    label, condition = first.label, first.condition
+    return replace(
+        fit, source=source, epoch=label, condition=condition, method=method.name, outcome=outcome
+    )
 
 
 def _failed(epoch: Epoch, method: Method, reason: str) -> Fit:
@@ -539,3 +544,51 @@ def between_samples(
 
 def _power(lines: Complex) -> float:
     return float(np.vdot(lines, lines).real)
+
+
+_INTERVALS = (
+    "Intervals are made from the power of the residual at each frequency, torque that "
+    "is not from the robot included"
+)
+_POOLED = (
+    f"From {ENOUGH_EPOCHS} epochs on they come from the scatter between epochs; with fewer, each "
+    "is the wider of that and what the residual gives"
+)
+
+IV = Method(
+    name="iv",
+    title="instrumental variables, made from the perturbation",
+    needs=("perturbation_nm",),
+    methods_text="by refined instrumental variables made from the known perturbation",
+    pose=instrumental,
+    references=("riv", "riv_loop"),
+    intervals_text=_INTERVALS,
+    pooled_text=_POOLED,
+    by_noise=True,
+    in_sensitivity=True,
+)
+SPECTRAL = Method(
+    name="spectral",
+    title="instrumental variables at the lines of a periodic perturbation",
+    needs=("perturbation_nm",),
+    methods_text="by instrumental variables at the lines of the periodic perturbation",
+    pose=excited,
+    periodic=True,
+    intervals_text=_INTERVALS,
+    pooled_text=_POOLED,
+    by_noise=True,
+)
+BANDLIMITED = Method(
+    name="bandlimited",
+    title="least squares, each frequency weighted by its noise",
+    needs=(),
+    methods_text="by least squares in which each frequency counts by its noise",
+    pose=direct,
+    intervals_text=_INTERVALS
+    + ". They hold what that torque, coming back by the loop of the settings, does to least "
+    "squares, and where the drive is not known what one as that of the settings does between the "
+    "samples",
+    pooled_text=_POOLED,
+    by_noise=True,
+    in_sensitivity=True,
+)

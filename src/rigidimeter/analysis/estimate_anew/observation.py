@@ -9,8 +9,8 @@ The perturbation alone causes, from rest and without noise,
 
     θ = H A P / (1 + L(J, B, K))
 
-with the admittance A and the loop gain L of the settings (`rigidimeter.model.Loop`) and the drive H.
-It carries nothing of what the subject does. A wrong loop makes it a weaker instrument, not a wrong
+with the admittance A and the loop gain L of the settings (`rigidimeter.model.Loop`) and the drive
+H. It carries nothing of what the subject does. A wrong loop makes it a weaker instrument, not a wrong
 one; a loop that would be unstable with the joint was not the one that moved it, and is opened.
 """
 
@@ -453,7 +453,7 @@ def _cause(ticks: Channel, loop: Loop, grid: Grid, causes: list[tuple[Array, Cau
         circle.loop.sensed[:, :bins] * (passed * shift),
         samples,
         raising,
-        None if at_s is None else at_s + float(ticks.time_s[0]),
+        None if at_s is None else np.asarray(at_s + float(ticks.time_s[0])),
     )
     causes.append((whole, made))
     return made

@@ -11,8 +11,8 @@ epochs and neighbouring lines. With U = Z/S and C = G⁻¹
 
     cov p = c C (½ Σ Re(Uᴴ U) S) Cᵀ
 
-whatever the spectrum (Newey and West 1987; the smoothed periodogram in place of a lag window), c the
-window's (`Grid.spread`). How many independent lines stand behind it gives Student's degrees of
+whatever the spectrum (Newey and West 1987; the smoothed periodogram in place of a lag window), c
+the window's (`Grid.spread`). How many independent lines stand behind it gives Student's degrees of
 freedom (Satterthwaite 1946). Three things make that too small where lines are few:
 
 - the window, which is c;
@@ -299,18 +299,18 @@ class Smoother(NamedTuple):
         return _smoother(int(line[0]), line.size, least, share)
 
     @property
-    def count(self) -> NDArray[np.intp]:
+    def lines(self) -> NDArray[np.intp]:
         """How many lines are averaged for each, shape (m,)."""
         return self.stop - self.start
 
     def __call__(self, power: Array) -> Array:
         """Return the means, shape (m,) or (m, q) as given."""
         total = np.concatenate([np.zeros((1, *power.shape[1:])), np.cumsum(power, axis=0)])
-        return np.asarray(((total[self.stop] - total[self.start]).T / self.count).T)
+        return np.asarray(((total[self.stop] - total[self.start]).T / self.lines).T)
 
     def adjoint(self, weight: Array) -> Array:
         """Return how much each line's own power counts in weighted means, shape (m, p)."""
-        share = np.cumsum(weight / self.count[:, None], axis=0)
+        share = np.cumsum(weight / self.lines[:, None], axis=0)
         share = np.concatenate([np.zeros((1, weight.shape[1])), share])
         # Both ends rise, so the lines in whose mean a line is are in a row.
         place = np.arange(self.start.size)
@@ -362,7 +362,7 @@ class LineNoise:
         slope = slope.reshape(m, p * p)
         around = smooth(self.power[:, None] * slope) / self.power[:, None]
         pairs = (slope.T @ around).reshape(p, p, p, p)
-        own = (slope / smooth.count[:, None]).sum(axis=0).reshape(p, p) / epochs
+        own = (slope / smooth.lines[:, None]).sum(axis=0).reshape(p, p) / epochs
         return np.asarray(self.spread * (own - np.einsum("ijkl,jk->il", pairs, self.inverse)))
 
     def density(self, residual: Complex, smooth: Smoother) -> Array:
@@ -374,7 +374,7 @@ class LineNoise:
         by_line = _products(regressors @ self.inverse, self.weighted)
         by_all = _products(regressors @ self.variance(self.power), regressors)
         left = smooth(1.0 - self.spread * by_line + by_all / self.power)
-        left = np.maximum(left, 0.5 / smooth.count)  # one degree of freedom at least
+        left = np.maximum(left, 0.5 / smooth.lines)  # one degree of freedom at least
         return np.asarray(self.power * smooth(np.abs(residual) ** 2 / self.power) / left)
 
     def degrees(self, density: Array, smooth: Smoother) -> Array:

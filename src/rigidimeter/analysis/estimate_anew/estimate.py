@@ -1,0 +1,633 @@
+"""From epochs to J, B and K: drives, clocks, two stages, checks, terms, conditions.
+
+1. Stretches in which a sensor did not measure, or a muscle was active, are left out.
+2. The drive of each recording is identified, and how late its torque is.
+3. J, B and K of each epoch and of each condition; every epoch is checked, and one that a check
+   excludes is not in the pool.
+4. What the torque holds beside J, B and K, by condition, and J, B and K beside it.
+5. J is held at the median of all included epochs of all conditions, and B and K are found again
+   (Eq. 7, Sec. 2.4.4).
+
+What is computed is an argument of what follows, and nothing is kept elsewhere.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+
+from rigidimeter.analysis.estimate_anew.activity import activities
+from rigidimeter.analysis.estimate_anew import answer as _a
+from rigidimeter.analysis.estimate_anew.answer import answer
+
+findings_of = getattr(_a, "findings_of", lambda *_: ())
+from rigidimeter.analysis.estimate_anew.between import band_estimates, between_epochs
+from rigidimeter.analysis.estimate_anew.checks import Pull, excitation, in_half_intervals, sensors
+from rigidimeter.analysis.estimate_anew.checks import fit as fit_checks
+from rigidimeter.analysis.estimate_anew.checks import motion as motion_checks
+from rigidimeter.analysis.estimate_anew.delay import (
+    aligned,
+    corrected_s,
+    delay_of,
+    late_torque,
+    with_clock_error,
+)
+from rigidimeter.analysis.estimate_anew.drive import Drive, find_drive
+from rigidimeter.analysis.estimate_anew.methods import (
+    BANDLIMITED,
+    IV,
+    SPECTRAL,
+    Fitted,
+    Method,
+    Ready,
+    fit_epochs,
+)
+from rigidimeter.analysis.estimate_anew.observation import (
+    Cause,
+    Observation,
+    loop_of,
+    no_instrument,
+    observe,
+)
+from rigidimeter.analysis.estimate_anew.published import fit_published
+from rigidimeter.analysis.estimate_anew.scores import line_shares, score_epoch
+from rigidimeter.analysis.estimate_anew.solve import Solution
+from rigidimeter.analysis.estimate_anew.stretches import Array, longest_part, obstacle, screened
+from rigidimeter.core.findings import Fact, Finding, found_between
+from rigidimeter.core.records import Analysis, Axis, BandEstimate, Delay, Epoch, Fit, Outcome, Task
+from rigidimeter.core.settings import Settings
+from rigidimeter.core.words import short_names
+from rigidimeter.model import Loop
+
+PUBLISHED = Method(
+    name="published",
+    title="least squares as the paper prints it",
+    needs=(),
+    methods_text="by ordinary least squares in the time domain, as published",
+    fit=fit_published,
+    references=("paper",),
+    intervals_text="Intervals take the residual for white and do not include bias",
+    pooled_text=(
+        "The joint is taken for one that does not change, and where epochs differ by more than "
+        "their own intervals these are too narrow"
+    ),
+    as_recorded=True,
+    in_sensitivity=True,
+)
+
+METHODS: list[Method] = [PUBLISHED, BANDLIMITED, IV, SPECTRAL]
+"""Every estimator. Code from outside the package may append its own."""
+
+MOST_TRIED = 5
+"""From so many epochs it is known whether the motion follows the perturbation."""
+
+FOLLOWS_CHANCE, GROUP_LINES, GROUP_SHARE = 1e-6, 8, 0.15
+"""A motion that answers with a larger probability by chance does not follow; lines are taken
+together that are so many in a row, and reach over this share of their frequency."""
+
+SINGLE_FREQUENCY_SHARE = 0.85
+"""Above this share of the angle's variance in one line an epoch is an imposed sinusoid, unless the
+velocity shows steps to and fro. A sinusoid that fills half the epoch reaches 0.95, a PRBS in the
+closed loop 0.5."""
+
+DIFFERENT_INERTIA_PERCENT = 15.0
+"""Recordings whose median J differ by more hardly are of one joint."""
+
+Progress = Callable[[float], None]
+"""Called with the share of the work that was done since, 1 in all."""
+
+
+class Recorded(NamedTuple):
+    """Epochs of one joint, with what every analysis of them needs.
+
+    Attributes
+    ----------
+    epochs : tuple of Epoch
+        As recorded.
+    settings : Settings
+    perturbed : tuple of Ready
+        Those that are fitted, as recorded.
+    imposed : tuple of Epoch
+        Those that are scored, as recorded.
+    delays : tuple of Delay
+        How late the torque of each recording is; empty where that was not wanted.
+    """
+
+    epochs: tuple[Epoch, ...]
+    settings: Settings
+    perturbed: tuple[Ready, ...]
+    imposed: tuple[Epoch, ...]
+    delays: tuple[Delay, ...] = ()
+
+    def on_one_clock(self) -> list[Ready]:
+        """Return the perturbed epochs with their torque moved."""
+        moves = [corrected_s(one.epoch.source, self.delays) for one in self.perturbed]
+        return [r.moved(s) if s else r for r, s in zip(self.perturbed, moves, strict=True)]
+
+
+def method_names() -> tuple[str, ...]:
+    """Return what `--method` takes: ``auto``, the default, and the name of each estimator."""
+    return ("auto", *(method.name for method in METHODS))
+
+
+def no_such_method(name: str) -> str:
+    """Return why `--method` cannot be `name`, and what it may be."""
+    known = method_names()
+    (near,) = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
+    return f"there is no such method; the nearest is {near} (known: {', '.join(known)})"
+
+
+def method_named(name: str) -> Method:
+    """Return the estimator of that name.
+
+    Raises
+    ------
+    ValueError
+        If there is none, with the names of those there are; or if two have the name.
+    """
+    named = [method for method in METHODS if method.name == name]
+    if not named:
+        raise ValueError(no_such_method(name))
+    if len(named) > 1:
+        raise ValueError(f"two methods have the name {name}; rename the one that was added")
+    return named[0]
+
+
+def task_of(epoch: Epoch, settings: Settings) -> Task:
+    """Return the epoch's task: as recorded, else a sinusoid if the motion holds a single line."""
+    if epoch.task is not None:
+        return epoch.task
+    if obstacle(epoch, settings.estimation):
+        return "prbs"  # it will fail with its reason among the fits
+    return "sinusoid" if line_shares(epoch).single(SINGLE_FREQUENCY_SHARE) else "prbs"
+
+
+def prepare(
+    epochs: Iterable[Epoch],
+    settings: Settings,
+    *,
+    clocks: bool = True,
+    progress: Progress = lambda _: None,
+) -> Recorded:
+    """Return epochs with tasks, what is left out, the drive and the delay of each recording.
+
+    Parameters
+    ----------
+    epochs : iterable of Epoch
+    settings : Settings
+    clocks : bool
+        Whether delays are wanted.
+    progress : callable
+    """
+    everyone = tuple(epochs)
+    tasks = [task_of(one, settings) for one in everyone]
+    perturbed = [one for one, task in zip(everyone, tasks, strict=True) if task == "prbs"]
+    # A sinusoid is scored over whole cycles, and rests at its turning points.
+    imposed = [longest_part(one) for one, task in zip(everyone, tasks, strict=True)
+               if task == "sinusoid"]  # fmt: skip
+    measured = [screened(one, settings) for one in perturbed]
+    active = activities(perturbed, measured, settings)
+    sources = dict.fromkeys(one.source for one in everyone)
+    drives = {source: _drive_of(source, [one for one, _ in active], settings) for source in sources}
+    ready = [
+        Ready(
+            epoch,
+            settings,
+            drives[epoch.source],
+            obstacle(epoch, settings.estimation),
+            activity,
+            whole if epoch is not whole else None,
+        )
+        for whole, (epoch, activity) in zip(measured, active, strict=True)
+    ]
+    delays = []
+    for source in sources if clocks else ():
+        delays.append(_delay_of(source, [one for one in ready if one.epoch.source == source]))
+        progress(1.0 / len(sources))
+    return Recorded(everyone, settings, tuple(ready), tuple(imposed), tuple(delays))
+
+
+def _drive_of(source: str, epochs: Sequence[Epoch], settings: Settings) -> Drive | None:
+    sound = [
+        one
+        for one in epochs
+        if one.source == source and one.closed.included and not obstacle(one, settings.estimation)
+    ]
+    return find_drive(sound, settings)
+
+
+def _delay_of(source: str, ready: Sequence[Ready]) -> Delay:
+    sound = [one for one in ready if not one.obstacle]
+    known = [one for one in sound if not no_instrument(one.epoch)]
+
+    def observed(epochs: Sequence[Ready]) -> list[Observation]:
+        causes: list[tuple[Array, Cause]] | None = [] if known else None
+        return [_observation(one, causes) for one in epochs]
+
+    return delay_of(source, known or sound, bool(known), observed)
+
+
+def _observation(
+    ready: Ready, causes: list[tuple[Array, Cause]] | None, *, periodic: bool = False
+) -> Observation:
+    """Return an epoch at its lines; `causes` where the perturbation is the instrument."""
+    if ready.obstacle:
+        raise ValueError(ready.obstacle)
+    epoch, settings, drive = ready.epoch, ready.settings, ready.drive
+    loop: Loop | None = loop_of(settings, epoch.channels["torque_nm"].rate_hz, drive)
+    if causes is None:
+        shown = fit_checks.controller_shown(epoch, settings)
+        loop = fit_checks.loop_shown(epoch, settings, drive, shown)
+    # A window with a hole would spread excited lines over those between them.
+    part = longest_part(epoch) if periodic else epoch
+    return observe(part, settings, drive, loop, causes, periodic=periodic)
+
+
+def observed_for(method: Method, epochs: Sequence[Ready]) -> list[Observation | str]:
+    """Return epochs as a method sees them, or why it cannot.
+
+    Epochs with one perturbation share what it causes. A method without a pose is checked with
+    the lines of the motion alone.
+    """
+    causes: list[tuple[Array, Cause]] | None = [] if method.uses_perturbation else None
+    found: list[Observation | str] = []
+    for one in epochs:
+        try:
+            found.append(_observation(one, causes, periodic=method.periodic))
+        except ValueError as error:
+            found.append(str(error))
+    return found
+
+
+def choose_method(recorded: Recorded) -> tuple[str, str]:
+    """Return the method that suits what was recorded, and why.
+
+    With a perturbation that the motion follows, instrumental variables, which a subject who pushes
+    does not bias. An epoch that lacks it then fails, unless most do. Without it only least squares
+    is possible.
+    """
+    epochs = recorded.perturbed
+    if not epochs:
+        return "bandlimited", "there is no epoch to fit"
+    missing = [why for one in epochs if (why := no_instrument(one.epoch))]
+    least_squares = (
+        "so least squares weighted by noise is used: torque of the subject over all of the band, "
+        "or a joint that is not J, B and K, biases it"
+    )
+    if 2 * len(missing) > len(epochs):
+        shown = f"{missing[0]} (in {len(missing)} of {len(epochs)} epochs)"
+        return "bandlimited", f"{shown}, {least_squares}"
+    able = [one for one in epochs if not one.obstacle and not no_instrument(one.epoch)]
+    tried = able[:MOST_TRIED]
+    unanswered = [one for one in tried if not _follows(one)]
+    if 2 * len(unanswered) > len(tried):
+        return "bandlimited", (
+            f"the motion does not follow perturbation_nm (in {len(unanswered)} of "
+            f"{len(tried)} epochs that were tried; first epoch "
+            f"{unanswered[0].epoch.label}), {least_squares}. Check which column holds the "
+            "perturbation, and that it and the motion have one clock; --method iv uses it "
+            "all the same"
+        )
+    where = f" in {len(epochs) - len(missing)} of {len(epochs)} epochs" if missing else ""
+    return "iv", (
+        f"the perturbation was recorded{where}, so the motion that it causes is the instrument: "
+        "torque not from the robot does not bias the estimate"
+    )
+
+
+def _follows(ready: Ready) -> bool:
+    """Return whether any of the motion answers the perturbation, beyond chance.
+
+    The velocity is regressed on the perturbation with one complex factor in each group of n_g
+    neighbouring lines. By noise alone
+
+        F = Σ |h|² Σ|P|² / (2G) ÷ Σ |V − h P|² / (2 Σ (n_g − 1))
+
+    has Fisher's distribution, each group divided by its noise.
+    """
+    try:
+        seen = _observation(ready, None)
+    except ValueError:
+        return True  # the fit says why
+    cause, velocity = excitation.perturbation_lines(seen), seen.motion[:, 1]
+    edges = [0]
+    while edges[-1] < cause.size:
+        reach = int(GROUP_SHARE * (seen.grid.line[0] + edges[-1]))
+        edges.append(edges[-1] + max(GROUP_LINES, reach))
+    starts = np.array(edges[: max(len(edges) - 2, 1)])  # the last group takes what is left over
+    sizes = np.diff(np.append(starts, cause.size))
+    power = np.add.reduceat(np.abs(cause) ** 2, starts)
+    factor = np.add.reduceat(cause.conj() * velocity, starts) / np.maximum(power, 1e-300)
+    answered = np.abs(factor) ** 2 * power
+    left = np.maximum(np.add.reduceat(np.abs(velocity) ** 2, starts) - answered, 1e-300)
+    p = scipy.special.fdtrc(2, 2 * (sizes - 1), answered / left * (sizes - 1))
+    return bool(np.min(p) * p.size < FOLLOWS_CHANCE)
+
+
+def estimate_recorded(
+    recorded: Recorded,
+    method: str = "auto",
+    *,
+    fits_alone: bool = False,
+    progress: Progress = lambda _: None,
+) -> Analysis:
+    """Fit every perturbation epoch by a method, and score every sinusoidal one.
+
+    Parameters
+    ----------
+    recorded : Recorded
+    method : str
+        The name of one of `METHODS`; ``auto`` chooses by what was recorded.
+    fits_alone : bool
+        Leave out what does not decide whether an epoch counts: pooled fits, terms, scores.
+    progress : callable
+
+    Raises
+    ------
+    ValueError
+        If there is no such method.
+    """
+    settings, reason = recorded.settings, ""
+    if method == "auto":
+        method, reason = choose_method(recorded)
+    estimator = method_named(method)
+    delays = () if estimator.as_recorded else recorded.delays
+    epochs = list(recorded.perturbed) if estimator.as_recorded else recorded.on_one_clock()
+    observed = observed_for(estimator, epochs)
+    progress(0.3)
+    fitted = _fitted(estimator, epochs, observed, None, delays, pooled=not fits_alone)
+    progress(0.2)
+    fits = [
+        _checked(estimator, ready, seen, fit, delays)
+        for ready, seen, fit in zip(epochs, observed, fitted.fits, strict=True)
+    ]
+    counted = [_closed_as(one, fit) for one, fit in zip(epochs, fits, strict=True)]
+    if not fits_alone and any(a is not b for a, b in zip(counted, epochs, strict=True)):
+        # What a check excludes must not be in the pool either.
+        fitted = _fitted(estimator, counted, observed, None, delays, pooled=True)
+    pooled: list[Fit] = fitted.pooled
+    bands: list[BandEstimate] = []
+    if not fits_alone:
+        fits, pooled, bands = _together(estimator, counted, observed, fits, fitted)
+    progress(0.3)
+    included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
+    inertia_kg_m2 = float(np.median(included)) if included else float("nan")
+    fixed = [Fit(fit.source, fit.epoch, fit.condition, fit.method, fit.outcome) for fit in fits]
+    if included:
+        second = _fitted(estimator, epochs, observed, inertia_kg_m2, delays, pooled=False).fits
+        # What did not count in the first stage does not in the second.
+        fixed = [
+            two if one.outcome.included else replace(two, outcome=one.outcome)
+            for one, two in zip(fits, second, strict=True)
+        ]
+    imposed = [aligned(one, delays) for one in recorded.imposed]
+    scores = [] if fits_alone else [score_epoch(one, settings.scores, settings.estimation)
+                                    for one in imposed]  # fmt: skip
+    progress(0.2)
+    return Analysis(
+        method,
+        tuple(fits),
+        tuple(fixed),
+        inertia_kg_m2,
+        tuple(scores),
+        tuple(pooled),
+        delays,
+        reason,
+        tuple(bands),
+        () if fits_alone else tuple(_of_recordings(fits)),
+        _axis(recorded),
+    )
+
+
+def estimate(
+    epochs: Iterable[Epoch],
+    settings: Settings,
+    method: str = "auto",
+    *,
+    progress: Progress = lambda _: None,
+) -> Analysis:
+    """Estimate J, B and K of every epoch, and score the imposed sinusoids.
+
+    Parameters
+    ----------
+    epochs : iterable of Epoch
+        Of one joint.
+    settings : Settings
+    method : str
+        The name of one of `METHODS`; ``auto`` chooses by what was recorded.
+    progress : callable
+
+    Raises
+    ------
+    ValueError
+        If there is no such method.
+    """
+    clocks = method == "auto" or not method_named(method).as_recorded
+    recorded = prepare(epochs, settings, clocks=clocks, progress=lambda n: progress(0.5 * n))
+    return estimate_recorded(recorded, method, progress=lambda n: progress(0.5 * n))
+
+
+def _fitted(
+    method: Method,
+    epochs: Sequence[Ready],
+    observed: Sequence[Observation | str],
+    inertia_kg_m2: float | None,
+    delays: Sequence[Delay],
+    *,
+    pooled: bool,
+) -> Fitted:
+    """Return fits whose intervals hold the error of the clocks."""
+    fitted = fit_epochs(method, epochs, observed, inertia_kg_m2, pooled=pooled)
+
+    def again(by_s: Sequence[float]) -> list[Fit]:
+        moved = [one.moved(late_s) for one, late_s in zip(epochs, by_s, strict=True)]
+        seen = [
+            one.late(late_s) if isinstance(one, Observation) else one
+            for one, late_s in zip(observed, by_s, strict=True)
+        ]
+        return fit_epochs(method, moved, seen, inertia_kg_m2, pooled=False).fits
+
+    alone, together = with_clock_error(epochs, fitted.fits, fitted.pooled, delays, again)
+    return fitted._replace(fits=alone, pooled=together)
+
+
+def _closed_as(ready: Ready, fit: Fit) -> Ready:
+    """Return the epoch as excluded, where a check of its fit excludes it."""
+    if fit.outcome.included or not ready.epoch.closed.included or fit.n_samples == 0:
+        return ready
+    return ready._replace(epoch=replace(ready.epoch, closed=fit.outcome))
+
+
+def _checked(
+    method: Method, ready: Ready, seen: Observation | str, fit: Fit, delays: Sequence[Delay]
+) -> Fit:
+    """Return the fit with what the checks of its epoch found, excluded if one of them says so."""
+    fit = replace(fit, activity=ready.activity)
+    if fit.n_samples == 0 or not isinstance(seen, Observation):
+        return fit  # it has said why
+    pull = Pull(instruments=True)
+    if not method.uses_perturbation:
+        pull = fit_checks.pull_of(seen, fit, by_noise=method.by_noise)
+    delay = next((one for one in delays if one.source == fit.source), None)
+    findings = list(_findings(method, ready, seen, fit, pull, delay))
+    serious = [one for one in findings if one.level == "exclude"]
+    outcome = fit.outcome
+    if serious and outcome.included:
+        words = serious[0].words
+        outcome = Outcome("excluded", f"{words.headline}. {words.remedy}".rstrip(". "))
+    return in_half_intervals(replace(fit, outcome=outcome, findings=(*fit.findings, *findings)))
+
+
+def _findings(
+    method: Method, ready: Ready, seen: Observation, fit: Fit, pull: Pull, delay: Delay | None
+) -> Iterator[Finding]:
+    epoch, settings = ready.epoch, ready.settings
+    followed = not method.as_recorded and ready.drive is not None
+    yield from sensors.sensors(epoch, settings, followed)
+    yield from sensors.velocity(epoch, fit, settings)
+    yield from excitation.excitation(seen, fit, pull)
+    yield from sensors.static_torque(epoch, settings)
+    yield from fit_checks.residual(seen, fit, pull)
+    yield from fit_checks.least_squares(seen, fit, pull)
+    yield from motion_checks.pushing(seen, fit, settings, pull)
+    yield from motion_checks.tremor(seen, fit, settings, pull)
+    whole = _with_active(method, ready)
+    yield from motion_checks.emg_activity(epoch, ready.activity, fit, whole, settings, pull)
+    yield from fit_checks.parameters(epoch, fit, pull, settings.diagnostics)
+    shown = fit_checks.controller_shown(epoch, settings)
+    yield from fit_checks.controller(epoch, fit, pull, settings, shown)
+    if not pull.instruments:
+        yield from late_torque(seen, fit, delay)
+    if ready.drive is None:
+        yield from fit_checks.between_samples(epoch, fit, pull, settings, delay)
+
+
+def _with_active(method: Method, ready: Ready) -> Fit | None:
+    """Return the fit with the stretches that are left out for an active muscle; None without."""
+    if ready.with_active is None:
+        return None
+    whole = [ready._replace(epoch=ready.with_active, with_active=None)]
+    (fit,) = fit_epochs(method, whole, observed_for(method, whole), pooled=False).fits
+    return fit if fit.n_samples else None
+
+
+def _together(
+    method: Method,
+    epochs: Sequence[Ready],
+    observed: Sequence[Observation | str],
+    fits: Sequence[Fit],
+    fitted: Fitted,
+) -> tuple[list[Fit], list[Fit], list[BandEstimate]]:
+    """Return fits and pooled fits with what epochs of a condition show together, and bands."""
+    settings = epochs[0].settings if epochs else None
+    found_in: dict[str, list[Finding]] = {}
+    bands: list[BandEstimate] = []
+    for condition, (solution, values) in _shared(method, epochs, observed, fits, fitted).items():
+        assert settings is not None  # there are epochs
+        members = [f for f in fits if f.outcome.included and f.condition == condition]
+        pool = next((one for one in fitted.pooled if one.condition == condition), None)
+        seen = [one.observation for one in solution.problems]
+        if seen[0].cause is not None:
+            bands += band_estimates(seen, values, pool if method.uses_perturbation else None)
+        labels = tuple(one.epoch for one in members)
+        found_in[condition] = [
+            replace(one, condition=condition, epochs=labels)
+            for one in findings_of(answer(solution), solution, settings)
+        ]
+    alone = [
+        in_half_intervals(replace(one, findings=(*one.findings, *found_in.get(one.condition, ()))))
+        if one.outcome.included
+        else one
+        for one in fits
+    ]
+    pooled = []
+    for pool in fitted.pooled:
+        own = [f for f in alone if f.outcome.included and pool.condition in ("", f.condition)]
+        more = list(found_in.get(pool.condition, ()))
+        if pool.condition and settings is not None:
+            one = between_epochs(own, method.uses_perturbation, settings.diagnostics)
+            more += [] if one is None else [one]
+        pool = in_half_intervals(replace(pool, findings=(*pool.findings, *more)))
+        pooled.append(replace(pool, findings=(*pool.findings, *_of_every(pool, own))))
+    return alone, pooled, bands
+
+
+def _shared(
+    method: Method,
+    epochs: Sequence[Ready],
+    observed: Sequence[Observation | str],
+    fits: Sequence[Fit],
+    fitted: Fitted,
+) -> dict[str, tuple[Solution, list[Array]]]:
+    """Return what the epochs of each condition that count share, and J, B and K of each.
+
+    By the perturbation where it was recorded, whatever the method: at J, B and K of least squares
+    the subject's own torque would show in the residual as well.
+    """
+    counting = [i for i, fit in enumerate(fits) if fit.outcome.included]
+    known = [i for i in counting if not no_instrument(epochs[i].epoch)]
+    if method is not IV or len(known) < len(counting):
+        method, used = (IV, known) if known else (BANDLIMITED, counting)
+        epochs = [epochs[i] for i in used]
+        fitted = fit_epochs(method, epochs, observed_for(method, epochs), pooled=False)
+        fits = fitted.fits
+        counting = [i for i, fit in enumerate(fits) if fit.outcome.included]
+    values = {(fits[i].condition, fits[i].source, fits[i].epoch): fits[i].value for i in counting}
+    return {
+        condition: (
+            solution,
+            [
+                values.get((condition, e.source, e.label), solution.values)
+                for e in (one.observation.epoch for one in solution.problems)
+            ],
+        )
+        for condition, solution in fitted.shared.items()
+        if condition or len({fit.condition for fit in fits}) == 1
+    }
+
+
+def _of_every(pool: Fit, own: Sequence[Fit]) -> list[Finding]:
+    """Return the cautions that all epochs of a pool carry and the pool does not carry yet.
+
+    What all epochs share does not average out. Each is that of the epoch furthest beyond the limit.
+    """
+    cautions = [{one.name: one for one in fit.findings if one.level != "note"} for fit in own]
+    said = {one.name for one in pool.findings}
+    labels = tuple(fit.epoch for fit in own)
+    common = []
+    for name in cautions[0] if cautions else ():
+        shown = [one[name] for one in cautions if name in one]
+        if len(shown) == len(own) and name not in said:
+            most = max(shown, key=lambda one: abs(one.value - one.limit))
+            common.append(replace(most, epochs=labels, condition=pool.condition))
+    return common
+
+
+def _of_recordings(fits: Sequence[Fit]) -> Iterator[Finding]:
+    """Yield that recordings differ in J: one median for all puts that into B and K."""
+    by_source: dict[str, list[float]] = {}
+    for fit in fits:
+        if fit.outcome.included:
+            by_source.setdefault(fit.source, []).append(fit.inertia_kg_m2)
+    medians = {source: float(np.median(values)) for source, values in by_source.items()}
+    if len(medians) < 2 or min(medians.values()) <= 0:
+        return
+    low, high = min(medians, key=medians.__getitem__), max(medians, key=medians.__getitem__)
+    percent = 100.0 * (medians[high] / medians[low] - 1.0)
+    if percent >= DIFFERENT_INERTIA_PERCENT:
+        names = short_names(medians)
+        facts: dict[str, Fact] = {"high": names[high], "high_j": medians[high]}
+        facts |= {"low": names[low], "low_j": medians[low]}
+        yield found_between("inertia_of_recordings", facts, percent, DIFFERENT_INERTIA_PERCENT)
+
+
+def _axis(recorded: Recorded) -> Axis:
+    """Return how the joint's axis stands: as the settings state it; that of the virtual rig."""
+    stated = recorded.settings.diagnostics.axis
+    virtual = all(epoch.virtual for epoch in recorded.epochs)
+    return "vertical" if stated == "unknown" and virtual else stated
