@@ -81,10 +81,10 @@ criterion is above the best by more (Kass and Raftery 1995: strong evidence) is 
 NOISY, MISFIT = 0.01, 0.1
 """Shares of the velocity's SD: where noise is larger the angle may show the drive better; where
 more is left the command does not explain it."""
-QUIET, RUBS, RUBBED, SIGNS = 3e-4, 0.8, 4.0, 3
-"""A share of the SD below which nothing needs friction; to what share it must bring the power; how
-much more power is as good with it, for poles bend to what its law leaves; how often the sign is
-made of the drive and the drive of the sign."""
+QUIET, RUBS, EARLY, RUBBED, SIGNS = 3e-4, 0.8, 0.5, 4.0, 3
+"""A share of the SD below which nothing needs friction; the share to which it must bring the power,
+times the next where drives of four poles were not tried; how much more power is as good with it,
+for poles bend to what its law leaves; how often sign and drive are made of each other."""
 STAIRS, FINER = 0.5, 4
 """A command that was logged more slowly than it was sent goes on between its samples: if lines
 between them, in so many steps, leave this share of what stairs leave, the stairs are not known."""
@@ -194,10 +194,13 @@ class _Record:
 
     Attributes
     ----------
-    inputs : tuple of (Channel, float or array)
-        The command and, with dry friction, the sign of the velocity; and how long each was held.
+    command : Channel
     interval_s : float
         Of the ticks.
+    lengths_s : float or array
+        From each tick to the next.
+    inputs : tuple of array, each of shape (ticks, f)
+        The command and, with dry friction, the mean sign of the velocity, in f parts of a tick.
     time_s, measured : array, shape (n,)
         The velocity at its stamps, as a share of its SD.
     scale : float
@@ -206,8 +209,10 @@ class _Record:
         Where the angle was measured and `measured` is `_from_angle`: the interval of its stamps.
     """
 
-    inputs: tuple[tuple[Channel, float | Array], ...]
+    command: Channel
     interval_s: float
+    lengths_s: float | Array
+    inputs: tuple[Array, ...]
     time_s: Array
     measured: Array
     scale: float
@@ -273,9 +278,15 @@ def _record(epoch: Epoch, motion: Channel) -> _Record | None:
     if scale == 0.0:
         return None
     sent = Channel(command.name, command.time_s[used], command.values[used])
-    interval_s = 1.0 / command.mean_rate_hz
     return _Record(
-        ((sent, _lengths_s(sent)),), interval_s, time_s, measured / scale, scale, every_s
+        sent,
+        1.0 / command.mean_rate_hz,
+        _lengths_s(sent),
+        (sent.values[:, None],),
+        time_s,
+        measured / scale,
+        scale,
+        every_s,
     )
 
 
@@ -352,7 +363,7 @@ def _climbed(record: _Record, start: DriveModel) -> list[_Fitted]:
         done = poles > 1 and (enough or (spent and best.place[-1] == 0.0))
         enough = spent
         if best.power > QUIET**2 and (done or poles > 2):
-            least = best.power / (1.0 if done or poles == MOST_POLES else RUBBED)
+            least = best.power * (1.0 if done or poles == MOST_POLES else EARLY)
             if (rubbed := _rubbed(found[2], least)) is not None:
                 return _climbed(rubbed.record, rubbed.model)
         if done:
@@ -451,23 +462,35 @@ def _modes(record: _Record, place: Array, zeros: int) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=64)
-def _mode(record: _Record, which: int, pole: complex, delay_s: float) -> Complex:
+def _mode(record: _Record, which: int, pole: complex, delay_s: float) -> Array | Complex:
     """Return x of x' = λ x + c at the stamps; for an angle what `_from_angle` makes of ∫ x dt."""
-    channel, lengths_s = record.inputs[which]
-    tick, held_s = _since(record, which, delay_s)
-    sent = channel.values[tick]
-    state = state_later(pole, state_at_ticks(pole, channel.values, lengths_s)[tick], sent, held_s)
-    if record.every_s:  # from x' = λ x + c
-        summed = np.append(0.0, np.cumsum(channel.values[:-1] * lengths_s))
-        whole = (state - summed[tick] - held_s * sent) / (pole if pole.imag else pole.real)
-        state = _from_angle(whole, record.every_s)
+    values = record.inputs[which]
+    tick, held_s = _since(record, delay_s)
+    growth = pole if pole.imag else pole.real
+    # Held for a tick, the weighted mean of its parts leaves the same state.
+    parts = np.arange(values.shape[1] - 1, -1, -1) / values.shape[1]
+    share = np.exp(growth * record.interval_s * parts)
+    sent = values @ (share / np.sum(share)) if parts.size > 1 else values[:, 0]
+    before = state_at_ticks(pole, sent, record.lengths_s)[tick]
+    state = state_later(pole, before, sent[tick], held_s)
+    if record.every_s:  # x' = λ x + c
+        state = (_from_angle(state, record.every_s) - _integral(record, which, delay_s)) / growth
     return state
 
 
-@lru_cache(maxsize=8)
-def _since(record: _Record, which: int, delay_s: float) -> tuple[Rows, Array | float]:
-    tick, after_s = since_ticks(record.inputs[which][0], record.time_s, delay_s, even=0.0)
+@lru_cache(maxsize=16)
+def _since(record: _Record, delay_s: float) -> tuple[Rows, Array | float]:
+    tick, after_s = since_ticks(record.command, record.time_s, delay_s, even=0.0)
     return tick, same_time(after_s)
+
+
+@lru_cache(maxsize=16)
+def _integral(record: _Record, which: int, delay_s: float) -> Array:
+    """Return what `_from_angle` makes of ∫ c dt."""
+    tick, held_s = _since(record, delay_s)
+    sent = np.mean(record.inputs[which], axis=1)
+    summed = np.append(0.0, np.cumsum(sent[:-1] * record.lengths_s))
+    return _from_angle(summed[tick] + held_s * sent[tick], record.every_s)
 
 
 def _longest(record: _Record) -> float:
@@ -537,9 +560,8 @@ def _coordinates(drive: DriveModel, interval_s: float, poles: int) -> Array:
 @lru_cache(maxsize=2)
 def _past(record: _Record) -> Array:
     """Return independent sums of past commands at the stamps, shape (n, e)."""
-    command = record.inputs[0][0].values
-    sums = np.append(0.0, np.cumsum(command))
-    tick, _ = _since(record, 0, 0.0)
+    sums = np.append(0.0, np.cumsum(record.command.values))
+    tick, _ = _since(record, 0.0)
     edges = [sums[np.maximum(tick + 1 - lag, 0)] for lag in EDGES_TICKS if lag <= tick[-1]]
     table = np.diff(edges, axis=0).T
     return np.linalg.qr(table / (np.linalg.norm(table, axis=0) + TINY))[0]
@@ -558,17 +580,13 @@ def _explainable(one: _Fitted) -> float:
 
 def _regressed(record: _Record) -> list[DriveModel]:
     """Return drives with the poles of regressions on even samples, by their number; or none."""
-    tick, held_s = _since(record, 0, 0.0)
+    tick, held_s = _since(record, 0.0)
     rows = np.arange(MOST_POLES, tick.size)
     rows = rows[tick[rows] - tick[rows - MOST_POLES] == MOST_POLES]
-    command, lengths_s = record.inputs[0]
-    if (
-        isinstance(held_s, np.ndarray)
-        or isinstance(lengths_s, np.ndarray)
-        or rows.size < FEWEST_SAMPLES
-    ):
+    uneven = isinstance(held_s, np.ndarray) or isinstance(record.lengths_s, np.ndarray)
+    if uneven or rows.size < FEWEST_SAMPLES:
         return []
-    sent = command.values
+    sent = record.command.values
     if record.every_s:
         sent = scipy.signal.lfilter([1.0], [1.0, -_kept(record.every_s)], sent)
     columns = [record.measured[rows - lag] for lag in range(MOST_POLES + 1)]
@@ -591,8 +609,7 @@ def _regressed(record: _Record) -> list[DriveModel]:
 def _rubbed(one: _Fitted, least: float) -> _Fitted | None:
     """Return a drive with friction, where the sign of its velocity explains what others leave."""
     for again in range(SIGNS):
-        sign = _sign(one)
-        record = replace(one.record, inputs=(one.record.inputs[0], (sign, _lengths_s(sign))))
+        record = replace(one.record, inputs=(one.record.inputs[0], _signs(one)))
         one = _answer(record, np.append(one.place[:-1], 0.0), one.zeros)
         step, _, slopes = _scatter(one)
         if not again and np.mean((one.left + step @ slopes) ** 2) > RUBS * least:
@@ -601,38 +618,35 @@ def _rubbed(one: _Fitted, least: float) -> _Fitted | None:
     return one if one.power < RUBS * least else None
 
 
-def _sign(one: _Fitted) -> Channel:
-    """Return the mean sign of the velocity in parts of a tick.
+def _signs(one: _Fitted) -> Array:
+    """Return the mean sign of the velocity in parts of a tick, shape (ticks, parts).
 
     The velocity is what a drive makes there, and straight between the samples what it leaves; of
     an angle, what the drive makes.
     """
-    time_s = _finer(one.record.inputs[0][0].time_s)
-    there = replace(one.record, time_s=time_s, every_s=0.0)
-    velocity = _velocity(one._replace(record=there), one.place, one.numerator)
-    if not one.record.every_s:
-        velocity -= np.interp(time_s, one.record.time_s, one.left)
+    record = one.record
+    ticks_s = np.append(record.command.time_s, record.command.time_s[-1] + record.interval_s)
+    parts = np.arange(FINER * len(record.command)) / FINER
+    time_s = np.interp(parts, np.arange(ticks_s.size), ticks_s)
+    inputs = tuple(np.repeat(x, FINER // x.shape[1], axis=1).reshape(-1, 1) for x in record.inputs)
+    sent = Channel(record.command.name, time_s, inputs[0][:, 0])
+    finer = replace(record, command=sent, lengths_s=_lengths_s(sent), inputs=inputs, time_s=time_s)
+    velocity = _velocity(one._replace(record=replace(finer, every_s=0.0)), one.place, one.numerator)
+    if not record.every_s:
+        velocity = velocity - np.interp(time_s, record.time_s, one.left)
     after = np.append(velocity[1:], velocity[-1])
     mean = (velocity + after) / (np.abs(velocity) + np.abs(after) + TINY)
-    return Channel("velocity_rad_s", time_s, mean)
-
-
-def _finer(ticks_s: Array) -> Array:
-    """Return times that divide each tick evenly."""
-    place = np.arange(FINER * (ticks_s.size - 1) + 1) / FINER
-    return np.interp(place, np.arange(ticks_s.size), ticks_s)
+    return np.asarray(mean.reshape(-1, FINER))
 
 
 def _between_lines(one: _Fitted) -> float:
     """Return what a drive leaves whose command went straight between samples, of what it left."""
-    sent, record = one.record.inputs[0][0], one.record
-    time_s = _finer(sent.time_s)
-    middle = np.interp(time_s + 0.5 * (time_s[1] - time_s[0]), sent.time_s, sent.values)
-    lines = Channel(sent.name, time_s, middle)
-    interval_s = record.interval_s / FINER
-    finer = replace(record, inputs=((lines, _lengths_s(lines)),), interval_s=interval_s)
-    begin = np.append(_coordinates(one.model, interval_s, 2), 0.0)
-    return min(_searched(finer, begin, zeros, False).power for zeros in (0, 1)) / one.power
+    ticks = (np.arange(FINER * len(one.record.command)) + 0.5) / FINER
+    sent = one.record.command.values
+    lines = np.interp(ticks, np.arange(sent.size), sent).reshape(-1, FINER)
+    record = replace(one.record, inputs=(lines,))
+    begin = np.append(_coordinates(one.model, record.interval_s, 2), 0.0)
+    return min(_searched(record, begin, zeros, False).power for zeros in (0, 1)) / one.power
 
 
 def _scatter(one: _Fitted) -> tuple[Array, Array, Array]:
