@@ -1,0 +1,589 @@
+"""Whether the fit explains the torque, whether a joint can have these numbers, and the loop.
+
+A residual that is white within the band carries nothing more to be explained, and textbook standard
+errors hold for it. One that still follows the perturbation says that the model lacks something: a
+delay between the channels, a reflex, a joint that is not linear.
+
+**Least squares.** Torque u that something but the robot adds pulls least squares by b
+(`methods.loop_pull`). Where each line counts by its noise, b is small and in the interval; where
+lines count alike it is not. Weights do not change what noise and the loop alone leave: with p₀ the
+solution in which lines count alike, b₀ its pull and p̂ the weighted one, p₀ − b₀ − p̂ is zero but for
+the standard error of p₀, which is the larger (Hausman 1978). What the model lacks, such as a
+reflex, has other sizes at other frequencies, so the two solutions differ.
+
+**Controller.** Perturbation p and measured torque M' make the velocity command, c = A (p − F M'),
+with the admittance A and the low-pass F of the settings. From one tick of T to the next
+
+    p − F M' = B_c c(k) + β (c(k) − c(k − 1)),    β = B_c d / (1 − d),    d = e^(−B_c T/J_c)
+
+so inertia and damping follow from a recorded command by least squares. A movement that is imposed
+beside the perturbation adds a line to the command that no torque asked for: the line at which the
+two differ most is left out, for a wrong controller is as wrong at all the others. It does not bias
+instruments, which follow from the perturbation alone; the pull on least squares is computed with
+the controller that the recording shows. A loop that would be unstable with the joint that was
+estimated cannot have moved it.
+
+**Drive.** It holds a command from tick to tick. Torque that is sampled at the ticks sees the
+acceleration there, which is this share of its mean (`published.acceleration_seen`):
+
+    first order, bandwidth λ      λT / (e^(λT) − 1), and the torque seems half a tick late
+    second order, bandwidth ω     1 − (ωT)²/12, and it hardly seems late
+
+J comes out low by as much. Torque and motion alone do not show λ or ω, but where the torque is not
+late its acceleration does not jump at the ticks, and a drive of first order is ruled out, unless a
+command was recorded that no drive explains. The range of J is that over the drives which are left,
+of all bandwidths up to that of the settings.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from rigidimeter.analysis.estimate_anew.checks import (
+    Pull,
+    at_least,
+    at_most,
+    found,
+    half_widths,
+    too_biased,
+)
+from rigidimeter.analysis.estimate_anew.checks.excitation import (
+    by_push,
+    checked_lines,
+    perturbation_lines,
+    shown,
+)
+from rigidimeter.analysis.estimate_anew.drive import Drive
+from rigidimeter.analysis.estimate_anew.grid import Array, Complex
+from rigidimeter.analysis.estimate_anew.methods import direct, loop_pull
+from rigidimeter.analysis.estimate_anew.observation import Observation, loop_of
+from rigidimeter.analysis.estimate_anew.published import acceleration_seen
+from rigidimeter.analysis.estimate_anew.signals import lines_inside, power_lines
+from rigidimeter.analysis.estimate_anew.solve import (
+    LineNoise,
+    inverse_of,
+    noise_powers,
+    shortest,
+    smoother,
+    sums,
+)
+from rigidimeter.analysis.estimate_anew.stretches import moves
+from rigidimeter.core.findings import Effect, Fact, Finding
+from rigidimeter.core.records import PARAMETERS, Delay, Epoch, Fit
+from rigidimeter.core.settings import ControllerSettings, DiagnosticsSettings, Settings
+from rigidimeter.core.units import per_rad_from_per_deg, rad_from_deg
+from rigidimeter.model import (
+    DriveModel,
+    JointDynamics,
+    Loop,
+    admittance,
+    butterworth_lowpass,
+    spectral_radius,
+)
+
+LINES_TOGETHER, LONGEST_LAG_S = 8, 1.0
+
+STANDARD_ERRORS, PULL_SHARE = 4.0, 0.5
+"""So far may the two solutions be apart by chance, of whichever of J, B and K; and by this share of
+b₀, which is computed from the residual of one epoch."""
+
+MOST_NOISE = 50.0
+"""In %. Then as much of what decides J or B is noise as is motion."""
+
+PER_DEGREE_WITHIN = 1.5
+"""Values that are wrong by 57.3, within this factor, were given per degree."""
+
+COMPARED_HZ = (0.5, 10.0)
+"""Below, the start of the epoch still counts; above, how the torque is held between its samples."""
+
+LINE_BINS, LEAST_LEFT = 2, 0.01
+"""Half the width of a line in the window. Where less of the command's power is beside the line in
+which the two differ most, that line is compared too."""
+
+FORGOTTEN_S = 1.0
+"""So long after a stretch that is left out the comparison counts in full again."""
+
+LATE = 0.1
+"""A drive of first order is ruled out where the torque is late by less than this share of a tick.
+On rigs of 200 to 1000 ticks/s it was .34 to .50 late with velocity PI drives, with drives of second
+order at most .06 where these take less than 2 % off J."""
+
+LITTLE = 0.02
+"""A friction below this share of the torque's SD may be one of the drive."""
+
+
+def residual(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
+    """Return what the torque that J, B and K leave says of the model.
+
+    Parameters
+    ----------
+    observation : Observation
+        The epoch at its lines.
+    fit : Fit
+    pull : Pull
+        What torque of the subject does to the fit.
+    """
+    seen = checked_lines(observation)
+    findings = residual_whiteness(seen, fit, pull)
+    if moves(seen.epoch.channels.get("perturbation_nm")):
+        findings += residual_perturbation(seen, fit, pull)
+    return _of(fit, findings + held_out_vaf(seen, fit, pull))
+
+
+def parameters(epoch: Epoch, fit: Fit, pull: Pull, settings: DiagnosticsSettings) -> list[Finding]:
+    """Return what J, B and K, and R², say by themselves."""
+    findings = gravity(epoch, fit, settings) + r_squared(fit, pull, settings)
+    findings += negative_parameters(fit, settings) + implausible_parameters(fit, settings)
+    return _of(fit, findings)
+
+
+def least_squares(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
+    """Return what least squares of the measured motion assumes and the epoch contradicts."""
+    if pull.instruments:
+        return []
+    findings = loop_bias(fit, pull, observation.settings.diagnostics)
+    if pull.in_interval:
+        findings += unweighted_fit(observation, fit) + noise_of_motion(observation, fit)
+    return _of(fit, findings)
+
+
+def _of(fit: Fit, findings: Sequence[Finding]) -> list[Finding]:
+    return [replace(one, condition=fit.condition) for one in findings]
+
+
+def residual_whiteness(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
+    """Return whether the residual within the band is coloured, by its spectral flatness.
+
+    The geometric over the arithmetic mean of the power, lines taken eight together; their mean
+    logarithm is that of white noise less ln 8 − ψ(8), which is made up for.
+    """
+    settings, signals = seen.settings.diagnostics, shown(seen)
+    frequency, power = power_lines(signals.unexplained_nm(fit.value), signals.rate_hz)
+    power = power[lines_inside(frequency, signals.band_hz)]
+    groups = max(power.size // LINES_TOGETHER, 1)
+    means = power[: groups * LINES_TOGETHER].reshape(groups, -1).mean(axis=1)
+    value = math.nan
+    if np.all(means > 0):
+        made_up = math.log(LINES_TOGETHER) - float(scipy.special.digamma(LINES_TOGETHER))
+        value = min(float(np.exp(np.mean(np.log(means)) + made_up) / np.mean(means)), 1.0)
+    least, more = settings.min_residual_flatness, by_push(fit, pull, settings)
+    return at_least("residual_whiteness", settings, value, least, **more)
+
+
+def residual_perturbation(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
+    """Return whether torque follows the perturbation that is not explained.
+
+    The largest correlation of residual and perturbation, at any lag up to 1 s either way, times the
+    residual's share of the torque: in % of the torque's standard deviation. A correlation that two
+    independent signals of these spectra reach in one of 20 epochs is none: they correlate with
+    variance c Σ P_a P_b / (2 Σ P_a Σ P_b) over the lines (Bartlett 1935), and as the lag runs, a
+    Gaussian correlation of rms frequency ν passes ±u standard deviations 2 ν T exp(−u²/2) times on
+    average (Rice 1944), which is set to 1/20.
+
+    What the perturbation causes beyond J, B and K biases every method, so nothing is claimed of
+    them where torque of the subject does not: a single epoch is no proof.
+    """
+    settings, grid = seen.settings.diagnostics, seen.grid
+    left, cause = seen.torque_nm - seen.motion @ fit.value, perturbation_lines(seen)
+    a, b = np.abs(left) ** 2, np.abs(cause) ** 2
+    size, total = math.sqrt(np.sum(a) * np.sum(b)), float(np.sum(np.abs(seen.torque_nm) ** 2))
+    if size == 0.0 or total == 0.0:
+        return []
+    lag, n = round(LONGEST_LAG_S * grid.rate_hz), grid.time_s.size
+    spectrum = np.zeros(n // 2 + 1, dtype=np.complex128)
+    spectrum[grid.line] = left * cause.conj()
+    lags = np.arange(-lag, lag + 1)
+    together = scipy.fft.irfft(spectrum, n)[lags] * (n / 2 / size)
+    at = int(np.argmax(np.abs(together)))
+    r = float(abs(together[at]))
+    power = a * b
+    deviation = math.sqrt(0.5 * grid.spread * float(np.sum(power))) / size
+    rms_hz = math.sqrt(float(np.sum(grid.omega_rad_s**2 * power) / np.sum(power))) / (2 * math.pi)
+    crossings = max(2.0 * rms_hz * 2.0 * LONGEST_LAG_S, 0.1)
+    chance = deviation * math.sqrt(2.0 * math.log(crossings / 0.05))
+    value = 100.0 * r * math.sqrt(float(np.sum(a)) / total)
+    most = settings.max_residual_perturbation_percent
+    if value <= most or r <= chance:
+        return []
+    facts = {"correlation": r, "lag_s": float(lags[at] / grid.rate_hz), "chance": chance}
+    harmless = "chance" if pull.harmless(fit, settings)[0] else ""
+    name = "residual_perturbation"
+    return [found(name, settings, value, most, facts=facts, harmless=harmless)]
+
+
+def held_out_vaf(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
+    """Return whether J, B and K of the first half explain the second half's torque."""
+    settings, signals = seen.settings.diagnostics, shown(seen)
+    half = signals.time_s.size // 2
+    first, second = signals.part(slice(half)), signals.part(slice(half, None))
+    values = shortest(first.motion.T @ first.motion, first.motion.T @ first.torque_nm)
+    variance = float(np.var(second.torque_nm))
+    left = float(np.var(second.unexplained_nm(values)))
+    value = 100.0 * (1.0 - left / variance) if variance > 0 else math.nan
+    least, more = settings.min_held_out_vaf_percent, by_push(fit, pull, settings)
+    return at_least("held_out_vaf", settings, value, least, **more)
+
+
+def r_squared(fit: Fit, pull: Pull, settings: DiagnosticsSettings) -> list[Finding]:
+    """Return whether J, B and K explain little of the torque.
+
+    It does not matter to a method that weights torque beyond the model away.
+    """
+    more = by_push(fit, pull, settings)
+    if not pull.instruments and not pull.in_interval:
+        more |= {"harmless": "", "facts": {}}
+    return at_least("r_squared", settings, fit.r_squared, settings.min_r_squared, **more)
+
+
+def negative_parameters(fit: Fit, settings: DiagnosticsSettings) -> list[Finding]:
+    """Return how many of J, B and K are not above zero (none may be).
+
+    A sign that noise may have made, where the upper end of an interval is above zero, says nothing.
+    """
+    wrong = [name for name, value in zip("JBK", fit.value, strict=True) if not value > 0]
+    variant = ""
+    if len(wrong) == len(fit.value):
+        variant = "noise" if np.any(fit.high > 0) else "reaction"
+    more = {"variant": variant, "excludes": variant == "reaction"}
+    facts = {"names": " and ".join(wrong)}
+    return at_most("negative_parameters", settings, float(len(wrong)), 0.0, facts=facts, **more)
+
+
+def implausible_parameters(fit: Fit, settings: DiagnosticsSettings) -> list[Finding]:
+    """Return by what factor the worst of J, B and K is outside its range; at most 1 is inside.
+
+    Only sizes are looked at; signs are another check's business.
+    """
+    J, B, K = np.abs(fit.value).tolist()
+    factors = {
+        (0, "large"): J / settings.max_inertia_kg_m2,
+        (1, "large"): B / settings.max_damping_nm_s_rad,
+        (2, "large"): K / settings.max_stiffness_nm_rad,
+        (0, "small"): settings.min_inertia_kg_m2 / J if J else math.inf,
+    }
+    worst, side = max(factors, key=lambda one: factors[one])
+    about = PARAMETERS[worst]
+    facts = {"symbol": about.symbol, "size": float(fit.value[worst]), "size_unit": about.unit}
+    value = factors[worst, side]
+    return at_most("implausible_parameters", settings, value, 1.0, facts=facts | {"side": side})
+
+
+def gravity(epoch: Epoch, fit: Fit, settings: DiagnosticsSettings) -> list[Finding]:
+    """Return K without the slope of the limb's weight, where that is in the settings.
+
+    A limb at the angle θ from hanging straight down takes the torque m g l sin θ, whose slope
+    m g l cos θ is in K.
+    """
+    angle = epoch.channels.get("angle_rad")
+    if settings.gravity_nm == 0.0 or angle is None:
+        return []
+    hanging_rad, K = rad_from_deg(settings.gravity_angle_deg), fit.stiffness_nm_rad
+    slope = settings.gravity_nm * float(np.mean(np.cos(hanging_rad + angle.values)))
+    return [found("gravity", settings, K - slope, facts={"stiffness": K, "slope": slope})]
+
+
+def pull_of(observation: Observation, fit: Fit, *, by_noise: bool) -> Pull:
+    """Return what torque of the subject does to least squares of an epoch.
+
+    Parameters
+    ----------
+    observation : Observation
+        Without instruments.
+    fit : Fit
+        Where lines count by their noise, the solution.
+    by_noise : bool
+        Or all lines count alike.
+    """
+    if observation.loop is None:
+        return Pull(None, by_noise)
+    problems, values = direct([observation], fit.value), fit.value
+    powers = [np.ones(observation.grid.line.size)]
+    try:
+        if by_noise:
+            powers = noise_powers(problems, values)
+        else:
+            values = shortest(*sums([p._replace(instruments=p.regressors) for p in problems]))
+        inverse = inverse_of(sums(problems, powers)[0])
+    except ValueError:
+        return Pull(np.full(3, np.nan), by_noise)
+    return Pull(fit.value - values + loop_pull(problems, powers, values, inverse), by_noise)
+
+
+def loop_bias(fit: Fit, pull: Pull, settings: DiagnosticsSettings) -> list[Finding]:
+    """Return how far the loop pulls least squares from the joint, in % of half the intervals.
+
+    A loop that is not known is a note, since nothing is computed.
+    """
+    most = settings.max_loop_bias_percent
+    if pull.bias is None:
+        return [found("loop_bias", settings, math.nan, most, harmless="not_known")]
+    half = half_widths(fit)
+    value = 100.0 * float(np.max(np.abs(pull.bias) / half))
+    if not math.isfinite(value):
+        return [found("loop_bias", settings, value, most, variant="unknown")]
+    if not too_biased(fit, pull.bias, most, pull.in_interval):
+        return []
+    effect = Effect.of(pull.bias, fit.value, half)
+    variant = "first_order" if pull.in_interval else ""
+    return [found("loop_bias", settings, value, most, variant=variant, effect=effect)]
+
+
+def unweighted_fit(observation: Observation, fit: Fit) -> list[Finding]:
+    """Return by how many % least squares without weights differs, more than noise and loop do."""
+    settings, grid = observation.settings.diagnostics, observation.grid
+    problems = direct([observation], fit.value)
+    gram, moment = sums(problems)
+    inverse = inverse_of(gram)
+    alike = inverse @ moment
+    pull = loop_pull(problems, [np.ones(grid.line.size)], alike, inverse)
+    if not np.all(np.isfinite(pull)):
+        return []
+    (shape,), smooth = noise_powers(problems, alike), smoother(grid.line, 1)
+    noise = LineNoise(problems[0], shape, problems[0].instruments, inverse)
+    covariance = noise.variance(noise.density(problems[0].residual(alike), smooth))
+    apart = alike - pull - fit.value
+    allowed = STANDARD_ERRORS * np.sqrt(np.diag(covariance)) + PULL_SHARE * np.abs(pull)
+    percent, most = 100.0 * apart / np.abs(fit.value), settings.max_unweighted_percent
+    sure = (np.abs(apart) > allowed) & (np.abs(percent) > most)
+    if not np.any(sure):
+        return []
+    about = int(np.argmax(np.where(sure, np.abs(percent), -1.0)))
+    facts = {"symbol": "JBK"[about], "way": "higher" if percent[about] > 0 else "lower"}
+    return [found("unweighted_fit", settings, float(abs(percent[about])), most, facts=facts)]
+
+
+def noise_of_motion(observation: Observation, fit: Fit) -> list[Finding]:
+    """Return how much of the motion that decides J or B is noise, in %.
+
+    Half the difference of what even and odd samples give is the noise of their mean. With its power
+    |n|² and that of the motion |φ|², both weighted, the share is Σ |n|²/S ÷ Σ |φ|²/S. What
+    neighbouring samples share, as behind a filter, it does not show.
+    """
+    if observation.noise is None:
+        return []
+    (power,) = noise_powers(direct([observation], fit.value), fit.value)
+    of_noise, of_motion = (
+        np.sum(np.abs(lines[:, :2]) ** 2 / power[:, None], axis=0)
+        for lines in (observation.noise, observation.motion)
+    )
+    share = 100.0 * of_noise / of_motion
+    about, settings = int(np.argmax(share)), observation.settings.diagnostics
+    facts: dict[str, Fact] = {"symbol": "JB"[about]}
+    return at_most("noise_of_motion", settings, float(share[about]), MOST_NOISE, facts=facts)
+
+
+class Shown(NamedTuple):
+    """What a recorded command says of the controller.
+
+    Attributes
+    ----------
+    misfit_percent, factor : float
+        The difference of what the controller of the settings makes from the command, in % of it,
+        and its size, as a factor of it; NaN where nothing can be said.
+    controller : ControllerSettings or None
+        Another one that makes the command, where that of the settings does not.
+    """
+
+    misfit_percent: float = math.nan
+    factor: float = math.nan
+    controller: ControllerSettings | None = None
+
+
+def controller_shown(epoch: Epoch, settings: Settings) -> Shown:
+    """Return what the recorded command says of the controller of the settings.
+
+    Nothing where command or perturbation were not recorded, or ticks are missing.
+    """
+    command = epoch.channels.get("velocity_command_rad_s")
+    if command is None or "perturbation_nm" not in epoch.channels or len(command) < 2:
+        return Shown()
+    rate_hz, n = command.mean_rate_hz, len(command)
+    if np.ptp(np.diff(command.time_s)) > 0.5 / rate_hz:
+        return Shown()
+    window = np.hanning(n)
+    for stretch in epoch.left_out:  # there neither torque nor, where samples are lost, command is
+        before_s, after_s = stretch.start_s - command.time_s, command.time_s - stretch.stop_s
+        away = np.clip(np.maximum(before_s, after_s) / FORGOTTEN_S, 0.0, 1.0)
+        window = window * (0.5 - 0.5 * np.cos(np.pi * away))
+    asked_nm = _asked_nm(epoch, settings, command.time_s)
+    compared = slice(*(int(edge * n / rate_hz) + k for k, edge in enumerate(COMPARED_HZ)))
+
+    def lines(*signals: Array) -> Complex:
+        return np.asarray(scipy.fft.rfft(np.stack(signals) * window)[:, compared])
+
+    def compare(controller: ControllerSettings) -> tuple[float, float, NDArray[np.bool_]]:
+        """Return misfit in %, factor, and which lines were compared."""
+        J, B = controller.inertia_kg_m2, controller.damping_nm_s_rad
+        decay, gain = admittance(J, B, 1.0 / rate_hz)
+        made = scipy.signal.lfilter([gain], [1.0, -decay], asked_nm)
+        sent, made = lines(command.values, made)
+        apart = np.abs(sent - made)
+        kept = np.abs(np.arange(sent.size) - np.argmax(apart)) > LINE_BINS
+        power = np.abs(sent) ** 2
+        if not np.sum(power[kept]) > LEAST_LEFT * np.sum(power):
+            kept = np.ones_like(kept)
+        total = float(np.sum(power[kept]))
+        if total == 0.0:
+            return math.nan, math.nan, kept
+        factor = float(np.sum((sent.conj() * made).real[kept]) / total)
+        return 100.0 * math.sqrt(np.sum(apart[kept] ** 2) / total), factor, kept
+
+    percent, factor, kept = compare(settings.controller)
+    most = settings.diagnostics.max_controller_misfit_percent
+    if not percent > most:
+        return Shown(percent, factor)
+    step_rad_s = np.diff(command.values, prepend=command.values[0])
+    *columns, wanted = lines(command.values, step_rad_s, asked_nm)[:, kept]
+    stacked = np.concatenate([np.stack(columns, 1).real, np.stack(columns, 1).imag])
+    found, *_ = np.linalg.lstsq(stacked, np.concatenate([wanted.real, wanted.imag]))
+    damping, beta = found.tolist()
+    if not beta > 0:
+        return Shown(percent, factor)
+    bent = damping / beta / math.log1p(damping / beta) if damping > 0 else 1.0
+    values = {"inertia_kg_m2": beta / rate_hz * bent, "damping_nm_s_rad": max(damping, 0.0)}
+    other = settings.controller.model_copy(update=values)
+    return Shown(percent, factor, None if compare(other)[0] > most else other)
+
+
+def _asked_nm(epoch: Epoch, settings: Settings, ticks_s: Array) -> Array:
+    """Return perturbation less the torque as the loop read and filtered it, at each tick."""
+    perturbation, torque = epoch.channels["perturbation_nm"], epoch.channels["torque_nm"]
+    rate_hz = (ticks_s.size - 1) / float(ticks_s[-1] - ticks_s[0])
+    held = np.searchsorted(perturbation.time_s, ticks_s + 0.01 / rate_hz, side="right") - 1
+    # The newest sample at a tick is half an interval old on average, beside the latency.
+    late_s = settings.rig.torque.latency_s + max(0.5 / torque.rate_hz - 0.5 / rate_hz, 0.0)
+    read = np.interp(ticks_s - late_s, torque.time_s, torque.values)
+    cutoff_hz = settings.controller.torque_cutoff_hz
+    if cutoff_hz < rate_hz / 2:
+        b0, b1, b2, a1, a2 = butterworth_lowpass(cutoff_hz, rate_hz)
+        read = scipy.signal.lfilter([b0, b1, b2], [1.0, a1, a2], read)
+    return np.asarray(perturbation.values[np.maximum(held, 0)] - read)
+
+
+def loop_shown(epoch: Epoch, settings: Settings, drive: Drive | None, shown: Shown) -> Loop | None:
+    """Return the loop that an epoch ran in, for least squares: recorded, or stated in the settings.
+
+    None where it is neither: the defaults of the controller are the paper's, which are no reason to
+    think that a robot gave way.
+    """
+    recorded = ("perturbation_nm", "velocity_command_rad_s")
+    stated = "controller" in settings.model_fields_set
+    if not stated and not any(name in epoch.channels for name in recorded):
+        return None
+    loop = loop_of(settings, epoch.channels["torque_nm"].rate_hz, drive)
+    return loop if shown.controller is None else replace(loop, controller=shown.controller)
+
+
+def controller(
+    epoch: Epoch, fit: Fit, pull: Pull, settings: Settings, shown: Shown
+) -> list[Finding]:
+    """Return what contradicts the controller of the settings: the command, or the joint."""
+    if not moves(epoch.channels.get("perturbation_nm")):
+        return []
+    return _of(
+        fit,
+        controller_misfit(fit, pull, settings, shown) + unstable_loop(epoch, fit, pull, settings),
+    )
+
+
+def controller_misfit(fit: Fit, pull: Pull, settings: Settings, shown: Shown) -> list[Finding]:
+    """Return how far the command is from what the controller makes of perturbation and torque."""
+    if math.isnan(shown.misfit_percent):
+        return []
+    facts: dict[str, Fact] = {"factor": shown.factor}
+    variant, harmless = "", ""
+    why: dict[str, Fact] = {}
+    if shown.controller is not None:
+        variant = _how_shown(settings.controller, shown.controller)
+        facts["shown_inertia"] = shown.controller.inertia_kg_m2
+        facts["shown_damping"] = shown.controller.damping_nm_s_rad
+    # Of a loop that is not known the bias cannot be told.
+    if pull.instruments or variant:
+        harmless, why = pull.harmless(fit, settings.diagnostics)
+    most = settings.diagnostics.max_controller_misfit_percent
+    more = {"facts": {**facts, **why}, "variant": variant, "harmless": harmless}
+    return at_most("controller_misfit", settings.diagnostics, shown.misfit_percent, most, **more)
+
+
+def _how_shown(given: ControllerSettings, other: ControllerSettings) -> str:
+    """Return the variant that says how the settings differ from the controller that was used."""
+    heavier = other.inertia_kg_m2 / given.inertia_kg_m2
+    factors = np.array([heavier, other.damping_nm_s_rad / max(given.damping_nm_s_rad, 1e-12)])
+    per_deg = per_rad_from_per_deg(1.0)
+    for wrong, variant in ((per_deg, "per_degree"), (1.0 / per_deg, "per_degree_twice")):
+        with np.errstate(divide="ignore"):
+            if np.all(np.abs(np.log(factors / wrong)) < math.log(PER_DEGREE_WITHIN)):
+                return variant
+    return "shown"
+
+
+def unstable_loop(epoch: Epoch, fit: Fit, pull: Pull, settings: Settings) -> list[Finding]:
+    """Return the growth per second of the loop of the settings with the joint that was found."""
+    if not np.all(fit.value >= 0):
+        return []  # no such joint
+    rig = loop_of(settings, epoch.channels["torque_nm"].rate_hz, None).rig
+    looped = Settings().model_copy(update={"controller": settings.controller, "rig": rig})
+    radius = spectral_radius(looped, JointDynamics(*fit.value.tolist()))
+    value = math.log(max(radius, 1e-12)) * rig.tick_rate_hz
+    harmless, why = pull.harmless(fit, settings.diagnostics)
+    more = {"harmless": harmless, "facts": why}
+    return at_most("unstable_loop", settings.diagnostics, value, 0.0, **more)
+
+
+def between_samples(
+    epoch: Epoch,
+    fit: Fit,
+    pull: Pull,
+    settings: Settings,
+    delay: Delay | None,
+    missing: Sequence[Finding] = (),
+) -> list[Finding]:
+    """Return by how much J may be too low, in %, where the loop was recorded and not its drive.
+
+    A drive shows in the torque only by what it does between the samples of the velocity. Where no
+    loop was recorded, J is not known as long as friction of the drive may be in the torque.
+
+    Parameters
+    ----------
+    epoch : Epoch
+        Of a recording that does not show its drive.
+    fit : Fit
+    pull : Pull
+    settings : Settings
+    delay : Delay or None
+        Of the torque of its recording.
+    missing : sequence of Finding
+        What the torque holds beside J, B and K.
+    """
+    checks, rig, channels = settings.diagnostics, settings.rig, epoch.channels
+    most, J = checks.max_between_samples_percent, fit.inertia_kg_m2
+    command = channels.get("velocity_command_rad_s")
+    ticks = channels.get("perturbation_nm") if command is None and pull.instruments else command
+    if ticks is not None and J > 0.0:
+        interval_s = 1.0 / ticks.mean_rate_hz
+        late = math.nan if delay is None else delay.delay_s / interval_s
+        fastest = 2 * math.pi * rig.drive_bandwidth_hz
+        drive = DriveModel((complex(-fastest),), (complex(fastest),))
+        if command is None and late < LATE:
+            drive = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
+        seen = acceleration_seen(drive, interval_s, np.zeros(1))
+        facts: dict[str, Fact] = {"symbol": "J", "low_j": J, "high_j": J / seen}
+        facts["bandwidth_hz"] = rig.drive_bandwidth_hz
+        effect = Effect((-100.0 * (1.0 - seen), math.nan, math.nan))
+        more = {"facts": facts, "variant": "unknown_drive", "effect": effect}
+        value = 100.0 * (1.0 / seen - 1.0)
+        return _of(fit, at_most("between_samples", checks, value, most, **more))
+    said = any(one.name == "between_samples" for one in fit.findings)
+    little = any("of_drive" in str(one.facts.get("variant")).split() for one in missing)
+    if pull.instruments or command is not None or said or not little:
+        return []
+    facts = {"little": 100 * LITTLE}
+    name, variant = "between_samples", "friction"
+    return _of(fit, [found(name, checks, math.nan, most, facts=facts, variant=variant)])
