@@ -68,6 +68,7 @@ PASSED_HZ = 10.0  # an angle is used as the velocity through a low-pass with thi
 EDGES_TICKS = (0, *sorted(step << octave for octave in range(13) for step in (2, 3)))
 """Of stretches of past commands, ever longer the longer ago."""
 
+FAR = 30.0  # a delay is not searched where more times the power of others is left near it
 WORTH = 0.02  # a further pole is tried where past commands explain this share of what is left
 AS_GOOD, UNSEEN = 1.05, 2e-5
 """A drive that leaves no more than so many times the power of the best, and this share of the SD of
@@ -92,7 +93,7 @@ between them, in so many steps, leave this share of what stairs leave, the stair
 ERRORS, BLOCKS = 2.0, 32
 """A delay must be longer than so many standard errors, and rivals are so many away; they are those
 of sums over so many stretches, whatever the colour of the noise."""
-MOST_STEPS, ENOUGH = 20, 1e-4  # of a search, and the last share of the power to gain
+MOST_STEPS, ENOUGH = 12, 1e-4  # of a search, and the last share of the power to gain
 STEP, LONG, CURVED = 1e-4, 5.0, 2.0
 """Of a coordinate, for its slope; the longest move of one; a move that changes the velocity by more
 times what the slopes say is halved."""
@@ -347,43 +348,48 @@ def _climbed(record: _Record, start: DriveModel) -> list[_Fitted]:
     models = [replace(start, poles_rad_s=tuple(x * p for p in start.poles_rad_s)) for x in speeds]
     found: list[_Fitted] = []
     enough = False
-    for poles in range(1 + rubs, MOST_POLES + 1):
-        before = min((one.power for one in found), default=1.0)
+    for poles in range(2, MOST_POLES + 1):
+        least = min((one.power for one in found), default=1.0)
         near = [*models, *regressed[poles - 1 : poles], *(one.model for one in found[-2:])]
         begins = [_coordinates(one, record.interval_s, poles) for one in near]
-        for zeros in range(max(poles - 2, 0), poles):
-            found.append(_best(record, begins, zeros))
-            begins.append(found[-1].place[:-1])
+        for zeros in (poles - 2, poles - 1):
+            found.append(_best(record, begins, zeros, least))
+            begins.append(found[-1].place)
         best = min(found, key=_power)
         if rubs:
-            if poles > 2 and RUBBED * best.power > before:
-                break
+            if poles > 2 and RUBBED * best.power > least:
+                return found
             continue
         spent = _explainable(best) < WORTH
-        done = poles > 1 and (enough or (spent and best.place[-1] == 0.0))
+        done = enough or (spent and best.place[-1] == 0.0)
         enough = spent
         if best.power > QUIET**2 and (done or poles > 2):
             least = best.power * (1.0 if done or poles == MOST_POLES else EARLY)
-            if (rubbed := _rubbed(found[2], least)) is not None:
+            if (rubbed := _rubbed(found[1], least)) is not None:
                 return _climbed(rubbed.record, rubbed.model)
         if done:
             break
-    return found
+    single = [_coordinates(one, record.interval_s, 1) for one in (*models, *regressed[:1])]
+    return [_best(record, single, 0, best.power), *found]
 
 
-def _best(record: _Record, begins: Sequence[Array], zeros: int) -> _Fitted:
-    """Return the drive that explains the velocity best, with a delay only where one is shown."""
-    at = [_answer(record, np.append(begin, 0.0), zeros) for begin in begins]
+def _best(record: _Record, begins: Sequence[Array], zeros: int, least: float) -> _Fitted:
+    """Return the drive that explains the velocity best, with a delay only where one is shown.
+
+    `least` is the power that others leave: far above it no delay is searched.
+    """
+    at = [_answer(record, np.append(one[:-1], 0.0), zeros) for one in begins]
     still = _searched(record, min(at, key=_power).place, zeros, False)
     step, scatter, _ = _scatter(still)
-    delay = still.place.size - 1
-    if step[delay] <= ERRORS * np.linalg.norm(scatter[delay]):
+    if step[still.place.size - 1] <= ERRORS * np.linalg.norm(scatter[still.place.size - 1]):
         return still
-    late = [
-        _answer(record, np.append(still.place[:-1], ticks), zeros)
-        for ticks in np.geomspace(SHORTEST_TICKS, _longest(record), 8)
-    ]
-    moved = _searched(record, min(late, key=_power).place, zeros, True)
+    ticks = np.geomspace(SHORTEST_TICKS, _longest(record), 8)
+    places = [one for one in begins if one[-1] > 0]
+    places = places or [np.append(still.place[:-1], late) for late in ticks]
+    late = min((_answer(record, one, zeros) for one in places), key=_power)
+    if late.power > FAR * least:
+        return still
+    moved = _searched(record, late.place, zeros, True)
     shown = 1.0 - ERRORS**2 / record.measured.size if len(record.inputs) == 1 else 1.0 / RUBBED
     return moved if moved.place[-1] > 0 and moved.power < shown * still.power else still
 
@@ -554,7 +560,7 @@ def _coordinates(drive: DriveModel, interval_s: float, poles: int) -> Array:
         found += [-(a + b).real * interval_s, (a * b).real * interval_s**2]
     if poles % 2:  # one of a pair does not stand alone
         found.append(abs(everyone[-1]) * interval_s)
-    return np.log(found)
+    return np.append(np.log(found), drive.delay_s / interval_s)
 
 
 @lru_cache(maxsize=2)
@@ -645,8 +651,8 @@ def _between_lines(one: _Fitted) -> float:
     sent = one.record.command.values
     lines = np.interp(ticks, np.arange(sent.size), sent).reshape(-1, FINER)
     record = replace(one.record, inputs=(lines,))
-    begin = np.append(_coordinates(one.model, record.interval_s, 2), 0.0)
-    return min(_searched(record, begin, zeros, False).power for zeros in (0, 1)) / one.power
+    begin = _coordinates(one.model, record.interval_s, 2)
+    return min(_searched(record, begin, zeros, begin[-1] > 0).power for zeros in (0, 1)) / one.power
 
 
 def _scatter(one: _Fitted) -> tuple[Array, Array, Array]:
