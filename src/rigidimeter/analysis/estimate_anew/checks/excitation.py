@@ -14,7 +14,6 @@ All but the shares of power are made of the lines of the epoch, weighted as `sig
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -37,7 +36,7 @@ from rigidimeter.analysis.estimate_anew.signals import (
 )
 from rigidimeter.analysis.estimate_anew.stretches import motion_channels, moves
 from rigidimeter.core.findings import Fact, Finding
-from rigidimeter.core.records import PARAMETERS, Epoch, Fit
+from rigidimeter.core.records import Epoch, Fit
 from rigidimeter.core.settings import DiagnosticsSettings, EstimationSettings
 
 OUTSIDE = 0.05
@@ -81,8 +80,8 @@ def checked_lines(observation: Observation) -> Observation:
     _, high_hz = _band_hz(observation)
     most = 2 * high_hz * observation.grid.duration_s
     part = observation.part(slice(int(np.searchsorted(observation.grid.line, most))))
-    gain = _gain(part)
-    return replace(part, torque_nm=gain * part.torque_nm, motion=gain[:, None] * part.motion)
+    share = gain(part)
+    return replace(part, torque_nm=share * part.torque_nm, motion=share[:, None] * part.motion)
 
 
 def _band_hz(seen: Observation) -> tuple[float, float]:
@@ -91,7 +90,7 @@ def _band_hz(seen: Observation) -> tuple[float, float]:
     return low_hz, min(high_hz, seen.grid.band_hz[1])
 
 
-def _gain(seen: Observation) -> Array:
+def gain(seen: Observation) -> Array:
     """Return that of `signals.zero_phase_band`, shape (m,)."""
     low_hz, high_hz = band_hz(seen.epoch, seen.settings.estimation)
     frequency_hz = seen.grid.line / seen.grid.duration_s
@@ -114,18 +113,16 @@ def shown(seen: Observation) -> Signals:
     return Signals(np.arange(torque.size) / rate_hz, torque, a, v, x, rate_hz, _band_hz(seen))
 
 
-def perturbation_lines(seen: Observation) -> Complex:
-    """Return the perturbation, held from one tick to the next, as `checked_lines`."""
-    held_nm = held_at(seen.epoch.channels["perturbation_nm"], seen.grid.time_s)
-    return np.asarray(_gain(seen) * seen.grid.lines(held_nm)[0])
+def perturbation_lines(observation: Observation) -> Complex:
+    """Return the perturbation, held from one tick to the next, at the lines."""
+    held = held_at(observation.epoch.channels["perturbation_nm"], observation.grid.time_s)
+    return np.asarray(observation.grid.lines(held)[0])
 
 
-def by_push(
-    fit: Fit, pull: Pull, settings: DiagnosticsSettings, facts: Mapping[str, Fact] | None = None
-) -> dict[str, Any]:
+def by_push(fit: Fit, pull: Pull, settings: DiagnosticsSettings, **facts: Fact) -> dict[str, Any]:
     """Return what a finding says of torque of the subject's own: its harm, effect and facts."""
     harmless, why = pull.harmless(fit, settings)
-    return {"harmless": harmless, "effect": pull.effect(fit), "facts": {**(facts or {}), **why}}
+    return {"harmless": harmless, "effect": pull.effect(fit), "facts": facts | why}
 
 
 def conditioning(seen: Observation, settings: DiagnosticsSettings) -> list[Finding]:
@@ -140,10 +137,10 @@ def conditioning(seen: Observation, settings: DiagnosticsSettings) -> list[Findi
     running = np.cumsum(np.abs(seen.motion[:, 1]) ** 2)
     ends = np.searchsorted(running / running[-1], [OUTSIDE, 1.0 - OUTSIDE])
     low_hz, high_hz = (seen.grid.line[ends] / seen.grid.duration_s).tolist()
-    facts = {"first": PARAMETERS[first].symbol, "second": PARAMETERS[second].symbol}
+    facts: dict[str, Fact] = {"first": "JBK"[first], "second": "JBK"[second]}
+    facts |= {"low_hz": low_hz, "high_hz": high_hz}
     value = math.sqrt(power[-1] / power[0]) if power[0] > 0 else math.inf
-    ranges = {"low_hz": low_hz, "high_hz": high_hz}
-    return at_most("conditioning", settings, value, most, facts=facts | ranges)
+    return at_most("conditioning", settings, value, most, facts=facts)
 
 
 def coherence(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
@@ -158,8 +155,7 @@ def coherence(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
     frequency, shared = scipy.signal.coherence(few[0], few[1:], rate_hz, nperseg=length)
     medians = np.median(shared[:, lines_inside(frequency, _band_hz(seen))], axis=1).tolist()
     value, weaker = min(zip(medians, ("torque", "velocity"), strict=True))
-    facts: dict[str, Fact] = {"signal": weaker, "percent": 100.0 * value}
-    more = by_push(fit, pull, settings, facts)
+    more = by_push(fit, pull, settings, signal=weaker, percent=100.0 * value)
     return at_least("coherence", settings, value, settings.min_coherence, **more)
 
 

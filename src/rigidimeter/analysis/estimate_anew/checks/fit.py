@@ -57,11 +57,12 @@ from rigidimeter.analysis.estimate_anew.checks import (
 from rigidimeter.analysis.estimate_anew.checks.excitation import (
     by_push,
     checked_lines,
+    gain,
     perturbation_lines,
     shown,
 )
 from rigidimeter.analysis.estimate_anew.drive import Drive
-from rigidimeter.analysis.estimate_anew.grid import Array, Complex
+from rigidimeter.analysis.estimate_anew.grid import Array
 from rigidimeter.analysis.estimate_anew.methods import direct, loop_pull
 from rigidimeter.analysis.estimate_anew.observation import Observation, loop_of
 from rigidimeter.analysis.estimate_anew.published import acceleration_seen
@@ -191,7 +192,7 @@ def residual_perturbation(seen: Observation, fit: Fit, pull: Pull) -> list[Findi
     them where torque of the subject does not: a single epoch is no proof.
     """
     settings, grid = seen.settings.diagnostics, seen.grid
-    left, cause = seen.torque_nm - seen.motion @ fit.value, perturbation_lines(seen)
+    left, cause = seen.torque_nm - seen.motion @ fit.value, gain(seen) * perturbation_lines(seen)
     a, b = np.abs(left) ** 2, np.abs(cause) ** 2
     size, total = math.sqrt(np.sum(a) * np.sum(b)), float(np.sum(np.abs(seen.torque_nm) ** 2))
     if size == 0.0 or total == 0.0:
@@ -237,8 +238,8 @@ def r_squared(fit: Fit, pull: Pull, settings: DiagnosticsSettings) -> list[Findi
     It does not matter to a method that weights torque beyond the model away.
     """
     more = by_push(fit, pull, settings)
-    if not pull.instruments and not pull.in_interval:
-        more |= {"harmless": "", "facts": {}}
+    if not (pull.instruments or pull.in_interval):
+        more = {"effect": more["effect"]}
     return at_least("r_squared", settings, fit.r_squared, settings.min_r_squared, **more)
 
 
@@ -413,36 +414,32 @@ def controller_shown(epoch: Epoch, settings: Settings) -> Shown:
         away = np.clip(np.maximum(before_s, after_s) / FORGOTTEN_S, 0.0, 1.0)
         window = window * (0.5 - 0.5 * np.cos(np.pi * away))
     asked_nm = _asked_nm(epoch, settings, command.time_s)
+    step_rad_s = np.diff(command.values, prepend=command.values[0])
     compared = slice(*(int(edge * n / rate_hz) + k for k, edge in enumerate(COMPARED_HZ)))
-
-    def lines(*signals: Array) -> Complex:
-        return np.asarray(scipy.fft.rfft(np.stack(signals) * window)[:, compared])
+    both = np.stack([command.values, step_rad_s, asked_nm])
+    sent, step, asked = scipy.fft.rfft(both * window)[:, compared]
 
     def compare(controller: ControllerSettings) -> tuple[float, float, NDArray[np.bool_]]:
         """Return misfit in %, factor, and which lines were compared."""
         J, B = controller.inertia_kg_m2, controller.damping_nm_s_rad
         decay, gain = admittance(J, B, 1.0 / rate_hz)
-        made = scipy.signal.lfilter([gain], [1.0, -decay], asked_nm)
-        sent, made = lines(command.values, made)
-        apart = np.abs(sent - made)
+        made_rad_s = scipy.signal.lfilter([gain], [1.0, -decay], asked_nm)
+        made = scipy.fft.rfft(made_rad_s * window)[compared]
+        apart, power = np.abs(sent - made), np.abs(sent) ** 2
         kept = np.abs(np.arange(sent.size) - np.argmax(apart)) > LINE_BINS
-        power = np.abs(sent) ** 2
         if not np.sum(power[kept]) > LEAST_LEFT * np.sum(power):
             kept = np.ones_like(kept)
-        total = float(np.sum(power[kept]))
-        if total == 0.0:
-            return math.nan, math.nan, kept
-        factor = float(np.sum((sent.conj() * made).real[kept]) / total)
-        return 100.0 * math.sqrt(np.sum(apart[kept] ** 2) / total), factor, kept
+        total = float(np.sum(power[kept])) or math.nan
+        factor = float(np.sum((sent.conj() * made).real[kept])) / total
+        return 100.0 * math.sqrt(float(np.sum(apart[kept] ** 2)) / total), factor, kept
 
     percent, factor, kept = compare(settings.controller)
     most = settings.diagnostics.max_controller_misfit_percent
     if not percent > most:
         return Shown(percent, factor)
-    step_rad_s = np.diff(command.values, prepend=command.values[0])
-    *columns, wanted = lines(command.values, step_rad_s, asked_nm)[:, kept]
-    stacked = np.concatenate([np.stack(columns, 1).real, np.stack(columns, 1).imag])
-    found, *_ = np.linalg.lstsq(stacked, np.concatenate([wanted.real, wanted.imag]))
+    columns = np.stack([sent, step], axis=1)[kept]
+    stacked = np.concatenate([columns.real, columns.imag])
+    found, *_ = np.linalg.lstsq(stacked, np.concatenate([asked.real[kept], asked.imag[kept]]))
     damping, beta = found.tolist()
     if not beta > 0:
         return Shown(percent, factor)
@@ -487,40 +484,37 @@ def controller(
     """Return what contradicts the controller of the settings: the command, or the joint."""
     if not moves(epoch.channels.get("perturbation_nm")):
         return []
-    return _of(
-        fit,
-        controller_misfit(fit, pull, settings, shown) + unstable_loop(epoch, fit, pull, settings),
-    )
+    misfit = controller_misfit(fit, pull, settings, shown)
+    return _of(fit, misfit + unstable_loop(epoch, fit, pull, settings))
 
 
 def controller_misfit(fit: Fit, pull: Pull, settings: Settings, shown: Shown) -> list[Finding]:
     """Return how far the command is from what the controller makes of perturbation and torque."""
-    if math.isnan(shown.misfit_percent):
+    other, value, checks = shown.controller, shown.misfit_percent, settings.diagnostics
+    if not value > checks.max_controller_misfit_percent:
         return []
-    facts: dict[str, Fact] = {"factor": shown.factor}
-    variant, harmless = "", ""
-    why: dict[str, Fact] = {}
-    if shown.controller is not None:
-        variant = _how_shown(settings.controller, shown.controller)
-        facts["shown_inertia"] = shown.controller.inertia_kg_m2
-        facts["shown_damping"] = shown.controller.damping_nm_s_rad
-    # Of a loop that is not known the bias cannot be told.
-    if pull.instruments or variant:
-        harmless, why = pull.harmless(fit, settings.diagnostics)
-    most = settings.diagnostics.max_controller_misfit_percent
-    more = {"facts": {**facts, **why}, "variant": variant, "harmless": harmless}
-    return at_most("controller_misfit", settings.diagnostics, shown.misfit_percent, most, **more)
+    more = by_push(fit, pull, checks, factor=shown.factor)
+    facts, harmless, variant = more["facts"], more["harmless"], ""
+    if other is not None:
+        variant = _how_shown(settings.controller, other)
+        facts["shown_inertia"] = other.inertia_kg_m2
+        facts["shown_damping"] = other.damping_nm_s_rad
+    elif not pull.instruments:  # of a loop that is not known the bias cannot be told
+        facts, harmless = {"factor": shown.factor}, ""
+    name, most = "controller_misfit", checks.max_controller_misfit_percent
+    return [found(name, checks, value, most, facts=facts, variant=variant, harmless=harmless)]
 
 
 def _how_shown(given: ControllerSettings, other: ControllerSettings) -> str:
     """Return the variant that says how the settings differ from the controller that was used."""
-    heavier = other.inertia_kg_m2 / given.inertia_kg_m2
-    factors = np.array([heavier, other.damping_nm_s_rad / max(given.damping_nm_s_rad, 1e-12)])
-    per_deg = per_rad_from_per_deg(1.0)
-    for wrong, variant in ((per_deg, "per_degree"), (1.0 / per_deg, "per_degree_twice")):
-        with np.errstate(divide="ignore"):
-            if np.all(np.abs(np.log(factors / wrong)) < math.log(PER_DEGREE_WITHIN)):
-                return variant
+    damping = max(other.damping_nm_s_rad, 1e-12) / max(given.damping_nm_s_rad, 1e-12)
+    factors, per_deg = (
+        np.log([other.inertia_kg_m2 / given.inertia_kg_m2, damping]),
+        math.log(per_rad_from_per_deg(1.0)),
+    )
+    for wrong, variant in ((per_deg, "per_degree"), (-per_deg, "per_degree_twice")):
+        if np.all(np.abs(factors - wrong) < math.log(PER_DEGREE_WITHIN)):
+            return variant
     return "shown"
 
 
@@ -533,8 +527,7 @@ def unstable_loop(epoch: Epoch, fit: Fit, pull: Pull, settings: Settings) -> lis
     radius = spectral_radius(looped, JointDynamics(*fit.value.tolist()))
     value = math.log(max(radius, 1e-12)) * rig.tick_rate_hz
     harmless, why = pull.harmless(fit, settings.diagnostics)
-    more = {"harmless": harmless, "facts": why}
-    return at_most("unstable_loop", settings.diagnostics, value, 0.0, **more)
+    return at_most("unstable_loop", settings.diagnostics, value, 0.0, harmless=harmless, facts=why)
 
 
 def between_samples(
@@ -562,28 +555,25 @@ def between_samples(
     missing : sequence of Finding
         What the torque holds beside J, B and K.
     """
-    checks, rig, channels = settings.diagnostics, settings.rig, epoch.channels
-    most, J = checks.max_between_samples_percent, fit.inertia_kg_m2
-    command = channels.get("velocity_command_rad_s")
-    ticks = channels.get("perturbation_nm") if command is None and pull.instruments else command
+    checks, rig = settings.diagnostics, settings.rig
+    command = epoch.channels.get("velocity_command_rad_s")
+    ticks = command or (epoch.channels.get("perturbation_nm") if pull.instruments else None)
+    name, most, J = "between_samples", checks.max_between_samples_percent, fit.inertia_kg_m2
     if ticks is not None and J > 0.0:
-        interval_s = 1.0 / ticks.mean_rate_hz
-        late = math.nan if delay is None else delay.delay_s / interval_s
-        fastest = 2 * math.pi * rig.drive_bandwidth_hz
+        interval_s, fastest = 1.0 / ticks.mean_rate_hz, 2 * math.pi * rig.drive_bandwidth_hz
         drive = DriveModel((complex(-fastest),), (complex(fastest),))
-        if command is None and late < LATE:
+        if command is None and delay is not None and delay.delay_s / interval_s < LATE:
             drive = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
         seen = acceleration_seen(drive, interval_s, np.zeros(1))
         facts: dict[str, Fact] = {"symbol": "J", "low_j": J, "high_j": J / seen}
         facts["bandwidth_hz"] = rig.drive_bandwidth_hz
         effect = Effect((-100.0 * (1.0 - seen), math.nan, math.nan))
-        more = {"facts": facts, "variant": "unknown_drive", "effect": effect}
         value = 100.0 * (1.0 / seen - 1.0)
-        return _of(fit, at_most("between_samples", checks, value, most, **more))
-    said = any(one.name == "between_samples" for one in fit.findings)
+        more = {"facts": facts, "variant": "unknown_drive", "effect": effect}
+        return _of(fit, at_most(name, checks, value, most, **more))
+    said = any(one.name == name for one in fit.findings)
     little = any("of_drive" in str(one.facts.get("variant")).split() for one in missing)
     if pull.instruments or command is not None or said or not little:
         return []
     facts = {"little": 100 * LITTLE}
-    name, variant = "between_samples", "friction"
-    return _of(fit, [found(name, checks, math.nan, most, facts=facts, variant=variant)])
+    return _of(fit, [found(name, checks, math.nan, most, facts=facts, variant="friction")])
