@@ -65,7 +65,7 @@ DOUBLE = 1e-4  # poles this close, as a share of their size, are taken for so fa
 BESIDE = 0.3  # where the search for a further pole begins, in times the first
 LONGEST_S, LONGEST_TICKS, SHORTEST_TICKS = 0.1, 4.0, 0.25  # of delays
 PASSED_HZ = 10.0  # an angle is used as the velocity through a low-pass with this corner
-EDGES_TICKS = (0, *sorted(step << octave for octave in range(13) for step in (2, 3)))
+EDGES_TICKS = (0, 1, *sorted(step << octave for octave in range(13) for step in (2, 3)))
 """Of stretches of past commands, ever longer the longer ago."""
 
 FAR = 30.0  # a delay is not searched where more times the power of others is left near it
@@ -300,15 +300,15 @@ def _identified(
         return []
     found = _climbed(record, start)
     times = AS_GOOD if len(found[0].record.inputs) == 1 else RUBBED
-    found = [one for one in found if _fastest(one) < SEEN]  # the samples show every pole
-    if not found:
-        return []
     best = min(found, key=_power)
     slowly = epoch.ticks is None and best.power > QUIET**2 and _explainable(best) > 0.5 * STAIRS
-    if slowly and _between_lines(best) < STAIRS:
+    if slowly and _power_of_lines(found) < STAIRS * best.power:
         return []
-    chosen = next(one for one in found if one.power <= times * best.power + UNSEEN**2)
-    if chosen.power > MISFIT**2 or not 0.5 < chosen.model.gain < 2.0:
+    found = [one for one in found if _fastest(one) < SEEN]  # the samples show every pole
+    best = min(found, key=_power, default=best)
+    alike = (one for one in found if one.power <= times * best.power + UNSEEN**2)
+    chosen = next(alike, None)
+    if chosen is None or chosen.power > MISFIT**2 or not 0.5 < chosen.model.gain < 2.0:
         return []
     noise = bool(best.left[1:] @ best.left[:-1] < COLOURED * best.left.size * best.power)
     most = (times if noise else RIVAL) * best.power + UNSEEN**2
@@ -645,14 +645,14 @@ def _signs(one: _Fitted) -> Array:
     return np.asarray(mean.reshape(-1, FINER))
 
 
-def _between_lines(one: _Fitted) -> float:
-    """Return what a drive leaves whose command went straight between samples, of what it left."""
-    ticks = (np.arange(FINER * len(one.record.command)) + 0.5) / FINER
-    sent = one.record.command.values
-    lines = np.interp(ticks, np.arange(sent.size), sent).reshape(-1, FINER)
-    record = replace(one.record, inputs=(lines,))
-    begin = _coordinates(one.model, record.interval_s, 2)
-    return min(_searched(record, begin, zeros, begin[-1] > 0).power for zeros in (0, 1)) / one.power
+def _power_of_lines(found: Sequence[_Fitted]) -> float:
+    """Return what drives of two poles leave whose command went straight between samples."""
+    sent = found[0].record.command.values
+    parts = (np.arange(FINER * sent.size) + 0.5) / FINER
+    lines = np.interp(parts, np.arange(sent.size), sent).reshape(-1, FINER)
+    record = replace(found[0].record, inputs=(lines,))
+    begins = [(one.place, one.zeros) for one in found if one.place.size == 3]
+    return min(_searched(record, *begin, begin[0][-1] > 0).power for begin in begins)
 
 
 def _scatter(one: _Fitted) -> tuple[Array, Array, Array]:
