@@ -22,12 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.core.records import Channel, Epoch, LeftOut, Outcome
-from rigidimeter.core.settings import (
-    USABLE_FRACTION_OF_RATE,
-    DiagnosticsSettings,
-    EstimationSettings,
-    Settings,
-)
+from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE, EstimationSettings, Settings
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -90,9 +85,7 @@ def screened(epoch: Epoch, settings: Settings) -> Epoch:
     then the check speaks of the whole epoch.
     """
     epoch, levels = bridged(epoch), settings.diagnostics.levels
-    if not fitted_channels(epoch):
-        return epoch
-    found = [one for one in _bad(epoch, settings.diagnostics) if levels.of(one.check) == "exclude"]
+    found = [one for one in _bad(epoch, settings) if levels.of(one.check) == "exclude"]
     return leaving_out(epoch, found, settings)[0]
 
 
@@ -221,18 +214,17 @@ def _span(epoch: Epoch) -> tuple[float, float]:
     return start_s, min(float(channel.time_s[-1]) for channel in used)
 
 
-def repeated(
-    epoch: Epoch, channel: Channel, settings: DiagnosticsSettings, *, extreme: bool = False
-) -> Rows:
+def repeated(epoch: Epoch, channel: Channel, most_s: float, *, extreme: bool = False) -> Rows:
     """Return the first and last row of runs of one value that neither joint nor command explain.
 
-    Runs within what is left out do not count. Those of up to `max_frozen_s` are given unexplained.
+    Runs within what is left out do not count.
 
     Parameters
     ----------
     epoch : Epoch
     channel : Channel
-    settings : DiagnosticsSettings
+    most_s : float
+        Of shorter runs it is not asked why, unless they are extreme.
     extreme : bool
         Those of the channel's largest or smallest value alone, `FEWEST_AT_EXTREME` rows or more.
 
@@ -240,7 +232,7 @@ def repeated(
     -------
     array of int, shape (k, 2)
     """
-    values, most_s = channel.values, settings.max_frozen_s
+    values = channel.values
     edges = np.flatnonzero(np.diff(np.diff(values) == 0, prepend=False, append=False))
     runs = edges.reshape(-1, 2)
     if epoch.left_out:
@@ -262,15 +254,15 @@ def at_extremes_percent(channel: Channel, runs: Rows) -> float:
     return 100.0 * float(np.sum(np.ptp(runs, axis=1) + 1)) / len(channel)
 
 
-def _bad(epoch: Epoch, settings: DiagnosticsSettings) -> list[LeftOut]:
+def _bad(epoch: Epoch, settings: Settings) -> list[LeftOut]:
     """Return where a channel hung, or was at the end of its range if it was so too often."""
-    found = []
+    most_s, found = settings.diagnostics.max_frozen_s, []
     for one in fitted_channels(epoch):
-        spans_s = one.time_s[repeated(epoch, one, settings)]
-        long = spans_s[np.ptp(spans_s, axis=1) > settings.max_frozen_s].tolist()
+        spans_s = one.time_s[repeated(epoch, one, most_s)]
+        long = spans_s[np.ptp(spans_s, axis=1) > most_s].tolist()
         found += [LeftOut(a, b, f"{one.name} repeats one value", "frozen") for a, b in long]
-        runs = repeated(epoch, one, settings, extreme=True)
-        if at_extremes_percent(one, runs) > settings.max_saturated_percent:
+        runs = repeated(epoch, one, most_s, extreme=True)
+        if at_extremes_percent(one, runs) > settings.diagnostics.max_saturated_percent:
             text, spans = f"{one.name} repeats an extreme value", one.time_s[runs].tolist()
             found += [LeftOut(a, b, text, "saturation") for a, b in spans]
     return found

@@ -24,9 +24,10 @@ import numpy as np
 from rigidimeter.analysis.estimate_anew.activity import CHECK
 from rigidimeter.analysis.estimate_anew.checks import Array, Pull, at_most, found, half_widths
 from rigidimeter.analysis.estimate_anew.checks.sensors import rest_of
-from rigidimeter.analysis.estimate_anew.grid import SAME_TIME, Complex, Grid
+from rigidimeter.analysis.estimate_anew.grid import SAME_TIME, Complex, Grid, grid_of
 from rigidimeter.analysis.estimate_anew.observation import Observation
-from rigidimeter.analysis.estimate_anew.signals import band_hz, values_at
+from rigidimeter.analysis.estimate_anew.signals import band_hz, kinematics, values_at
+from rigidimeter.analysis.estimate_anew.stretches import fitted_channels
 from rigidimeter.core.findings import UNKNOWN_EFFECT, Effect, Fact, Finding
 from rigidimeter.core.records import PARAMETERS, Activity, Epoch, Fit
 from rigidimeter.core.settings import Settings
@@ -35,6 +36,9 @@ from rigidimeter.core.words import number
 WINDOW_S = 1.0
 WHOLE = 1.0 - 1e-9
 """Of the window: where it does not fall to an end."""
+
+COURSE = 3
+"""Degree of the polynomial in time that is no movement, but where the joint went to rest."""
 
 WIDTH_HZ = 1.0
 STANDS_OUT = 3.0
@@ -81,19 +85,38 @@ def pushing(observation: Observation, fit: Fit, settings: Settings, pull: Pull) 
 
 
 def _own_torque(observation: Observation, values: Array) -> tuple[Grid, Complex]:
-    """Return M_sub in the band of the checks, at as many lines as were observed."""
-    seen = observation.wider or observation
-    gain = _gain(seen.grid, band_hz(seen.epoch, seen.settings.estimation))
-    return seen.grid, np.asarray((seen.motion @ values - seen.torque_nm) * gain)
+    """Return M_sub in the band of the checks, at lines beyond those of tremor where they are known.
+
+    Without drive and instruments the fit ends where the samples no longer show the noise of the
+    motion. That is too low for a tremor in 100 samples/s.
+    """
+    seen, settings = observation.wider or observation, observation.settings
+    epoch, (low_hz, high_hz) = seen.epoch, band_hz(seen.epoch, settings.estimation)
+    grid, motion, torque_nm = seen.grid, seen.motion, seen.torque_nm
+    beyond_hz = min(settings.diagnostics.tremor_high_hz + WIDTH_HZ, high_hz)
+    if grid.band_hz[1] < beyond_hz - 1.0 / grid.duration_s and not seen.drive_known:
+        channels, holes_s = fitted_channels(epoch), [one[:2] for one in epoch.left_out]
+        grid = grid_of(channels, (low_hz, beyond_hz), settings.estimation.trim_s, holes_s)
+        motion = grid.lines(kinematics(epoch, grid.time_s))[0].T
+        torque_nm = grid.lines(values_at(channels[0], grid.time_s, SAME_TIME))[0]
+    return grid, _steady(grid, motion @ values - torque_nm) * _gain(grid, (low_hz, high_hz))
 
 
 def _torque_sd_nm(observation: Observation) -> float:
     """Return the SD of the torque in the band of the checks, whatever that of the fit."""
     epoch, grid = observation.epoch, observation.grid
     whole = replace(grid, line=np.arange(1, grid.time_s.size // 2))
-    torque_nm = values_at(epoch.channels["torque_nm"], grid.time_s, SAME_TIME)
+    torque_nm = whole.lines(values_at(epoch.channels["torque_nm"], grid.time_s, SAME_TIME))[0]
     gain = _gain(whole, band_hz(epoch, observation.settings.estimation))
-    return _sd_nm(whole, whole.lines(torque_nm)[0] * gain)
+    return _sd_nm(whole, torque_nm * gain)
+
+
+def _steady(grid: Grid, lines: Complex) -> Complex:
+    """Return the lines without a slow course below the band, which the window spreads over them."""
+    x = np.linspace(-1.0, 1.0, grid.time_s.size)
+    course = grid.lines(np.polynomial.legendre.legvander(x, COURSE)[:, 1:].T)[0]
+    columns, target = (np.concatenate([z.real, z.imag], axis=-1) for z in (course, lines))
+    return np.asarray(lines - np.linalg.lstsq(columns.T, target, rcond=None)[0] @ course)
 
 
 def _gain(grid: Grid, band: tuple[float, float]) -> Array:

@@ -92,12 +92,6 @@ def sensors(epoch: Epoch, settings: Settings, followed: bool) -> list[Finding]:
     return _of(epoch, alone + loop(epoch, settings, followed))
 
 
-def velocity(epoch: Epoch, fit: Fit, settings: Settings) -> list[Finding]:
-    """Return whether the velocity has the scale, the time and the shape of the angle's."""
-    against = velocity_against_angle(epoch, fit, settings.diagnostics)
-    return _of(epoch, against + velocity_shape(epoch, settings))
-
-
 def _of(epoch: Epoch, findings: Sequence[Finding]) -> list[Finding]:
     return [replace(one, condition=epoch.condition) for one in findings]
 
@@ -151,7 +145,7 @@ def repeating(epoch: Epoch, settings: DiagnosticsSettings) -> list[Finding]:
     """Return whether a channel was at the end of its range, or hung."""
 
     def seen(one: Channel, extreme: bool) -> tuple[float, dict[str, Fact]]:
-        runs = repeated(epoch, one, settings, extreme=extreme)
+        runs = repeated(epoch, one, settings.max_frozen_s, extreme=extreme)
         if extreme:
             return at_extremes_percent(one, runs), {"channel": one.name}
         spans_s = np.vstack([one.time_s[[0, 0]], one.time_s[runs]])
@@ -230,24 +224,24 @@ def loop(epoch: Epoch, settings: Settings, followed: bool) -> list[Finding]:
     return results
 
 
-def velocity_against_angle(epoch: Epoch, fit: Fit, settings: DiagnosticsSettings) -> list[Finding]:
-    """Return whether the velocity has the scale of the angle, and its time.
+def velocity(epoch: Epoch, fit: Fit, settings: Settings) -> list[Finding]:
+    """Return whether the velocity has the scale of the angle, its time, and its shape.
 
     With the torque in time with the velocity B is K τ too low, which half its interval must hold.
     """
     scale, delay_s = velocity_fit(epoch)
     if not np.isfinite([scale, delay_s]).all():
         return []  # what does not move is found by other checks
-    value, most = 100.0 * abs(scale - 1.0), settings.max_velocity_scale_percent
-    results = at_most("velocity_scale", settings, value, most, facts={"scale": scale})
-    late_ms, half = 1e3 * delay_s / scale, half_widths(fit)
-    bias = np.array([0.0, -fit.value[2] * 1e-3 * late_ms, 0.0])
+    checks, late_ms, half = settings.diagnostics, 1e3 * delay_s / scale, half_widths(fit)
+    value, most = 100.0 * abs(scale - 1.0), checks.max_velocity_scale_percent
+    results = at_most("velocity_scale", checks, value, most, facts={"scale": scale})
+    bias = np.array([0.0, -1e-3 * fit.value[2] * late_ms, 0.0])
     held_ms = abs(late_ms) * half[1] / max(abs(bias[1]), 1e-300)
-    most = min(settings.max_velocity_delay_ms, float(held_ms))
-    if abs(late_ms) > most:
+    most = min(checks.max_velocity_delay_ms, float(held_ms))
+    if not abs(late_ms) <= most:
         effect = Effect.of(bias, fit.value, half)
-        results.append(found("velocity_delay", settings, late_ms, most, effect=effect))
-    return results
+        results.append(found("velocity_delay", checks, late_ms, most, effect=effect))
+    return _of(epoch, results + velocity_shape(epoch, settings))
 
 
 def velocity_fit(epoch: Epoch) -> tuple[float, float]:
@@ -284,7 +278,10 @@ def velocity_shape(epoch: Epoch, settings: Settings) -> list[Finding]:
     if len(channels) < len(wanted) or highest_hz <= 2 * band[0]:
         return []
     holes_s = [one[:2] for one in epoch.left_out]
-    grid = grid_of(channels, band, settings.estimation.trim_s, holes_s)
+    try:
+        grid = grid_of(channels, band, settings.estimation.trim_s, holes_s)
+    except ValueError:
+        return []  # too few lines
     torque, angle, velocity = (values_at(one, grid.time_s) for one in channels)
     by_angle, by_velocity = grid.lines(angle, 2), grid.lines(velocity, 1)
     slow = grid.line <= highest_hz * grid.duration_s
@@ -293,11 +290,13 @@ def velocity_shape(epoch: Epoch, settings: Settings) -> list[Finding]:
     if not value > most:
         return []
     rest = {name: one for name, one in epoch.channels.items() if name != "angle_rad"}
-    integral = grid.lines(angle_at(replace(epoch, channels=rest), grid.time_s))
-    (target,) = grid.lines(torque)
+    integral = angle_at(replace(epoch, channels=rest), grid.time_s)
+    # It drifts, and does not know how far the joint went in what is left out.
+    drifts = [grid.time_s - grid.time_s[0], *(grid.time_s > stop_s for _, stop_s in holes_s)]
+    integrals, (target,) = grid.lines(np.stack([integral, *drifts]))[0], grid.lines(torque)
     shares = {
         "by_angle": _r_squared(by_angle, target),
-        "by_velocity": _r_squared(np.concatenate([by_velocity, integral]), target),
+        "by_velocity": _r_squared(np.concatenate([by_velocity, integrals]), target),
     }
     less, more = sorted(1.0 - share for share in shares.values())
     worse = "velocity" if shares["by_angle"] > shares["by_velocity"] else "angle"
