@@ -27,7 +27,8 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import NamedTuple, TypeVar
+from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -49,54 +50,55 @@ from rigidimeter.model import (
 )
 
 Complex = NDArray[np.complex128]
-Values = TypeVar("Values", Array, Complex)
+Values = Array | Complex
 
 MOST_TRIED = 5  # epochs of a recording, before its drive is taken for unknown
+# Of the velocity, and of command and angle; more do not make a drive known any better that is not
+# quite linear.
 FEWEST_SAMPLES, MOST_SAMPLES, MOST_TICKS = 50, 3000, 8000
-"""Of the velocity, and of command and angle; more do not make a drive known any better that is not
-quite linear."""
 SETTLED_S = 0.3  # after the start, and after commands are lost, the state is not known
 
 MOST_POLES = 4  # a velocity PI has two; a lag and a position loop add one each
+# In rad a tick: poles are between the first two; an oscillation beyond π looks like a slower one;
+# the samples show poles up to the last, of which 1 % is left at the next tick.
 SLOWEST, FASTEST, QUICKEST, SEEN = 5e-4, 6.0, 3.0, 4.6
-"""In rad a tick: poles are between the first two; an oscillation beyond π looks like a slower one;
-the samples show poles up to the last, of which 1 % is left at the next tick."""
 DOUBLE = 1e-4  # poles this close, as a share of their size, are taken for so far apart
 BESIDE = 0.3  # where the search for a further pole begins, in times the first
 LONGEST_S, LONGEST_TICKS, SHORTEST_TICKS = 0.1, 4.0, 0.25  # of delays
 PASSED_HZ = 10.0  # an angle is used as the velocity through a low-pass with this corner
+# Of stretches of past commands, ever longer the longer ago.
 EDGES_TICKS = (0, 1, *sorted(step << octave for octave in range(13) for step in (2, 3)))
-"""Of stretches of past commands, ever longer the longer ago."""
-
-FAR = 30.0  # a delay is not searched where more times the power of others is left near it
-WORTH = 0.02  # a further pole is tried where past commands explain this share of what is left
-AS_GOOD, UNSEEN = 1.05, 2e-5
-"""A drive that leaves no more than so many times the power of the best, and this share of the SD of
-the velocity, explains as well."""
-RIVAL, COLOURED = 4.0, 1 / 3
-"""If what the best leaves is correlated by so much from sample to sample it is not noise, and one
-that leaves so many times its power might be there."""
-UNLIKELY, SLOW = 6.0, 1.0
-"""Where it is noise and no pole is faster than so many rad a tick, a drive whose information
-criterion is above the best by more (Kass and Raftery 1995: strong evidence) is no rival."""
-NOISY, MISFIT = 0.01, 0.1
-"""Shares of the velocity's SD: where noise is larger the angle may show the drive better; where
-more is left the command does not explain it."""
-QUIET, RUBS, EARLY, RUBBED, SIGNS = 3e-4, 0.8, 0.5, 4.0, 3
-"""A share of the SD below which nothing needs friction; the share to which it must bring the power,
-times the next where drives of four poles were not tried; how much more power is as good with it,
-for poles bend to what its law leaves; how often sign and drive are made of each other."""
-STAIRS, FINER = 0.5, 4
-"""A command that was logged more slowly than it was sent goes on between its samples: if lines
-between them, in so many steps, leave this share of what stairs leave, the stairs are not known."""
-
-ERRORS, BLOCKS = 2.0, 32
-"""A delay must be longer than so many standard errors, and rivals are so many away; they are those
-of sums over so many stretches, whatever the colour of the noise."""
 MOST_STEPS, ENOUGH = 12, 1e-4  # of a search, and the last share of the power to gain
-STEP, LONG, CURVED = 1e-4, 5.0, 2.0
-"""Of a coordinate, for its slope; the longest move of one; a move that changes the velocity by more
-times what the slopes say is halved."""
+STEP = 1e-4  # of a coordinate, for its slope
+FAR = 30.0  # a delay is not searched where more times the power of others is left near it
+
+WORTH = 0.02  # a further pole is tried where past commands explain this share of what is left
+# A drive that leaves no more than so many times the power of the best, and this share of the SD of
+# the velocity, explains as well.
+AS_GOOD, UNSEEN = 1.05, 2e-5
+# If what the best leaves is correlated by so much from sample to sample it is not noise, and one
+# that leaves so many times its power might be there.
+RIVAL, COLOURED = 4.0, 1 / 3
+# Where it is noise and no pole is faster than so many rad a tick, a drive whose information
+# criterion is above the best by more (Kass and Raftery 1995: strong evidence) is no rival.
+UNLIKELY, SLOW = 6.0, 1.0
+# Shares of the velocity's SD: where noise is larger the angle may show the drive better; where
+# more is left the command does not explain it.
+NOISY, MISFIT = 0.01, 0.1
+# A share of the SD below which nothing needs friction; the share to which it must bring the power,
+# times the next where drives of four poles were not tried; how much more power is as good with it,
+# for poles bend to what its law leaves; how often sign and drive are made of each other.
+QUIET, RUBS, EARLY, RUBBED, SIGNS = 3e-4, 0.8, 0.5, 4.0, 3
+# A command that was logged more slowly than it was sent goes on between its samples: if lines
+# between them, in so many steps, leave this share of what stairs leave, the stairs are not known.
+STAIRS, FINER = 0.5, 4
+
+# A delay must be longer than so many standard errors, and rivals are so many away. They are those
+# of sums over so many stretches, whatever the colour of the noise.
+ERRORS, BLOCKS = 2.0, 32
+# The longest move of a coordinate; one that changes the velocity by more times what the slopes say
+# is halved.
+LONG, CURVED = 5.0, 2.0
 INEXACT = 0.005  # no drive is quite linear: so much of what it tells is uncertain
 SCATTERED = 5.0  # stamps keep step if their mean direction is so many standard errors long
 TINY = 1e-300
@@ -142,11 +144,7 @@ def since_ticks(
     ticks_s, interval_s = command.time_s - command.time_s[0], 1.0 / command.mean_rate_hz
     then_s = (time_s - command.time_s[0]) - delay_s
     near_s = max(even * interval_s, SAME_TIME_S)
-    edges_s = np.concatenate(([-np.inf], ticks_s[1:], [np.inf]))
-    tick = np.clip((then_s + near_s) / interval_s, 0, ticks_s.size - 1).astype(np.intp)
-    other = (then_s + near_s < edges_s[tick]) | (then_s + near_s >= edges_s[tick + 1])
-    if np.any(other):  # the ticks did not come evenly
-        tick[other] = np.searchsorted(edges_s, then_s[other] + near_s, side="right") - 1
+    tick = np.maximum(np.searchsorted(ticks_s, then_s + near_s, side="right") - 1, 0)
     after_s = np.maximum(then_s - ticks_s[tick], 0.0)
     return tick, np.where(after_s < near_s, 0.0, after_s)
 
@@ -253,8 +251,7 @@ class _Fitted(NamedTuple):
         return _model(self.record, self.place, self.numerator[: self.zeros + 1])
 
 
-def _power(one: _Fitted) -> float:
-    return one.power
+_power = attrgetter("power")
 
 
 def _record(epoch: Epoch, motion: Channel) -> _Record | None:
@@ -262,33 +259,23 @@ def _record(epoch: Epoch, motion: Channel) -> _Record | None:
     command = epoch.channels.get("velocity_command_rad_s")
     if command is None or len(command) < 2 * FEWEST_SAMPLES:
         return None
-    stamps_s, of_angle = motion.time_s, motion.name == "angle_rad"
-    first_s, last_s = command.time_s[0] + SETTLED_S, command.time_s[:MOST_TICKS][-1]
-    inside = (stamps_s >= first_s) & (stamps_s <= last_s) & sound(epoch, stamps_s)
-    for hole in epoch.left_out:
-        if hole.lost:
-            inside &= (stamps_s < hole.stop_s) | (stamps_s > hole.stop_s + SETTLED_S)
+    of_angle, first_s = motion.name == "angle_rad", command.time_s[0] + SETTLED_S
+    holes = [one._replace(stop_s=one.stop_s + SETTLED_S * one.lost) for one in epoch.left_out]
+    inside = sound(replace(epoch, left_out=tuple(holes)), motion.time_s)
+    inside &= (motion.time_s >= first_s) & (motion.time_s <= command.time_s[:MOST_TICKS][-1])
     rows = np.flatnonzero(inside)[: MOST_TICKS if of_angle else MOST_SAMPLES]
     if rows.size < FEWEST_SAMPLES:
         return None
-    time_s, measured, every_s = stamps_s[rows], motion.values[rows], 0.0
+    time_s, measured = motion.time_s[rows], motion.values[rows]
+    every_s = of_angle * float(time_s[-1] - time_s[0]) / (rows.size - 1)
     if of_angle:
-        every_s = float(time_s[-1] - time_s[0]) / (rows.size - 1)
-        measured = _from_angle(measured, every_s)
+        measured = np.real(_from_angle(measured, every_s))
     scale, used = float(np.std(measured)), command.time_s <= time_s[-1]
     if scale == 0.0:
         return None
     sent = Channel(command.name, command.time_s[used], command.values[used])
-    return _Record(
-        sent,
-        1.0 / command.mean_rate_hz,
-        _lengths_s(sent),
-        (sent.values[:, None],),
-        time_s,
-        measured / scale,
-        scale,
-        every_s,
-    )
+    held = 1.0 / command.mean_rate_hz, _lengths_s(sent), (sent.values[:, None],)
+    return _Record(sent, *held, time_s, measured / scale, scale, every_s)
 
 
 def _identified(
@@ -312,17 +299,12 @@ def _identified(
         return []
     noise = bool(best.left[1:] @ best.left[:-1] < COLOURED * best.left.size * best.power)
     most = (times if noise else RIVAL) * best.power + UNSEEN**2
-    rivals = [one for one in found if one is not chosen and one.power <= most]
+    likely = math.inf
     if noise and _fastest(chosen) < SLOW:
         likely = min(map(_information, found)) + UNLIKELY
-        rivals = [one for one in rivals if _information(one) <= likely]
-    if not noise:  # where a drive is not linear its halves differ
-        one, middle = chosen.record, chosen.left.size // 2
-        for part in (slice(middle), slice(middle, None)):
-            half = replace(one, time_s=one.time_s[part], measured=one.measured[part])
-            rivals.append(_searched(half, chosen.place, chosen.zeros, chosen.place[-1] > 0))
-    others = (*(one.model for one in rivals), *_neighbours(chosen))
-    return [(chosen.power, noise, Drive(chosen.model, others))]
+    rivals = [one for one in found if one.power <= most and _information(one) <= likely]
+    others = [one.model for one in rivals if one is not chosen]
+    return [(chosen.power, noise, Drive(chosen.model, (*others, *_neighbours(chosen))))]
 
 
 def _fastest(one: _Fitted) -> float:
@@ -343,33 +325,31 @@ def _climbed(record: _Record, start: DriveModel) -> list[_Fitted]:
     (its acceleration jumps at them). One pole more where the best has a delay: a lag looks like it.
     """
     rubs = len(record.inputs) > 1
-    regressed = [] if rubs else _regressed(record)
+    regressed = {} if rubs else _regressed(record)
     speeds = [1.0] if rubs or regressed else [2.0**-n for n in range(6)]
     models = [replace(start, poles_rad_s=tuple(x * p for p in start.poles_rad_s)) for x in speeds]
     found: list[_Fitted] = []
     enough = False
     for poles in range(2, MOST_POLES + 1):
         least = min((one.power for one in found), default=1.0)
-        near = [*models, *regressed[poles - 1 : poles], *(one.model for one in found[-2:])]
+        near = [*models, *regressed.get(poles, []), *(one.model for one in found[-2:])]
         begins = [_coordinates(one, record.interval_s, poles) for one in near]
         for zeros in (poles - 2, poles - 1):
             found.append(_best(record, begins, zeros, least))
             begins.append(found[-1].place)
         best = min(found, key=_power)
-        if rubs:
-            if poles > 2 and RUBBED * best.power > least:
-                return found
-            continue
         spent = _explainable(best) < WORTH
         done = enough or (spent and best.place[-1] == 0.0)
         enough = spent
-        if best.power > QUIET**2 and (done or poles > 2):
+        if rubs:
+            done = poles > 2 and RUBBED * best.power > least
+        elif best.power > QUIET**2 and (done or poles > 2):
             least = best.power * (1.0 if done or poles == MOST_POLES else EARLY)
             if (rubbed := _rubbed(found[1], least)) is not None:
                 return _climbed(rubbed.record, rubbed.model)
         if done:
             break
-    single = [_coordinates(one, record.interval_s, 1) for one in (*models, *regressed[:1])]
+    single = [_coordinates(one, record.interval_s, 1) for one in (*models, *regressed.get(1, []))]
     return [_best(record, single, 0, best.power), *found]
 
 
@@ -454,7 +434,8 @@ def _modes(record: _Record, place: Array, zeros: int) -> tuple[Array, Array]:
     poles = _poles(place[:-1], record.interval_s)
     delay_s, count = float(place[-1]) * record.interval_s, place.size - 1
     terms = (zeros + 1, count)[: len(record.inputs)]  # friction acts behind the controller's zeros
-    weights, modes = np.zeros((sum(terms), count * len(terms))), []
+    weights = np.zeros((sum(terms), count * len(terms)))
+    modes: list[Array] = []
     for which, own in enumerate(terms):
         rows = weights[zeros + 1 :] if which else weights[: zeros + 1]
         for pole, shape in zip(poles, _shapes(poles, own - 1), strict=True):
@@ -468,7 +449,7 @@ def _modes(record: _Record, place: Array, zeros: int) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=64)
-def _mode(record: _Record, which: int, pole: complex, delay_s: float) -> Array | Complex:
+def _mode(record: _Record, which: int, pole: complex, delay_s: float) -> Values:
     """Return x of x' = λ x + c at the stamps; for an angle what `_from_angle` makes of ∫ x dt."""
     values = record.inputs[which]
     tick, held_s = _since(record, delay_s)
@@ -480,7 +461,8 @@ def _mode(record: _Record, which: int, pole: complex, delay_s: float) -> Array |
     before = state_at_ticks(pole, sent, record.lengths_s)[tick]
     state = state_later(pole, before, sent[tick], held_s)
     if record.every_s:  # x' = λ x + c
-        state = (_from_angle(state, record.every_s) - _integral(record, which, delay_s)) / growth
+        moved = _from_angle(state, record.every_s) - _integral(record, which, delay_s)
+        state = np.asarray(moved / growth)
     return state
 
 
@@ -491,7 +473,7 @@ def _since(record: _Record, delay_s: float) -> tuple[Rows, Array | float]:
 
 
 @lru_cache(maxsize=16)
-def _integral(record: _Record, which: int, delay_s: float) -> Array:
+def _integral(record: _Record, which: int, delay_s: float) -> Values:
     """Return what `_from_angle` makes of ∫ c dt."""
     tick, held_s = _since(record, delay_s)
     sent = np.mean(record.inputs[which], axis=1)
@@ -510,7 +492,7 @@ def _from_angle(angle_rad: Values, interval_s: float) -> Values:
     above it, and neither where the angle begins nor a slow drift counts.
     """
     steps = np.diff(angle_rad, prepend=angle_rad[:1])
-    return scipy.signal.lfilter([1.0], [1.0, -_kept(interval_s)], steps)
+    return np.asarray(scipy.signal.lfilter([1.0], [1.0, -_kept(interval_s)], steps))
 
 
 def _kept(interval_s: float) -> float:
@@ -584,31 +566,28 @@ def _explainable(one: _Fitted) -> float:
     return float(1.0 - (1.0 - share) * n / max(n - e, 1))
 
 
-def _regressed(record: _Record) -> list[DriveModel]:
+def _regressed(record: _Record) -> dict[int, list[DriveModel]]:
     """Return drives with the poles of regressions on even samples, by their number; or none."""
     tick, held_s = _since(record, 0.0)
     rows = np.arange(MOST_POLES, tick.size)
     rows = rows[tick[rows] - tick[rows - MOST_POLES] == MOST_POLES]
-    uneven = isinstance(held_s, np.ndarray) or isinstance(record.lengths_s, np.ndarray)
-    if uneven or rows.size < FEWEST_SAMPLES:
-        return []
+    found: dict[int, list[DriveModel]] = {}
+    if np.ndim(held_s) or np.ndim(record.lengths_s) or rows.size < FEWEST_SAMPLES:
+        return found
     sent = record.command.values
     if record.every_s:
         sent = scipy.signal.lfilter([1.0], [1.0, -_kept(record.every_s)], sent)
     columns = [record.measured[rows - lag] for lag in range(MOST_POLES + 1)]
     columns += [sent[np.maximum(tick[rows] - lag, 0)] for lag in range(MOST_POLES + 2)]
     through = _past(record)[rows].T @ np.stack(columns, axis=1)
-    found = []
     for poles in range(1, MOST_POLES + 1):
         own = [*range(1, poles + 1), *range(MOST_POLES + 1, MOST_POLES + poles + 3)]
         values = np.linalg.lstsq(through[:, own], through[:, 0], rcond=1e-12)[0]
-        roots = np.roots([1.0, *-values[:poles]])
-        roots = roots[(roots.imag >= 0) & (np.abs(roots) < 1)] + 0j
-        roots = roots[(roots.imag > 0) | (roots.real > 1e-3)]
-        if not roots.size:
-            return []
-        lasting = tuple((np.log(roots) / record.interval_s).tolist())
-        found.append(DriveModel(lasting, (0j,) * len(lasting)))
+        roots = np.roots([1.0, *-values[:poles]]) + 0j
+        lasting = (np.abs(roots) < 1) & ((roots.imag > 0) | ((roots.imag == 0) & (roots.real > 0)))
+        if np.any(lasting):
+            shown = np.log(roots[lasting]) / record.interval_s
+            found[poles] = [DriveModel(tuple(shown.tolist()), ())]
     return found
 
 
@@ -749,7 +728,7 @@ def _beyond(
     seen = motion = model.transfer(z, interval_s, after_s)
     through: Complex = np.ones(omega.size, dtype=np.complex128)
     if torque_filter is not None:
-        through = lowpass(1j * omega, *torque_filter)
+        through = lowpass(np.asarray(1j * omega), *torque_filter)
         seen = model.smoothed(*torque_filter).transfer(z, interval_s, after_s)
     velocity = 1j * omega * motion[2] if angle_alone else motion[1]
     sampled = through * np.stack([1j * omega * velocity, velocity, motion[2]])
@@ -794,8 +773,7 @@ def alternatives(
     scattered = np.ptp(after_s) >= ON_EDGE * interval_s
     if scattered and SCATTERED / np.sqrt(after_s.size) <= abs(turns) <= 1.0 - ON_EDGE**2:
         kept_s = cmath.phase(turns) / (2 * math.pi) % 1.0 * interval_s
-        many = np.ptp(after_s) >= 2 * ON_EDGE * interval_s
-        late = np.quantile(after_s, np.linspace(0.05, 0.95, 10)) if many else np.array([mean_s])
+        late = np.quantile(after_s, np.linspace(0.05, 0.95, 10))
         there = np.mean([seen(drive.model, one)[0] for one in late.tolist()], axis=0)
         changes.append(seen(drive.model, kept_s)[0] - there)
     return [*(one * sent for one in changes), ours * (motion[:, 1:2] / velocity - sent)]
