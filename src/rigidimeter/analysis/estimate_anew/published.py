@@ -3,7 +3,7 @@
 The regressors are scaled to unit length and factorised by singular values; AᵀA is never formed, so
 the condition number is not squared, and a motion that cannot distinguish the parameters shows as a
 large condition number instead of as a confident wrong answer. Textbook standard errors take the
-residual for white, σ² (AᵀA)⁻¹; `signals.hac_covariance` does not.
+residual for white, σ² (AᵀA)⁻¹.
 
 The published method (Sec. 2.4.4, Eq. 6), at the torque's own times:
 

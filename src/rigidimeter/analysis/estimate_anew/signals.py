@@ -47,12 +47,6 @@ spline is poor, and a filter with a long memory would carry that into the epoch.
 SHORT_MEMORY = 15
 """Samples over which a signal is continued for the low-pass."""
 
-COSINES, FEWEST_COSINES = 0.8, 6
-"""Cosines are this times (independent scores)^(2/3), and no fewer than that. The published rule,
-0.41 n^(2/3), counts samples; at the correlation for which it was made (first order, 0.7) it is
-1.3 (independent samples)^(2/3). Counting independent ones makes the choice the same at 100 and at
-1000 samples/s."""
-
 COLUMNS = "time_s", "torque_nm", "acceleration_rad_s2", "velocity_rad_s", "angle_rad"
 
 
@@ -348,57 +342,3 @@ def lines_inside(frequency_hz: Array, band: tuple[float, float]) -> NDArray[np.i
     """Return which lines lie in a band, ends included, zero left out."""
     low, high = band
     return np.flatnonzero((frequency_hz > 0) & (frequency_hz >= low) & (frequency_hz <= high))
-
-
-def correlation_samples(scores: Array) -> Array:
-    """Return the correlation time of each column in samples, shape (p,), at least 1.
-
-    τ = 1 + 2 Σ ρ(h), from the first lag to the last before the autocorrelation ρ first turns
-    negative. Beyond, ρ must sum to −½, because a fit makes its scores sum to zero. n / τ is the
-    number of independent scores, whatever the sampling rate.
-
-    Parameters
-    ----------
-    scores : array, shape (n, p)
-    """
-    n = len(scores)
-    length = scipy.fft.next_fast_len(2 * n, real=True)
-    lines = scipy.fft.rfft(np.ascontiguousarray(scores.T), length)
-    lagged = scipy.fft.irfft(np.abs(lines) ** 2, length)[:, :n]
-    before = np.logical_and.accumulate(lagged > 0, axis=1)
-    sums = np.sum(np.where(before, lagged, 0.0), axis=1)
-    power = np.where(lagged[:, 0] > 0, lagged[:, 0], 1.0)
-    return np.asarray(np.maximum(2.0 * sums / power - 1.0, 1.0))
-
-
-def hac_covariance(bread: Array, scores: Array) -> tuple[Array, float]:
-    """Return the covariance of an estimate whose residual may be coloured, and its degrees.
-
-    Least squares solves Aᵀ(M − A p) = 0, so that cov p = D S D, D = (AᵀA)⁻¹, S = cov Σ a e. S is n
-    times the spectral density of the scores g = a e at frequency zero: the mean square of K cosine
-    sums of them, all below the frequency K / (2 T). It is positive by construction and has K
-    degrees of freedom for Student's t, which makes up for what little a short epoch knows (Lazarus,
-    Lewis, Stock and Watson 2018, J. Bus. Econ. Stat. 36:541). It is enlarged by n_eff / (n_eff −
-    p), with n_eff the independent scores of the slowest column: p of them went into the fit.
-
-    Parameters
-    ----------
-    bread : array, shape (p, p)
-        (AᵀA)⁻¹.
-    scores : array, shape (n, p)
-        Regressors times residual, one row for each sample.
-
-    Raises
-    ------
-    ValueError
-        If there are not more samples than parameters.
-    """
-    n, p = scores.shape
-    if n <= p + 1:
-        raise ValueError(f"{n} samples are too few for the scatter of {p} parameters")
-    independent = max(n / float(np.max(correlation_samples(scores))), p + 1.0)
-    count = min(max(round(COSINES * independent ** (2.0 / 3.0)), FEWEST_COSINES), n - 1)
-    # The transform gives 2 Σ cos(π j (t + ½)/n) g_t; a sum of unit mean square has √2 before it.
-    sums = scipy.fft.dct(scores, type=2, axis=0)[1 : count + 1] / np.sqrt(2.0)
-    middle = sums.T @ sums / count * independent / (independent - p)
-    return bread @ middle @ bread.T, float(count)

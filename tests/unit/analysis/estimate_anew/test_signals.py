@@ -6,7 +6,6 @@ from scipy import signal
 
 from rigidimeter.analysis.estimate_anew.signals import (
     bandlimited_signals,
-    hac_covariance,
     kinematics,
     power_lines,
     sampled,
@@ -100,12 +99,3 @@ def test_power_sums_to_the_variance_and_a_line_is_where_it_is():
     f, power = power_lines(np.sin(2 * np.pi * 7.3 * np.arange(2000) / 100), 100.0, tapered=True)
     assert f[np.argmax(power)] == pytest.approx(7.3, abs=0.05)
     assert power.sum() == pytest.approx(0.5, rel=1e-3)
-
-
-def test_coloured_noise_widens_the_error_of_a_mean_as_it_should():
-    """Of first order with φ = .9 the variance of a mean is (1 + φ)/(1 − φ) = 19 times as large."""
-    rng, n = np.random.default_rng(3), 20_000
-    e = signal.lfilter([1.0], [1.0, -0.9], rng.normal(size=n + 500))[500:, None]
-    scores = e - e.mean()
-    covariance, _ = hac_covariance(np.array([[1.0 / n]]), scores)
-    assert covariance[0, 0] == pytest.approx(19 * np.var(e) / n, rel=0.35)
