@@ -242,11 +242,12 @@ def repeated(epoch: Epoch, channel: Channel, most_s: float, *, extreme: bool = F
         runs = runs[np.ptp(runs, axis=1) >= FEWEST_AT_EXTREME - 1]
         runs = runs[np.isin(values[runs[:, 0]], (np.max(values), np.min(values)))]
     asked = extreme | (np.ptp(channel.time_s[runs], axis=1) > most_s)
-    explained = [
-        one and (_as_the_angle(epoch, channel, run) or _as_told(epoch, channel, run, most_s))
-        for one, run in zip(asked, runs, strict=True)
-    ]
-    return runs[~np.array(explained, dtype=np.bool_)]
+    kept = np.ones(asked.size, dtype=np.bool_)
+    for place in np.flatnonzero(asked):
+        run = runs[place]
+        told = _as_told(epoch, channel, run, most_s)
+        kept[place] = not (told or _as_the_angle(epoch, channel, run))
+    return runs[kept]
 
 
 def at_extremes_percent(channel: Channel, runs: Rows) -> float:

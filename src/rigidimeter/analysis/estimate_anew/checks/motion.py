@@ -113,9 +113,9 @@ def _torque_sd_nm(observation: Observation) -> float:
 
 def _steady(grid: Grid, lines: Complex) -> Complex:
     """Return the lines without a slow course below the band, which the window spreads over them."""
-    x = np.linspace(-1.0, 1.0, grid.time_s.size)
+    x = np.linspace(-1.0, 1.0, grid.coarse_time_s.size)
     powers = np.asarray(np.polynomial.legendre.legvander(x, COURSE)[:, 1:].T, dtype=np.float64)
-    course = grid.lines(powers)[0]
+    course = grid.coarse_lines(powers)
     columns, target = (np.concatenate([z.real, z.imag], axis=-1) for z in (course, lines))
     return np.asarray(lines - np.linalg.lstsq(columns.T, target, rcond=None)[0] @ course)
 

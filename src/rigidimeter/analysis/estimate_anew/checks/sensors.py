@@ -101,13 +101,15 @@ def computed_torque(epoch: Epoch, settings: DiagnosticsSettings) -> list[Finding
 
     Nothing is said of a simulation, whose sensors may be free of noise.
     """
+    if epoch.virtual:
+        return []
     sent = [epoch.channels[name] for name in ("perturbation_nm",) if name in epoch.channels]
     causes = {"the motion": motion_channels(epoch), "the perturbation": sent}
     shares = {name: 100.0 * _not_a_sum(epoch, channels) for name, channels in causes.items()}
     origin = min(shares, key=lambda name: shares[name])
     value, least = shares[origin], settings.min_computed_torque_percent
-    if epoch.virtual or not math.isfinite(value):
-        return []
+    if math.isinf(value):
+        return []  # nothing to compare it with
     return at_least("computed_torque", settings, value, least, facts={"origin": origin})
 
 
