@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimeter.analysis.estimation import (
+from rigidimeter.analysis.estimate_anew import (
     epoch_signals,
     fit_epochs,
     fit_inertia_damping_stiffness,

@@ -1,1 +1,35 @@
-"""From epochs to J, B and K: offline and pure."""
+"""From epochs to J, B and K, to scores, and to what else the torque holds: offline and pure."""
+
+from rigidimeter.analysis.estimate_anew.answer import Answer, answer
+from rigidimeter.analysis.estimate_anew.delay import aligned
+from rigidimeter.analysis.estimate_anew.estimate import (
+    METHODS,
+    Impedance,
+    Progress,
+    Recorded,
+    choose_method,
+    estimate,
+    estimate_recorded,
+    fit_epoch,
+    impedance,
+    method_named,
+    method_names,
+    no_such_method,
+    prepare,
+    task_of,
+)
+from rigidimeter.analysis.estimate_anew.grid import Array
+from rigidimeter.analysis.estimate_anew.methods import Method, Ready
+from rigidimeter.analysis.estimate_anew.published import (
+    epoch_signals,
+    fit_inertia_damping_stiffness,
+)
+from rigidimeter.analysis.estimate_anew.scores import (
+    Cycles,
+    find_motion,
+    loop_area_j,
+    score_epoch,
+    scoring_cycles,
+)
+from rigidimeter.analysis.estimate_anew.signals import Signals, band_hz, zero_phase_band
+from rigidimeter.analysis.estimate_anew.stretches import longest_part

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
+from numpy.lib.stride_tricks import sliding_window_view
 
 from rigidimeter.analysis.estimate_anew.activity import activities
 from rigidimeter.analysis.estimate_anew import answer as _a
@@ -31,13 +32,13 @@ from rigidimeter.analysis.estimate_anew.checks import Pull, excitation, in_half_
 from rigidimeter.analysis.estimate_anew.checks import fit as fit_checks
 from rigidimeter.analysis.estimate_anew.checks import motion as motion_checks
 from rigidimeter.analysis.estimate_anew.delay import (
-    aligned,
     corrected_s,
     delay_of,
     late_torque,
     with_clock_error,
 )
 from rigidimeter.analysis.estimate_anew.drive import Drive, find_drive
+from rigidimeter.analysis.estimate_anew.grid import Array, Complex
 from rigidimeter.analysis.estimate_anew.methods import (
     BANDLIMITED,
     IV,
@@ -57,7 +58,7 @@ from rigidimeter.analysis.estimate_anew.observation import (
 from rigidimeter.analysis.estimate_anew.published import fit_published
 from rigidimeter.analysis.estimate_anew.scores import line_shares, score_epoch
 from rigidimeter.analysis.estimate_anew.solve import Solution
-from rigidimeter.analysis.estimate_anew.stretches import Array, longest_part, obstacle, screened
+from rigidimeter.analysis.estimate_anew.stretches import longest_part, obstacle, screened
 from rigidimeter.core.findings import Fact, Finding, found_between
 from rigidimeter.core.records import Analysis, Axis, BandEstimate, Delay, Epoch, Fit, Outcome, Task
 from rigidimeter.core.settings import Settings
@@ -124,10 +125,13 @@ class Recorded(NamedTuple):
     imposed: tuple[Epoch, ...]
     delays: tuple[Delay, ...] = ()
 
-    def on_one_clock(self) -> list[Ready]:
-        """Return the perturbed epochs with their torque moved."""
-        moves = [corrected_s(one.epoch.source, self.delays) for one in self.perturbed]
-        return [r.moved(s) if s else r for r, s in zip(self.perturbed, moves, strict=True)]
+    def analysed(self, *, as_recorded: bool) -> list[Ready]:
+        """Return the epochs of both kinds, perturbed ones first, on one clock or as recorded."""
+        every = [*self.perturbed, *(Ready(one, self.settings) for one in self.imposed)]
+        if as_recorded:
+            return every
+        moves = [corrected_s(one.epoch.source, self.delays) for one in every]
+        return [one.moved(by_s) if by_s else one for one, by_s in zip(every, moves, strict=True)]
 
 
 def method_names() -> tuple[str, ...]:
@@ -264,14 +268,13 @@ def observed_for(method: Method, epochs: Sequence[Ready]) -> list[Observation | 
     return found
 
 
-def choose_method(recorded: Recorded) -> tuple[str, str]:
+def choose_method(epochs: Sequence[Ready]) -> tuple[str, str]:
     """Return the method that suits what was recorded, and why.
 
     With a perturbation that the motion follows, instrumental variables, which a subject who pushes
     does not bias. An epoch that lacks it then fails, unless most do. Without it only least squares
     is possible.
     """
-    epochs = recorded.perturbed
     if not epochs:
         return "bandlimited", "there is no epoch to fit"
     missing = [why for one in epochs if (why := no_instrument(one.epoch))]
@@ -329,6 +332,53 @@ def _follows(ready: Ready) -> bool:
     return bool(np.min(p) * p.size < FOLLOWS_CHANCE)
 
 
+class Impedance(NamedTuple):
+    """Torque over angle at the excited lines, without a model.
+
+    Attributes
+    ----------
+    frequency_hz, coherence : array, shape (m,)
+    impedance_nm_rad : complex array, shape (m,)
+    observed : int
+        Epochs that it is made of.
+    """
+
+    frequency_hz: Array
+    impedance_nm_rad: Complex
+    coherence: Array
+    observed: int
+
+
+def impedance(epochs: Sequence[Ready]) -> Impedance | None:
+    """Return the impedance of epochs that share the joint, K − J ω² + i B ω of one that is linear.
+
+    Over whole periods of a perturbation the response is in the lines that periods have in common,
+    and the lines between hold nothing but noise. Torque and angle at the excited lines are added
+    over the epochs, turned so that the perturbation has phase zero in each; the coherence is
+    |response|² / (|response|² + noise) of the sums. None where no epoch holds two periods.
+    """
+    groups: dict[tuple[int, ...], list[Observation]] = {}
+    for one in observed_for(SPECTRAL, epochs):
+        if isinstance(one, Observation):
+            lines_hz = one.grid.omega_rad_s[one.excited] / (2 * np.pi)
+            groups.setdefault(tuple(np.rint(1e3 * lines_hz).astype(int)), []).append(one)
+    if not groups:
+        return None
+    seen = max(groups.values(), key=len)
+    sums: Complex = np.zeros((2, int(np.count_nonzero(seen[0].excited))), dtype=np.complex128)
+    noise = np.zeros(sums.shape[1])
+    for one in seen:
+        at, cause = one.excited, excitation.perturbation_lines(one)
+        turn = (cause.conj() / np.maximum(np.abs(cause), 1e-300))[at]
+        sums += turn * np.stack([one.torque_nm[at], one.motion[at, 2]])
+        between = np.where(at, np.nan, np.abs(one.torque_nm) ** 2)
+        beside = sliding_window_view(np.pad(between, 2, constant_values=np.nan), 5)
+        noise += np.nanmean(beside[at], axis=1)
+    frequency_hz = seen[0].grid.omega_rad_s[seen[0].excited] / (2 * np.pi)
+    coherence = np.clip(1 - noise / np.abs(sums[0]) ** 2, 0.0, 1.0)
+    return Impedance(frequency_hz, np.asarray(sums[0] / sums[1]), coherence, len(seen))
+
+
 def estimate_recorded(
     recorded: Recorded,
     method: str = "auto",
@@ -354,10 +404,11 @@ def estimate_recorded(
     """
     settings, reason = recorded.settings, ""
     if method == "auto":
-        method, reason = choose_method(recorded)
+        method, reason = choose_method(recorded.perturbed)
     estimator = method_named(method)
     delays = () if estimator.as_recorded else recorded.delays
-    epochs = list(recorded.perturbed) if estimator.as_recorded else recorded.on_one_clock()
+    every = recorded.analysed(as_recorded=estimator.as_recorded)
+    epochs, imposed = every[: len(recorded.perturbed)], every[len(recorded.perturbed) :]
     observed = observed_for(estimator, epochs)
     progress(0.3)
     fitted = _fitted(estimator, epochs, observed, None, delays, pooled=not fits_alone)
@@ -385,9 +436,10 @@ def estimate_recorded(
             two if one.outcome.included else replace(two, outcome=one.outcome)
             for one, two in zip(fits, second, strict=True)
         ]
-    imposed = [aligned(one, delays) for one in recorded.imposed]
-    scores = [] if fits_alone else [score_epoch(one, settings.scores, settings.estimation)
-                                    for one in imposed]  # fmt: skip
+    scores = [
+        score_epoch(one.epoch, settings.scores, settings.estimation)
+        for one in (() if fits_alone else imposed)
+    ]
     progress(0.2)
     return Analysis(
         method,
@@ -430,6 +482,19 @@ def estimate(
     clocks = method == "auto" or not method_named(method).as_recorded
     recorded = prepare(epochs, settings, clocks=clocks, progress=lambda n: progress(0.5 * n))
     return estimate_recorded(recorded, method, progress=lambda n: progress(0.5 * n))
+
+
+def fit_epoch(
+    epoch: Epoch, method: str, settings: Settings, inertia_kg_m2: float | None = None
+) -> Fit:
+    """Fit J, B and K to one epoch, or B and K when the inertia is given, without checks.
+
+    An epoch that cannot be fitted gives a `Fit` whose outcome is `failed`, with the reason.
+    """
+    estimator = method_named(method)
+    ready = prepare([replace(epoch, task="prbs")], settings, clocks=False).perturbed
+    observed = observed_for(estimator, ready)
+    return fit_epochs(estimator, ready, observed, inertia_kg_m2, pooled=False).fits[0]
 
 
 def _fitted(

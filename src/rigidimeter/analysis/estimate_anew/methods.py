@@ -24,6 +24,7 @@ first. What an epoch says of J, B and K is its own.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -333,106 +334,70 @@ def fit_epochs(
     pooled : bool
         Whether the fits of several epochs together are wanted.
     """
-    fits: list[Fit] = [_failed(one.epoch, method, "") for one in epochs]
-    together: list[Fit] = []
+    pose = method.pose
+    if pose is not None and inertia_kg_m2 is not None:
+        pose = holding(pose, inertia_kg_m2)
+    fits: dict[int, Fit] = {}
     shared: dict[str, Solution] = {}
-    conditions = dict.fromkeys(one.epoch.condition for one in epochs)
-    pose = _pose(method, inertia_kg_m2)
+    conditions = list(dict.fromkeys(one.epoch.condition for one in epochs))
     for condition in conditions:
         places = [i for i, one in enumerate(epochs) if one.epoch.condition == condition]
-        own = _alone(method, pose, epochs, observed, places, shared, inertia_kg_m2)
-        for i, fit in zip(places, own, strict=True):
-            fits[i] = fit
-    wanted = [*conditions, *([""] if len(conditions) > 1 else [])]
-    for condition in wanted if pooled else ():
-        members = [
-            i for i, one in enumerate(epochs)
-            if one.epoch.closed.included and not one.obstacle
-            and condition in ("", one.epoch.condition)
-        ]  # fmt: skip
-        pool = _pooled(method, pose, epochs, observed, members, shared, condition, inertia_kg_m2)
-        if pool is not None:
-            together.append(replace(pool, epoch="pooled", condition=condition))
-    return Fitted(fits, together, shared)
-
-
-def _pose(method: Method, inertia_kg_m2: float | None) -> Pose | None:
-    if method.pose is None or inertia_kg_m2 is None:
-        return method.pose
-    return holding(method.pose, inertia_kg_m2)
-
-
-def _alone(
-    method: Method,
-    pose: Pose | None,
-    epochs: Sequence[Ready],
-    observed: Sequence[Observation | str],
-    places: Sequence[int],
-    shared: dict[str, Solution],
-    inertia_kg_m2: float | None,
-) -> list[Fit]:
-    """Return the fits of the epochs of a condition; what they share is added to `shared`."""
-    if pose is None:
-        return [_by_function(method, [epochs[i]], inertia_kg_m2) for i in places]
-    seen = {i: one for i in places if isinstance(one := observed[i], Observation)}
-    good = [i for i in seen if epochs[i].epoch.closed.included]
-    begin = start_of([seen[i] for i in (good or seen)]) if seen else np.empty(0)
-    begin = begin if inertia_kg_m2 is None else begin[1:]
-    whole: Solution | None = None
-    if good:
-        try:
-            whole = solve([seen[i] for i in good], pose, begin)
-            shared[epochs[places[0]].epoch.condition] = whole
-        except ValueError:
-            whole = None  # as each epoch will say
-    # Few epochs do not know the shape of their noise together any better than each alone.
-    known = whole if len(good) >= SHARED_FROM else None
-    found = []
-    for i in places:
-        one = observed[i]
-        if not isinstance(one, Observation):
-            found.append(_failed(epochs[i].epoch, method, one))
+        if pose is None:
+            fits |= {i: _by_function(method, [epochs[i]], inertia_kg_m2) for i in places}
             continue
-        try:
-            if known is not None and i in good:
-                at = good.index(i)
-                solution = solve_once([known.problems[at]], [known.powers[at]])
-            else:
-                powers = None
-                if known is not None:
-                    first = known.problems[0].observation.grid
-                    powers = [on_lines(one.grid, first, known.powers[0])]
-                solution = solve([one], pose, begin if whole is None else whole.values, powers)
-            found.append(_of_solution(method, [one], solution, inertia_kg_m2))
-        except ValueError as error:
-            found.append(_failed(epochs[i].epoch, method, str(error)))
-    return found
+        seen = {i: one for i in places if isinstance(one := observed[i], Observation)}
+        good = [i for i in seen if epochs[i].epoch.closed.included]
+        begin = _begin([seen[i] for i in (good or seen)], inertia_kg_m2)
+        with suppress(ValueError):  # as each epoch will say
+            if good:
+                shared[condition] = solve([seen[i] for i in good], pose, begin)
+        whole = shared.get(condition)
+        # Few epochs do not know the shape of their noise together any better than each alone.
+        known = whole if len(good) >= SHARED_FROM else None
+        for i in places:
+            try:
+                if i not in seen:
+                    raise ValueError(observed[i])
+                if known is not None and i in good:
+                    at = good.index(i)
+                    solution = solve_once([known.problems[at]], [known.powers[at]])
+                else:
+                    powers = None
+                    if known is not None:
+                        first = known.problems[0].observation.grid
+                        powers = [on_lines(seen[i].grid, first, known.powers[0])]
+                    start = begin if whole is None else whole.values
+                    solution = solve([seen[i]], pose, start, powers)
+                fits[i] = _of_solution(method, [seen[i]], solution, inertia_kg_m2)
+            except ValueError as error:
+                fits[i] = _failed(epochs[i].epoch, method, str(error))
+    together: list[Fit] = []
+    for condition in [*conditions, *([""] if len(conditions) > 1 else [])] if pooled else ():
+        members = [
+            i
+            for i, one in enumerate(epochs)
+            if one.epoch.closed.included and condition in ("", one.epoch.condition)
+        ]
+        observations = [one for i in members if isinstance(one := observed[i], Observation)]
+        sound = [epochs[i] for i in members if not epochs[i].obstacle]
+        fit: Fit | None = None
+        if pose is None and sound:
+            fit = _by_function(method, sound, inertia_kg_m2)
+        elif pose is not None and observations:
+            with suppress(ValueError):  # as each epoch says
+                if condition not in shared:
+                    begin = _begin(observations, inertia_kg_m2)
+                    shared[condition] = solve(observations, pose, begin)
+                fit = _of_solution(method, observations, shared[condition], inertia_kg_m2)
+        if fit is not None and fit.n_samples:
+            findings = fit.findings if condition else ()
+            together.append(replace(fit, epoch="pooled", condition=condition, findings=findings))
+    return Fitted([fits[i] for i in range(len(epochs))], together, shared)
 
 
-def _pooled(
-    method: Method,
-    pose: Pose | None,
-    epochs: Sequence[Ready],
-    observed: Sequence[Observation | str],
-    places: Sequence[int],
-    shared: dict[str, Solution],
-    condition: str,
-    inertia_kg_m2: float | None,
-) -> Fit | None:
-    if pose is None:
-        fit = _by_function(method, [epochs[i] for i in places], inertia_kg_m2) if places else None
-        return fit if fit is not None and fit.n_samples else None
-    seen = [one for i in places if isinstance(one := observed[i], Observation)]
-    if condition not in shared and seen:
-        begin = start_of(seen)
-        try:
-            shared[condition] = solve(seen, pose, begin if inertia_kg_m2 is None else begin[1:])
-        except ValueError:
-            return None
-    if condition not in shared:
-        return None
-    fit = _of_solution(method, seen, shared[condition], inertia_kg_m2)
-    return fit if condition else replace(fit, findings=())
+def _begin(observations: Sequence[Observation], inertia_kg_m2: float | None) -> Array:
+    begin = start_of(observations) if observations else np.zeros(3)
+    return begin if inertia_kg_m2 is None else begin[1:]
 
 
 def _by_function(method: Method, epochs: Sequence[Ready], inertia_kg_m2: float | None) -> Fit:

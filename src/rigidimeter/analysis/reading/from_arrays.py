@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimeter.analysis.estimation.alignment import aligned_prepared, estimate_delays
-from rigidimeter.analysis.estimation.clock_error import with_clock_error
-from rigidimeter.analysis.estimation.diagnostics import checked, checked_together
-from rigidimeter.analysis.estimation.methods import choose_method, method_named
-from rigidimeter.analysis.estimation.prepared import prepare
-from rigidimeter.analysis.estimation.signals import Array
+from rigidimeter.analysis.estimate_anew import (
+    Array,
+    choose_method,
+    estimate_recorded,
+    method_named,
+    prepare,
+)
 from rigidimeter.analysis.reading.channels.looks import look
 from rigidimeter.analysis.reading.channels.readings import confusions, doubts
 from rigidimeter.core.records import CHANNEL_UNITS, Channel, Epoch, Fit, readonly
@@ -105,20 +106,16 @@ def identify(
         _refuse_units(stamps, arrays)
     channels = {name: Channel(name, stamps, values) for name, values in arrays.items()}
     epoch = Epoch("arrays", "1", channels, task="prbs")
-    (prepared,) = prepare([epoch], settings)
-    chosen = method_named(choose_method([prepared])[0] if method == "auto" else method)
-    lacking = [name for name in chosen.needs if name not in channels]
+    recorded = prepare([epoch], settings)
+    if method == "auto":
+        method, _ = choose_method(recorded.perturbed)
+    lacking = [name for name in method_named(method).needs if name not in channels]
     if lacking:
-        raise ValueError(f"method {chosen.name} needs {' and '.join(lacking)}")
-    delays = () if chosen.as_recorded else estimate_delays({epoch.source: [prepared]})
-    prepared = aligned_prepared(prepared, delays)
-    made = chosen.fit([prepared], None, lambda _: None, False)
-    (fit,), _ = with_clock_error(chosen.fit, [prepared], None, made, delays)
+        raise ValueError(f"method {method} needs {' and '.join(lacking)}")
+    (fit,) = estimate_recorded(recorded, method).fits
     if fit.outcome.kind == "failed":
-        raise ValueError(f"method {chosen.name}: {fit.outcome.reason}")
-    fit = checked(prepared, fit, delays)
-    together = checked_together([prepared], [fit], [], chosen)
-    return together.fits[0]
+        raise ValueError(f"method {method}: {fit.outcome.reason}")
+    return fit
 
 
 def _refuse_units(time_s: Array, arrays: Mapping[str, Array]) -> None:

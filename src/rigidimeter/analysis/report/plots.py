@@ -14,8 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimation import aligned, epoch_signals
-from rigidimeter.analysis.estimation.stretches import longest_part
+from rigidimeter.analysis.estimate_anew import aligned, epoch_signals, longest_part
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.analysis.report.curves import (
     EXCITATION_HEIGHTS,
@@ -144,7 +143,7 @@ def plot_torque(
             "estimated"
         )
     own = aligned(longest_part(own), analysis.delays)
-    signals = epoch_signals(own, fit.method, recording.settings.estimation)
+    signals = epoch_signals(own, recording.settings, fit.method)
     window_s = float(signals.time_s[-1] - signals.time_s[0]) if span_s is None else span_s
     name = condition_name(fit.condition)
     limit_nm = torque_limit_nm(signals, fit, window_s)

@@ -4,7 +4,7 @@ Acquisition and study meet only in recorded files, so a laboratory can analyse w
 installed.
 """
 
-from rigidimeter.analysis.study.analysis import Preparation, estimate, task_of
+from rigidimeter.analysis.study.analysis import estimate
 from rigidimeter.analysis.study.archive import UNCHANGED, keep
 from rigidimeter.analysis.study.compare_input import compare
 from rigidimeter.analysis.study.compared import TEST, Comparison, DayMedian, comparison_rows

@@ -9,7 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigidimeter.analysis.estimation.method_record import Progress
+from rigidimeter.analysis.estimate_anew import Progress
 from rigidimeter.analysis.reading import read_estimates
 from rigidimeter.analysis.reading.formats import READERS
 from rigidimeter.analysis.study.compared import Comparison

@@ -12,15 +12,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimation import epoch_signals, scoring_cycles
-from rigidimeter.analysis.estimation.methods import prepared_signals
-from rigidimeter.analysis.estimation.prepared import PreparedEpoch
-from rigidimeter.analysis.estimation.scores import cycles_of
+from rigidimeter.analysis.estimate_anew import Ready, epoch_signals, scoring_cycles
 from rigidimeter.analysis.study.drawn_signals import ChannelFacts, EpochTrace, facts_of
-from rigidimeter.analysis.study.examples import (
-    analysed_epoch,
-    prepared_epochs,
-)
+from rigidimeter.analysis.study.examples import prepared_epochs
 from rigidimeter.analysis.study.results import StudyResult
 from rigidimeter.core.records import Fit, Score
 
@@ -41,7 +35,7 @@ def epoch_traces(result: StudyResult) -> Iterator[EpochTrace]:
     analysis = result.analysis
     results: list[Fit | Score] = [*analysis.fits, *analysis.scores]
     seen: set[tuple[str, str]] = set()
-    prepared = prepared_epochs(result) if result.prepared else {}
+    prepared = prepared_epochs(result)
     for one in results:
         key = one.source, one.epoch
         if key not in seen and (trace := _trace(result, one, prepared.get(key))) is not None:
@@ -49,19 +43,15 @@ def epoch_traces(result: StudyResult) -> Iterator[EpochTrace]:
             yield trace
 
 
-def _trace(
-    result: StudyResult, one: Fit | Score, prepared: PreparedEpoch | None
-) -> EpochTrace | None:
-    epoch = analysed_epoch(result, one) if prepared is None else prepared.epoch
-    if epoch is None:
+def _trace(result: StudyResult, one: Fit | Score, ready: Ready | None) -> EpochTrace | None:
+    if ready is None:
         return None
+    epoch = ready.epoch
     try:
         if isinstance(one, Fit):
-            signals = (
-                epoch_signals(epoch, one.method, result.settings.estimation)
-                if prepared is None
-                else prepared_signals(prepared, one.method)
-            )
+            if ready.obstacle:
+                return None
+            signals = epoch_signals(epoch, ready.settings, one.method, ready.drive)
             model = signals.motion @ np.asarray(one.value)
             series = {
                 "torque": signals.torque_nm,
@@ -70,11 +60,7 @@ def _trace(
             }
             time_s, highest_hz = signals.time_s, signals.band_hz[1]
         else:
-            cycles = (
-                scoring_cycles(epoch, result.settings.scores)
-                if prepared is None
-                else prepared.once(cycles_of)
-            )
+            cycles = scoring_cycles(epoch, result.settings.scores)
             series = {"torque": cycles.torque_nm, "angle": np.degrees(cycles.angle_rad)}
             time_s, highest_hz = cycles.time_s, 5 * cycles.frequency_hz
     except ValueError:

@@ -6,9 +6,7 @@ import math
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
-from rigidimeter.analysis.estimation import aligned
-from rigidimeter.analysis.estimation.prepared import PreparedEpoch, prepare
-from rigidimeter.analysis.estimation.stretches import longest_part
+from rigidimeter.analysis.estimate_anew import Ready, prepare
 from rigidimeter.analysis.study.results import StudyResult
 from rigidimeter.core.records import Channel, Epoch, Fit, Score
 
@@ -48,19 +46,16 @@ def analysed_epoch(result: StudyResult, one: Fit | Score) -> Epoch | None:
 
     Its delay is corrected, and what is left out is left out.
     """
-    key = one.source, one.epoch
-    if result.prepared:
-        return prepared_epochs(result)[key].epoch
-    for epoch in result.epochs:
-        if (epoch.source, epoch.label) == key:
-            return aligned(longest_part(epoch), result.analysis.delays)
-    return None
+    ready = prepared_epochs(result).get((one.source, one.epoch))
+    return None if ready is None else ready.epoch
 
 
-def prepared_epochs(result: StudyResult) -> dict[tuple[str, str], PreparedEpoch]:
+def prepared_epochs(result: StudyResult) -> dict[tuple[str, str], Ready]:
     """Return the epochs as they were analysed, by source and label."""
-    prepared = result.prepared or prepare(
-        (aligned(epoch, result.analysis.delays) for epoch in result.epochs), result.settings
+    prepared = result.prepared or (
+        prepare(result.epochs, result.settings, clocks=False)
+        ._replace(delays=result.analysis.delays)
+        .analysed(as_recorded=False)
     )
     return {(one.epoch.source, one.epoch.label): one for one in prepared}
 

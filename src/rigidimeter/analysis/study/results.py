@@ -9,7 +9,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any, Literal
 
 import rigidimeter
-from rigidimeter.analysis.estimation.prepared import PreparedEpoch
+from rigidimeter.analysis.estimate_anew import Ready
 from rigidimeter.analysis.statistics import EffectDifference
 from rigidimeter.analysis.study.compared import Comparison, comparison_rows
 from rigidimeter.analysis.study.families import Primary
@@ -187,7 +187,7 @@ class StudyResult:
         The table and its column of conditions, where columns of a table are compared.
     analysis, epochs, settings
         What was analysed; empty for columns of a table.
-    prepared : tuple of PreparedEpoch
+    prepared : tuple of Ready
         The epochs as they were analysed, with what was made of them, for the figures; empty where
         they were not analysed here.
     provenance : mapping of str to str
@@ -215,7 +215,7 @@ class StudyResult:
     by: str = ""
     analysis: Analysis = Analysis("", (), (), math.nan, ())  # noqa: RUF009
     epochs: tuple[Epoch, ...] = ()
-    prepared: tuple[PreparedEpoch, ...] = field(default=(), repr=False, compare=False)
+    prepared: tuple[Ready, ...] = field(default=(), repr=False, compare=False)
     settings: Settings = field(default_factory=Settings)
     provenance: Mapping[str, str] = field(default_factory=dict)
     conditions: tuple[Condition, ...] = ()

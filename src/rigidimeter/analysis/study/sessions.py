@@ -16,7 +16,7 @@ from rigidimeter.analysis.reading.channels.joining import FOUND
 from rigidimeter.analysis.reading.channels.mapping_file import read_mapping
 from rigidimeter.analysis.reading.formats import reader_of, recorded_settings
 from rigidimeter.analysis.reading.recording import read_joined
-from rigidimeter.analysis.study.analysis import task_of
+from rigidimeter.analysis.estimate_anew import task_of
 from rigidimeter.analysis.study.blinding import Naming
 from rigidimeter.analysis.study.results import LeftOut, SessionEntry
 from rigidimeter.analysis.study.session_checks import (

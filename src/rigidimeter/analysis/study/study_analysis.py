@@ -8,18 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from rigidimeter.analysis.estimation import (
+from rigidimeter.analysis.estimate_anew import (
+    Progress,
+    Recorded,
     choose_method,
+    estimate_recorded,
     method_named,
     method_names,
     no_such_method,
+    prepare,
 )
-from rigidimeter.analysis.estimation.method_record import Progress
-from rigidimeter.analysis.study.analysis import Preparation, analyse_prepared
 from rigidimeter.analysis.study.blinding import Naming, naming
 from rigidimeter.analysis.study.compared import Comparison
 from rigidimeter.analysis.study.comparison import (
@@ -46,8 +49,8 @@ from rigidimeter.core.study_files import STUDY_FILE, StudyFolder, TableRow, read
 GROUP = "group"
 """The column that says of which group, such as patients, a subject is."""
 
-MEASURE_MS, RESAMPLE_MS = 50.0, 0.01
-"""What the tests of a measure cost, beside the steps of `analysis.step_costs`."""
+TESTS_SHARE = 0.1
+"""Of the work: what the tests of all measures take."""
 
 
 @dataclass(frozen=True)
@@ -196,18 +199,16 @@ def analyse_study(
     """
     sessions = read.gathered.entries
     pair = read.names.pair
-    subjects = _by_subject(read.epochs, sessions, read.settings)
     fitted = [epoch for epoch in read.epochs if epoch.task == "prbs"]
     others = sensitivity_methods() if fitted and all(pair) else ()
-    statistics = len(MEASURES) * (MEASURE_MS + RESAMPLE_MS * resamples)
-    methods = [read.method, *others]
-    if read.method in ("auto", *others):  # the chosen method is not made again
-        methods = methods[: max(len(others), 1)]
-    work = statistics + sum(own.work(methods) for own in subjects.values())
+    # Preparing, the main method, and the others but for one that is the main one.
+    again = len(others) - (read.method in ("auto", *others)) if others else 0
+    each = (1.0 - TESTS_SHARE) / (2 + again)
 
-    def done(work_ms: float) -> None:
-        progress(work_ms / work)
+    def done(share: float) -> None:
+        progress(each * share)
 
+    subjects = _by_subject(read.epochs, sessions, read.settings, done)
     main, notices = _analysed(subjects, read.method, done)
     comparisons = gathered(main, pair, sessions)
     ratings, said = rated(read.folder, read.names)
@@ -217,7 +218,7 @@ def analyse_study(
         comparisons,
         seed=seed,
         resamples=resamples,
-        progress=lambda share: done(share * statistics),
+        progress=lambda share: progress(TESTS_SHARE * share),
     )
     comparisons, further = with_further(comparisons, _further(read, comparisons))
     notices += [*_lacking([c for c in comparisons if c.measure is not RATING], pair), *said]
@@ -245,9 +246,9 @@ def analyse_study(
         analysis=main,
         epochs=read.epochs,
         prepared=tuple(
-            prepared
+            ready
             for own in subjects.values()
-            for prepared in own.analysed(as_recorded=method_named(main.method).as_recorded)
+            for ready in own.analysed(as_recorded=method_named(main.method).as_recorded)
         ),
         settings=read.settings,
         conditions=read.names.conditions,
@@ -317,18 +318,25 @@ def estimate_study(
         Called with the share of the work that was done since, 1 in all.
     """
     sessions = read.gathered.entries
-    subjects = _by_subject(read.epochs, sessions, read.settings)
-    work = sum(own.work([read.method]) for own in subjects.values()) or 1.0
-    return _analysed(subjects, read.method, lambda done: progress(done / work))
+    subjects = _by_subject(read.epochs, sessions, read.settings, lambda n: progress(0.5 * n))
+    return _analysed(subjects, read.method, lambda n: progress(0.5 * n))
 
 
 def _by_subject(
-    epochs: Sequence[Epoch], sessions: Mapping[str, SessionEntry], settings: Settings
-) -> dict[str, Preparation]:
+    epochs: Sequence[Epoch],
+    sessions: Mapping[str, SessionEntry],
+    settings: Settings,
+    progress: Progress,
+) -> dict[str, Recorded]:
     own: dict[str, list[Epoch]] = {}
     for epoch in epochs:
         own.setdefault(sessions[epoch.source].subject, []).append(epoch)
-    return {subject: Preparation(epochs, settings) for subject, epochs in own.items()}
+    part = partial(_part, progress, len(own))
+    return {subject: prepare(each, settings, progress=part) for subject, each in own.items()}
+
+
+def _part(progress: Progress, parts: int, share: float) -> None:
+    progress(share / parts)
 
 
 def _beyond_epochs(part: Analysis) -> Iterator[tuple[str, Finding]]:
@@ -342,23 +350,22 @@ def _beyond_epochs(part: Analysis) -> Iterator[tuple[str, Finding]]:
 
 
 def _analysed(
-    subjects: Mapping[str, Preparation],
+    subjects: Mapping[str, Recorded],
     method: str,
     progress: Progress,
     *,
     fits_alone: bool = False,
 ) -> tuple[Analysis, list[Notice]]:
     """Analyse each subject apart and put the parts together, in the order of the epochs."""
+    part = partial(_part, progress, len(subjects))
     if len(subjects) < 2:
-        (preparation,) = subjects.values()
-        found = analyse_prepared(preparation, method, fits_alone=fits_alone, progress=progress)
-        return found, []
+        (recorded,) = subjects.values()
+        return estimate_recorded(recorded, method, fits_alone=fits_alone, progress=part), []
     reason = ""
     if method == "auto":
-        everything = [p for own in subjects.values() for p in own.perturbed(as_recorded=True)]
-        method, reason = choose_method(everything)
+        method, reason = choose_method([r for own in subjects.values() for r in own.perturbed])
     parts = {
-        subject: analyse_prepared(own, method, fits_alone=fits_alone, progress=progress)
+        subject: estimate_recorded(own, method, fits_alone=fits_alone, progress=part)
         for subject, own in subjects.items()
     }
     across = [

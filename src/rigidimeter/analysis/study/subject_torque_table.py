@@ -16,8 +16,7 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
-from rigidimeter.analysis.estimation import aligned, epoch_signals
-from rigidimeter.analysis.estimation.stretches import longest_part
+from rigidimeter.analysis.estimate_anew import aligned, epoch_signals, longest_part
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.core.errors import UserError, refused
 from rigidimeter.core.files import as_written, in_place, write_dictionary_beside
@@ -41,7 +40,7 @@ def subject_torque(recording: Recording, analysis: Analysis) -> Iterator[pa.Tabl
         if not fit.outcome.included:
             continue
         epoch = aligned(longest_part(epochs[fit.source, fit.epoch]), analysis.delays)
-        signals = epoch_signals(epoch, fit.method, recording.settings.estimation)
+        signals = epoch_signals(epoch, recording.settings, fit.method)
         joint = (
             fit.inertia_kg_m2 * signals.acceleration_rad_s2
             + fit.damping_nm_s_rad * signals.velocity_rad_s

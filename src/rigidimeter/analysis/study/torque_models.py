@@ -7,11 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rigidimeter.analysis.estimation.epoch_models import EpochModels, clock_of_models, model_epoch
-from rigidimeter.analysis.estimation.method_record import Progress
-from rigidimeter.analysis.estimation.terms import ModelRow, TermsFit
+from rigidimeter.analysis.estimate_anew import (
+    EpochModels,
+    ModelRow,
+    Progress,
+    TermsFit,
+    model_epochs,
+    prepare,
+)
 from rigidimeter.analysis.reading import Recording
-from rigidimeter.analysis.study.analysis import Preparation
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import Epoch
 
@@ -72,7 +76,7 @@ def model_recording(
     models : sequence of sequences of str
         The terms of each.
     compare, grow, high_hz
-        As for `model_epoch`.
+        As for `model_epochs`.
     progress : callable
         Called with the share of the epochs that was done since, 1 in all.
 
@@ -81,19 +85,13 @@ def model_recording(
     UserError
         If every epoch is an imposed sinusoid.
     """
-    preparation = Preparation(recording.epochs, recording.settings)
-    every = preparation.perturbed()
+    recorded = prepare(recording.epochs, recording.settings)
     found = []
-    for aligned, recorded in zip(every, preparation.perturbed(as_recorded=True), strict=True):
-        epoch = aligned.epoch
-        try:
-            prepared, remark = clock_of_models(aligned, recorded, models, high_hz=high_hz)
-            fits = model_epoch(prepared, models, compare=compare, grow=grow, high_hz=high_hz)
-        except ValueError as error:
-            found.append(ModelledEpoch(epoch, None, str(error), compare))
-        else:
-            found.append(ModelledEpoch(epoch, fits, "", compare, remark))
-        progress(1.0 / len(every))
+    for ready, models_of, problem, clock in model_epochs(
+        recorded, models, compare=compare, grow=grow, high_hz=high_hz
+    ):
+        found.append(ModelledEpoch(ready.epoch, models_of, problem, compare, clock))
+        progress(1.0 / len(recorded.perturbed))
     if not found:
         raise UserError("every epoch is an imposed sinusoid; a model needs a perturbed one")
     return tuple(found)

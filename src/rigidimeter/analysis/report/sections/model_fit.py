@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from markupsafe import Markup
 
-from rigidimeter.analysis.estimation import Signals, epoch_signals, scoring_cycles
+from rigidimeter.analysis.estimate_anew import Signals, epoch_signals, scoring_cycles
 from rigidimeter.analysis.report.contents import Block, Figure, Section, named, paragraph, part
 from rigidimeter.analysis.report.curves import (
     TORQUE_HEIGHTS,
@@ -39,7 +39,7 @@ from rigidimeter.model import JointDynamics
 def _torque(result: StudyResult) -> Iterator[Block]:
     colours = condition_colours(result.condition_names)
     found = [
-        (fit, epoch, epoch_signals(epoch, fit.method, result.settings.estimation))
+        (fit, epoch, epoch_signals(epoch, result.settings, fit.method))
         for fit in representative_fits(result)
         if (epoch := analysed_epoch(result, fit)) is not None
     ]
