@@ -103,6 +103,11 @@ class PlannedSession:
         entered = replace(entered, subject=str(self.about.get("subject", "")))
         return self.with_about({"range": entered.facts()})
 
+    def without_subject(self) -> PlannedSession:
+        """Return the session as one of an axis on which nobody is."""
+        nobody = {"diagnostics": {"subject_present": False}}
+        return replace(self, settings=changed_settings(self.settings, nobody))
+
     def with_about(self, more: Mapping[str, Any]) -> PlannedSession:
         """Return the session with more that is said of it; what was entered before stays."""
         return replace(self, about={**self.about, **more})
@@ -191,8 +196,8 @@ def checked_rig(planned: PlannedSession, rig: Path | None) -> PlannedSession:
     today = require_daily_check(rigfile, commissioned, settings, settings_path=planned.source)
     rigfile.claim().close()
     model = model_of_today(commissioned.numbers, today.numbers)
-    measured = as_measured(settings, commissioned, today)
-    planned = replace(planned, settings=measured, drive_model=model)
+    settings = as_measured(settings, commissioned, today)
+    planned = replace(planned, settings=settings, drive_model=model)
     _require_range(planned, rigfile, commissioned)
     return planned
 

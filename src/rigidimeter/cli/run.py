@@ -192,6 +192,7 @@ def run(
     if due is not None:
         planned = planned.with_about(due.waited())
     attended, confirmed = attendance(rig, unattended=unattended, confirm=confirm)
+    planned = planned.without_subject() if confirmed else planned
     shown = planned.shown(virtual=rig is None)
     realtime = Realtime(priority=priority, cpu=cpu, attended=attended, confirmed=confirmed)
     with terminal_view(sys.stdin if attended else None, sys.stdout, shown) as console:
