@@ -13,7 +13,7 @@ from tests.scenarios.recordings import measured_alone
 
 from rigidimeter.analysis.study.analysis import Preparation, analyse_prepared
 from rigidimeter.core.executor import each
-from rigidimeter.core.records import Fit
+from rigidimeter.core.records import Analysis, Epoch, Fit
 
 EPOCHS = 4
 METHODS = {"iv": "iv", "bandlimited": "bandlimited", "blind": "bandlimited"}
@@ -37,10 +37,10 @@ def measure(
         Processes.
     """
     tasks = [(name, number, tuple(methods)) for name in numbers for number in numbers[name]]
-    found = each(_one, tasks, jobs=jobs, in_order=True)
-    for name, own in groupby(found, lambda done: done[0][0]):
-        both = [kept for _, kept in own]
-        yield name, {method: [kept[method] for kept in both] for method in methods}
+    done = each(_one, tasks, jobs=jobs, in_order=True)
+    for name, own in groupby(done, lambda one: one[0][0]):
+        both = [found for _, found in own]
+        yield name, {method: [found[method] for found in both] for method in methods}
 
 
 def _one(task: tuple[str, int, tuple[str, ...]]) -> dict[str, Kept]:
@@ -52,18 +52,24 @@ def _one(task: tuple[str, int, tuple[str, ...]]) -> dict[str, Kept]:
     known = Preparation(epochs, settings)
     found = {}
     for method in methods:
-        hidden = method == "blind"
+        own = known if method != "blind" else Preparation(seen_by(method, epochs), settings)
         with np.errstate(all="ignore"):
-            analysis = analyse_prepared(
-                Preparation(map(measured_alone, epochs), settings) if hidden else known,
-                METHODS[method],
-            )
-        found[method] = {
-            "truth": truth.tolist(),
-            "fits": [_fit(fit) for fit in analysis.fits],
-            "pooled": [_fit(fit) for fit in analysis.pooled],
-        }
+            found[method] = kept(truth.tolist(), analyse_prepared(own, METHODS[method]))
     return found
+
+
+def seen_by(method: str, epochs: Iterable[Epoch]) -> list[Epoch]:
+    """Return the epochs with the channels that a method is given."""
+    return [measured_alone(epoch) if method == "blind" else epoch for epoch in epochs]
+
+
+def kept(truth: list[list[float]], analysis: Analysis) -> Kept:
+    """Return what a row of the table needs of one recording by one method."""
+    return {
+        "truth": truth,
+        "fits": [_fit(fit) for fit in analysis.fits],
+        "pooled": [_fit(fit) for fit in analysis.pooled],
+    }
 
 
 def _fit(fit: Fit) -> Kept:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from tests.docs.measured import folded
 
@@ -43,7 +43,7 @@ def table(rows: Rows) -> list[str]:
     ]
     for method in dict.fromkeys(method for _, method in rows):
         lines += [
-            "| " + " | ".join(_cells(scenario, method, row)) + " |"
+            "| " + " | ".join(cells(scenario, method, row)) + " |"
             for (scenario, name), row in rows.items()
             if name == method
         ]
@@ -66,7 +66,8 @@ def measured(rows: Rows) -> str:
     return "\n".join([*lines, "", *folded(table(rows))])
 
 
-def _cells(scenario: str, method: str, row: Row) -> Iterable[str]:
+def cells(scenario: str, method: str, row: Row) -> tuple[str, ...]:
+    """Return a row as cells of the table."""
     shares = ", ".join(f"{name} {100 * share:.0f}" for name, share in row.shares.items())
     return (
         method,

@@ -20,7 +20,13 @@ answer has changed, not that it is right; the scenarios, references and the pape
 J, B, K and the ends of intervals may differ by 0.001 of their standard error, p in the third digit
 of its logarithm (below 1e-12 all are alike), other numbers by 1e-4, words and counts not at all. A
 difference is printed as a list of the values that changed. `make golden` writes the table and this
-page anew; a commit that changes the table says which answers and why.
+page anew; a commit that changes the table says which answers and why. `python -m tests.golden
+--compare` prints old and new side by side, the largest difference first, and writes nothing.
+
+A room that is built anew has other rounding and another search. While `tests/golden/rebuilt.toml`
+names it, what goes through it may differ by 0.05 standard errors, and errors and intervals by 5 %;
+findings are compared by name and level. What differs beyond that, as where the program answers what
+it did not, is listed in `tests/golden/rebuilt.txt`, a line with its reason each.
 
 ## What each input shows
 

@@ -10,20 +10,46 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 Value = float | int | str | None
 Row = Mapping[str, Value]
 Answers = dict[str, dict[str, Row]]
 """For each case its rows by what they are."""
 
-P_DIGITS, P_LEAST = 0.01, 1e-12
-"""p agrees in two digits of its logarithm; below the least all are alike."""
+P_LEAST = 1e-12
+"""Below it all p are alike."""
 
-ERROR_SHARE = 1e-3
-"""Of the standard error, or of half the interval: by how much a number may differ."""
 
-RELATIVE = 1e-4
-"""For numbers without an error of their own."""
+class Tolerance(NamedTuple):
+    """By how much an answer may differ.
+
+    Attributes
+    ----------
+    errors : float
+        A number with an error of its own: so many standard errors, or halves of its interval.
+    of_error, of_interval : float
+        A standard error: this share of it. An end of an interval: this share of half of it.
+    logarithm, of_logarithm : float
+        p: in log10, and as a share of it.
+    relative : float
+        Other numbers: this share.
+    findings_by_name : bool
+        The value of a finding, a size in the unit of its check, is not compared.
+    """
+
+    errors: float = 1e-3
+    of_error: float = 1e-3
+    of_interval: float = 0.0
+    logarithm: float = 0.01
+    of_logarithm: float = 0.0
+    relative: float = 1e-4
+    findings_by_name: bool = False
+
+
+TIGHT = Tolerance()
+REBUILT = Tolerance(0.05, 0.05, 0.05, 0.05, 0.05, 0.01, findings_by_name=True)
+"""Of a room that is built anew, whose numbers have another rounding and search."""
 
 ROUNDING = 1e-12
 """What is smaller is the rounding of another processor: no answer is so small."""
@@ -70,57 +96,95 @@ def _number(cell: str) -> Value:
         return cell
 
 
-def differences(kept: Mapping[str, Row], found: Mapping[str, Row]) -> list[str]:
-    """Return a line for each value of a case that is another now, and by how much."""
-    lines = [f"- {what}" for what in kept if what not in found]
-    lines += [f"+ {what}  {dict(found[what])}" for what in found if what not in kept]
+class Difference(NamedTuple):
+    """A value of a row that is another now; a row that is gone or new has no key.
+
+    `size` is in standard errors where the value has one, else the share of the old value, and
+    infinite where there is no number.
+    """
+
+    row: str
+    key: str
+    old: object
+    new: object
+    size: float = math.inf
+    unit: str = ""
+
+    @property
+    def name(self) -> str:
+        """The finding, the key, or what the row is called last."""
+        finding = re.search(r"findings (\w+)", self.row)
+        return finding[1] if finding else self.key or self.row.split()[-1]
+
+    @property
+    def how(self) -> str:
+        """What has become of it: `gone`, `new` or `other`."""
+        return "other" if self.key else "gone" if self.new is None else "new"
+
+    def __str__(self) -> str:
+        if not self.key:
+            return f"- {self.row}" if self.new is None else f"+ {self.row}  {self.new}"
+        far = f" ({self.size:+.3g} {self.unit})" if self.unit else ""
+        return f"! {self.row}  {self.key}: {self.old} -> {self.new}{far}"
+
+
+def differences(
+    kept: Mapping[str, Row], found: Mapping[str, Row], tolerance: Tolerance = TIGHT
+) -> list[Difference]:
+    """Return each value of a case that is another now, and by how much."""
+    lines = [Difference(what, "", dict(kept[what]), None) for what in kept if what not in found]
+    lines += [Difference(what, "", None, dict(found[what])) for what in found if what not in kept]
     for what in kept:
         for key in {**kept[what], **found[what]} if what in found else ():
+            if key == "value" and tolerance.findings_by_name:
+                continue
             old, new = kept[what].get(key, "absent"), found[what].get(key, "absent")
             if isinstance(new, str):
                 new = _number(new)
-            if not _same(key, old, new, kept[what]):
-                lines.append(
-                    f"! {what}  {key}: {old} -> {new}{_how_far(key, old, new, kept[what])}"
-                )
+            if not _same(key, old, new, kept[what], tolerance):
+                far = _how_far(key, old, new, kept[what])
+                lines.append(Difference(what, key, old, new, *far))
     return lines
 
 
-def _same(key: str, old: Value, new: Value, row: Row) -> bool:
+def _same(key: str, old: Value, new: Value, row: Row, tolerance: Tolerance) -> bool:
     if isinstance(old, str) or isinstance(new, str) or old is None or new is None:
         return (old or "") == (new or "")
     if _P.search(key):
         logs = [math.log10(max(value, P_LEAST)) for value in (old, new)]
-        return abs(logs[0] - logs[1]) <= P_DIGITS
+        may = tolerance.logarithm + tolerance.of_logarithm * abs(logs[0])
+        return abs(logs[0] - logs[1]) <= may
     if isinstance(old, int) and isinstance(new, int):
         return old == new
     if math.isnan(old) or math.isnan(new):
         return math.isnan(old) and math.isnan(new)
-    return abs(old - new) <= max(_tolerance(key, row), ROUNDING)
+    return abs(old - new) <= max(_may_differ(key, row, tolerance), ROUNDING)
 
 
-def _tolerance(key: str, row: Row) -> float:
+def _may_differ(key: str, row: Row, tolerance: Tolerance) -> float:
     """Return by how much a number may differ: a share of its error where it has one."""
     value = row.get(key)
     size = abs(value) if isinstance(value, (int, float)) else 0.0
     if key.endswith("_se"):
-        return ERROR_SHARE * size
+        return tolerance.of_error * size
     base = re.sub(r"_(low|high)$", "", key)
     error = row.get(f"{base}_se")
     ends = [row.get(base + end) for end in ("_low", "_high")]
     if base in ("estimate", "low", "high"):
         error, ends = row.get("se"), [row.get("low"), row.get("high")]
+    known = all(isinstance(end, (int, float)) for end in ends) and ends[0] != ends[1]
+    half = abs(ends[1] - ends[0]) / 2 if known else 0.0  # type: ignore[operator]
+    of_end = tolerance.of_interval * half if re.search(r"(^|_)(low|high)$", key) else 0.0
     if isinstance(error, float) and error > 0:
-        return ERROR_SHARE * error + 5e-9 * size  # half of the ninth digit
-    if all(isinstance(end, (int, float)) for end in ends) and ends[0] != ends[1]:
-        return ERROR_SHARE * abs(ends[1] - ends[0]) / 2  # type: ignore[operator]
-    return RELATIVE * size
+        # half of the ninth digit beside it
+        return max(tolerance.errors * error + 5e-9 * size, of_end)
+    return max(tolerance.errors * half, of_end) if known else tolerance.relative * size
 
 
-def _how_far(key: str, old: Value, new: Value, row: Row) -> str:
+def _how_far(key: str, old: Value, new: Value, row: Row) -> tuple[float, str]:
     if not isinstance(old, (int, float)) or not isinstance(new, (int, float)):
-        return ""
+        return math.inf, ""
     error = row.get(re.sub(r"_(low|high)$", "", key) + "_se")
     if isinstance(error, float) and error > 0 and not key.endswith("_se"):
-        return f" ({(new - old) / error:+.3g} standard errors)"
-    return f" ({100 * (new / old - 1):+.3g} %)" if old else ""
+        return (new - old) / error, "standard errors"
+    return (100 * (new / old - 1), "%") if old else (math.inf, "")

@@ -41,7 +41,7 @@ from rigidimeter.rig.commissioning import (
     record_path,
     require_daily_check,
 )
-from rigidimeter.rig.console import SessionPlan, new_folder, next_steps, resume_command
+from rigidimeter.rig.console import SessionPlan, next_steps, resume_command
 from rigidimeter.rig.devices import (
     STOP_LOW,
     MotionRange,
@@ -102,6 +102,11 @@ class PlannedSession:
             return self
         entered = replace(entered, subject=str(self.about.get("subject", "")))
         return self.with_about({"range": entered.facts()})
+
+    def without_subject(self) -> PlannedSession:
+        """Return the session as one of an axis on which nobody is."""
+        nobody = {"diagnostics": {"subject_present": False}}
+        return replace(self, settings=changed_settings(self.settings, nobody))
 
     def with_about(self, more: Mapping[str, Any]) -> PlannedSession:
         """Return the session with more that is said of it; what was entered before stays."""
@@ -191,8 +196,8 @@ def checked_rig(planned: PlannedSession, rig: Path | None) -> PlannedSession:
     today = require_daily_check(rigfile, commissioned, settings, settings_path=planned.source)
     rigfile.claim().close()
     model = model_of_today(commissioned.numbers, today.numbers)
-    measured = as_measured(settings, commissioned, today)
-    planned = replace(planned, settings=measured, drive_model=model)
+    settings = as_measured(settings, commissioned, today)
+    planned = replace(planned, settings=settings, drive_model=model)
     _require_range(planned, rigfile, commissioned)
     return planned
 
@@ -311,7 +316,7 @@ def offer_to_continue(out: Path) -> None:
         return
     rest = rest_of(out)
     if rest.epochs:
-        again = resume_command(out, None if rest.virtual else "RIG.toml", new_folder(out))
+        again = resume_command(out, None if rest.virtual else "RIG.toml", rest.about)
         raise UserError(
             f"{out}: holds a session of which {len(rest.epochs)} epochs are left; continue it with "
             f"`{again}`, or name a new folder"
@@ -326,15 +331,14 @@ def conclude(ended: Ended, out: Path, rig: Path | None, *, nwb: bool) -> None:
     if nwb:
         echo(write_nwb_beside(folder))
     closed = bool(ended.outcome)
-    left = len(rest_of(folder).epochs)
+    rest = rest_of(folder)
     steps = next_steps(
         folder,
         closed=closed,
         good=good,
-        left=left,
+        left=len(rest.epochs),
         rig=rig,
-        out=new_folder(folder),
-        blinded=bool(codes_of(read_manifest(folder).get("about", {}))),
+        about=rest.about,
     )
     echo("\n".join(["What to do next:", *(f"  {step}" for step in steps)]))
     if ended.outcome != "success":

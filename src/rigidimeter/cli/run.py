@@ -23,7 +23,7 @@ _ON_THE_PAGE = {
 
 def run(
     out: Path | None = WRITE.option(
-        "--out DIR", "New folder for the session. With --next it is in the study."
+        "--out DIR", "New folder for the session. One of a plan is in its study."
     ),
     protocol: Path | None = argument("[PROTOCOL.toml]", "Settings with the protocol.", None),
     rig: Path | None = RIG,
@@ -106,15 +106,6 @@ def run(
       rigidimeter run --next demo-study --stimulation "on since 10:42"
     """
     from rigidimeter.cli.attendance import attendance
-    from rigidimeter.cli.next_session import (
-        SaidOfSession,
-        added,
-        continued,
-        continued_place,
-        next_session,
-        refuse_with_next,
-        refuse_without_next,
-    )
     from rigidimeter.cli.planned_session import (
         checked_rig,
         conclude,
@@ -124,6 +115,13 @@ def run(
         run_planned,
     )
     from rigidimeter.cli.range_entry import entered_range
+    from rigidimeter.cli.session_of_plan import (
+        SaidOfSession,
+        next_session,
+        refuse_with_next,
+        refuse_without_next,
+        rest_of_plan,
+    )
     from rigidimeter.rig.acquisition.processes import Realtime, complete_left
     from rigidimeter.rig.console import discard_typed, terminal_view
 
@@ -132,18 +130,30 @@ def run(
     said = SaidOfSession(
         subject, operator, note, stimulation, block, begin_anyway, clock_speed, day
     )
-    due = rest = None
+    due = None
     if study is not None:
-        refuse_with_next(out, protocol, resume, seed, day, page=page, blinded=blinded)
+        refuse_with_next(
+            {
+                "--out": out is not None,
+                "PROTOCOL.toml": protocol is not None,
+                "--resume": resume is not None,
+                "--seed": seed is not None,
+                "--day": bool(day),
+                "--blinded": blinded,
+                "--console": page,
+            }
+        )
         due = next_session(study, said, virtual=rig is None)
-        planned, out = due.planned(), due.folder
+        planned = due.planned()
     else:
         if resume is None:
             refuse_without_next(said)
         planned = planned_session(protocol, resume, seed, virtual=rig is None)
         if resume is not None:
-            rest = continued(resume, planned.about, said)
+            due = rest_of_plan(resume, planned.about, said)
         planned = planned.with_about(said.facts())
+    if due is not None:
+        out = due.folder(out)
     if out is None:
         raise UserError("--out is needed: name a new folder for the session")
     require_packages(planned.settings)
@@ -180,11 +190,9 @@ def run(
     planned = planned.within(entered_range(range_deg, rig, planned.settings, lead=lead_range))
     planned = checked_rig(planned, rig)
     if due is not None:
-        due = due.waited()
-        planned = planned.with_about(due.planned().about)
-    if rest is not None:
-        planned = planned.with_about({"plan": continued_place(rest, begin_anyway)})
+        planned = planned.with_about(due.waited())
     attended, confirmed = attendance(rig, unattended=unattended, confirm=confirm)
+    planned = planned.without_subject() if confirmed else planned
     shown = planned.shown(virtual=rig is None)
     realtime = Realtime(priority=priority, cpu=cpu, attended=attended, confirmed=confirmed)
     with terminal_view(sys.stdin if attended else None, sys.stdout, shown) as console:
@@ -192,7 +200,7 @@ def run(
     for remark in ended.remarks:
         echo(remark, err=True)
     if due is not None:
-        added(due)
+        due.add(ended.folder)
     try:
         conclude(ended, out, rig, nwb=planned.settings.sharing.nwb_at_close)
     finally:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -25,7 +25,7 @@ from rigidimeter.core.study_files import (
     write_plan,
 )
 from rigidimeter.planning import StudyDays, draw_days, plan
-from rigidimeter.rig.acquisition.processes import Realtime
+from rigidimeter.rig.acquisition.processes import Ended, Realtime
 from rigidimeter.rig.console.page import AfterView, Jobs, Place, ServerState, StartRequest
 
 NAMES = ("OFF", "DBS")
@@ -34,13 +34,15 @@ BEGUN = datetime.now(UTC) - timedelta(minutes=30)
 
 
 @pytest.fixture
-def study(tmp_path: Path) -> Path:
+def study(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     spec = StudyDays(("S01",), NAMES, 1, ("DBS",), order=NAMES, task="prbs")
     about = PlanToml(subjects=["S01"], days=1, conditions=list(NAMES), stimulated=["DBS"])
     protocols = {
         f"protocols/{name}.toml": toml_text(dump_settings(tiny(name, 1))) for name in NAMES
     }
-    return write_plan(tmp_path / "study", about, draw_days(spec, 1), protocols).folder
+    day = getattr(request, "param", "1")
+    blocks = [replace(block, day=day) for block in draw_days(spec, 1)]
+    return write_plan(tmp_path / "study", about, blocks, protocols).folder
 
 
 def switched(study: Path, state: str, minutes_ago: float) -> StimulationChange:
@@ -137,6 +139,77 @@ def test_a_change_can_be_said_where_a_session_is_continued(session, rigidimeter,
         "stimulation 'half': write on or off"
         in continued(rigidimeter, session, "--stimulation", "half").err
     )
+
+
+@pytest.fixture
+def recorded(monkeypatch) -> None:
+    """Record of each session that would be run that its epochs were done, and no sample."""
+
+    def supervise(target, recording, **_):
+        writer = recording.writer()
+        for epoch in recording.protocol:
+            facts = {"epoch": epoch["number"], "label": epoch["label"], "task": epoch["task"]}
+            writer.event("epoch_started", time_s=0.0, condition=epoch["condition"], **facts)
+            writer.event("epoch_ended", time_s=6.0, outcome="success", reason="", **facts)
+        writer.close(6.0, "success", "")
+        return Ended(recording.folder, "success", "", 0, 0, None, ())
+
+    monkeypatch.setattr("rigidimeter.cli.planned_session.supervise", supervise)
+
+
+def test_what_is_left_of_a_planned_session_enters_the_study(study, session, rigidimeter, recorded):
+    ran = rigidimeter("run", "--resume", session, "--unattended")
+    assert ran.status == 0, ran.err
+    rows = (study / "sessions.csv").read_text()
+    assert "sessions/S01-day-1-1-2,S01,1,OFF" in rows
+    assert "Next: Session 2 of 2 of S01" in ran.out
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (("--out", "elsewhere"), "--out elsewhere: is outside the study"),
+        (("--subject", "S02"), "--subject S02: the session that is continued is of S01"),
+        (("--day", "2"), "--day 2: the session that is continued is of 1"),
+    ],
+)
+def test_what_is_left_of_a_planned_session_stays_what_the_plan_says(
+    session, rigidimeter, ran, options, sentence
+):
+    refused = rigidimeter("run", "--resume", session, "--unattended", *options)
+    assert (refused.status, ran) == (1, [])
+    assert sentence in refused.err
+
+
+@pytest.mark.parametrize("study", ["pre-op"], indirect=True)
+def test_the_folder_of_what_is_left_is_that_of_the_plan_whatever_the_day_is_called(
+    study, rigidimeter, monkeypatch
+):
+    """The command that runs the rest needs no folder; the page takes the same."""
+
+    def supervise(target, recording, **_):
+        recording.writer().close(0.0, "abort", "aborted by the operator")
+        return Ended(recording.folder, "abort", "aborted by the operator", 0, 0, None, ())
+
+    monkeypatch.setattr("rigidimeter.cli.planned_session.supervise", supervise)
+    switched(study, "off", 90.0)
+    ended = rigidimeter("run", "--next", study, "--unattended")
+    first = study / "sessions" / "S01-day-pre-op-1"
+    command = f"rigidimeter run --resume {first}"
+    assert f"{command}  # run the 2 epochs that are left" in ended.out
+    state, asked = ServerState(Place(study, Settings(), "the defaults")), []
+    state.ask = asked.append
+    with Client(page("/rest")) as client:
+        AfterView(state, Jobs(), lambda: True, ui.label())
+        buttons = [one for one in client.elements.values() if isinstance(one, ui.button)]
+        (button,) = (one for one in buttons if one.text == "Run what is left: 2")
+        for one in button._event_listeners.values():
+            one.handler(None)
+    client.delete()
+    (request,) = asked
+    assert request.folder == "sessions/S01-day-pre-op-1-2"
+    rigidimeter(*command.split()[1:], "--unattended")
+    assert (study / request.folder).is_dir()
 
 
 def led(study: Path, **request: str) -> ServerState:

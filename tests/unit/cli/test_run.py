@@ -61,6 +61,7 @@ def seen(monkeypatch):
 
     def supervise(target, recording, **_):
         seen.continues, seen.about = recording.continues, recording.about
+        seen.settings = recording.settings
         target(SimpleNamespace())
 
     monkeypatch.setattr(RigFile, "build", build)
@@ -103,6 +104,13 @@ def test_the_home_is_where_the_session_began(seen, resume):
         resume(0.25, *RANGE)
     assert seen.home == Home(0.25, HOME_TOLERANCE_RAD)
     assert seen.continues["origin_rad"] == 0.25
+
+
+def test_a_session_with_nobody_in_the_rig_is_recorded_as_one_without_a_subject(seen, resume):
+    with pytest.raises(BuiltError):
+        resume(0.25, *RANGE)
+    assert not seen.settings.diagnostics.subject_present
+    assert parse_settings({}).diagnostics.subject_present
 
 
 def test_a_session_that_began_nowhere_leaves_the_home_to_the_rig_file(seen, resume):

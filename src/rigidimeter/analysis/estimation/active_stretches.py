@@ -66,20 +66,19 @@ def activities(
             locked = bool(spans) and follows_motion(one, epoch)
             stretches += [ActiveStretch(*span, name, locked) for span in spans]
         stretches.sort()
-        left = without
-        if settings.estimation.leave_out_active:
-            left = leaving_out(without, to_leave_out(stretches), settings)
+        wanted = _to_leave_out(stretches) if settings.estimation.leave_out_active else []
+        left, kept = leaving_out(without, wanted, settings)
         length_s = max(float(one.time_s[-1] - one.time_s[0]) for one in own.values())
         active = share_percent(joined([one[:2] for one in stretches]), length_s)
         out = [one[:2] for one in left.left_out if one.check == CHECK]
         largest = [largest_v[epoch.source, name] for name in own]
         shared = cocontraction_percent([*own.values()], largest)
         out_percent = min(share_percent(out, length_s), 100.0)
-        found.append((left, Activity(tuple(stretches), active, out_percent, shared)))
+        found.append((left, Activity(tuple(stretches), active, out_percent, shared, kept)))
     return found
 
 
-def to_leave_out(stretches: Sequence[ActiveStretch]) -> list[LeftOut]:
+def _to_leave_out(stretches: Sequence[ActiveStretch]) -> list[LeftOut]:
     """Return what would be left out for active muscles, but for those that follow the motion."""
     own = [(one.start_s, one.stop_s + TORQUE_OUTLASTS_S) for one in stretches if not one.locked]
     return [LeftOut(*span, "a muscle was active", CHECK) for span in joined(own)]

@@ -50,21 +50,22 @@ def without_bad_stretches(epoch: Epoch, settings: Settings) -> Epoch:
     if not fitted_channels(epoch):
         return epoch
     found = [one for one in bad_stretches(epoch, diagnostics) if levels.of(one.check) == "exclude"]
-    return leaving_out(epoch, found, settings)
+    return leaving_out(epoch, found, settings)[0]
 
 
-def leaving_out(epoch: Epoch, found: Sequence[LeftOut], settings: Settings) -> Epoch:
-    """Return a bridged epoch without some stretches too; as it is where too little would be left.
+def leaving_out(epoch: Epoch, found: Sequence[LeftOut], settings: Settings) -> tuple[Epoch, str]:
+    """Return a bridged epoch without some stretches too; as it is, and why, where they stay in.
 
-    That is more than `max_left_out_percent` of it, or less than can be fitted.
+    They do where that would take more than `max_left_out_percent` of it, or leave less than can be
+    fitted.
     """
-    if not found or why_kept(epoch, found, settings):
-        return epoch
-    return bridged(_without(epoch, found))
+    if not found:
+        return epoch, ""
+    why = _why_kept(epoch, found, settings)
+    return (epoch, why) if why else (bridged(_without(epoch, found)), "")
 
 
-def why_kept(epoch: Epoch, found: Sequence[LeftOut], settings: Settings) -> str:
-    """Return why some stretches cannot be left out too, or an empty text."""
+def _why_kept(epoch: Epoch, found: Sequence[LeftOut], settings: Settings) -> str:
     without, trim_s = _without(epoch, found), settings.estimation.trim_s
     (before_s, _), (left_s, _) = used_s(epoch, trim_s), used_s(without, trim_s)
     taken_percent = 100.0 * (before_s - left_s) / before_s if before_s > 0 else 100.0

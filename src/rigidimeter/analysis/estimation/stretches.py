@@ -68,7 +68,7 @@ def bridged(epoch: Epoch) -> Epoch:
             continue  # nothing to hang a line on; the epoch is refused for what is left of it
         line = np.interp(channel.time_s, channel.time_s[kept], channel.values[kept])
         values = np.where(kept, channel.values, line)
-        channels[channel.name] = Channel(channel.name, channel.time_s, values)
+        channels[channel.name] = replace(channel, values=values)
     return replace(epoch, channels=channels)
 
 
@@ -91,8 +91,9 @@ def _evenly(channel: Channel, lost: list[LeftOut]) -> Channel:
     place = before + (np.arange(before.size) - first[before]) / np.append(missing + 1, 1)[before]
     time_s = np.interp(place, np.arange(len(channel)), channel.time_s)
     if channel.name == "perturbation_nm":
-        return Channel(channel.name, time_s, channel.values[before])
-    return Channel(channel.name, time_s, np.interp(place, np.arange(len(channel)), channel.values))
+        return replace(channel, time_s=time_s, values=channel.values[before])
+    values = np.interp(place, np.arange(len(channel)), channel.values)
+    return replace(channel, time_s=time_s, values=values)
 
 
 def longest_part(epoch: Epoch) -> Epoch:

@@ -39,12 +39,15 @@ class Activity(NamedTuple):
     cocontraction_percent : float
         Mean of the smaller over the larger envelope of the first two muscles, each in units of its
         largest in the recording; NaN with one muscle.
+    kept : str
+        Why stretches that were to be left out stay in; empty where none does.
     """
 
     stretches: tuple[ActiveStretch, ...]
     active_percent: float
     left_out_percent: float
     cocontraction_percent: float = math.nan
+    kept: str = ""
 
     def row(self) -> dict[str, Any]:
         """Return names and numbers, as files and tables have them; the stretches as one text."""
@@ -53,6 +56,7 @@ class Activity(NamedTuple):
             "active_left_out_percent": self.left_out_percent,
             "cocontraction_percent": self.cocontraction_percent,
             "active_stretches": " / ".join(map(_in_words, self.stretches)),
+            "active_kept": self.kept,
         }
 
     def document(self) -> dict[str, Any]:
@@ -65,8 +69,9 @@ def activity_from(row: Mapping[str, Any]) -> Activity | None:
     if "active_stretches" not in row:
         return None
     names = ("active_percent", "active_left_out_percent", "cocontraction_percent")
-    numbers = (math.nan if row[name] is None else float(row[name]) for name in names)
-    return Activity(tuple(ActiveStretch(**one) for one in row["active_stretches"]), *numbers)
+    found: list[Any] = [math.nan if row[name] is None else float(row[name]) for name in names]
+    found.append(row.get("active_kept", ""))
+    return Activity(tuple(ActiveStretch(**one) for one in row["active_stretches"]), *found)
 
 
 def _in_words(one: ActiveStretch) -> str:

@@ -55,11 +55,14 @@ class Channel:
         neither rate nor phase: stamps may jitter.
     values : array, shape (n,)
         In the unit that the name states.
+    spoken : str
+        How sentences name it, such as ``emg_v (column biceps)``; empty where by its name alone.
     """
 
     name: str
     time_s: NDArray[np.float64]
     values: NDArray[np.float64]
+    spoken: str = ""
 
     def __post_init__(self) -> None:
         if self.name not in CHANNEL_UNITS:

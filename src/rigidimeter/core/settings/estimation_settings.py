@@ -99,6 +99,9 @@ class DiagnosticsSettings(Section):
     weight. `gravity_nm` is m g l, the moment of the limb's weight about the axis when the limb is
     horizontal; 0 where it is not known or the axis is vertical. `gravity_angle_deg` is the limb's
     angle from hanging straight down where the angle that is recorded is 0, in its direction.
+
+    `subject_present` is whether a person is on the axis. It is false on a bench, and in sessions of
+    `run` for which it was written that nobody is in the rig.
     """
 
     ascending: ClassVar = (
@@ -140,6 +143,7 @@ class DiagnosticsSettings(Section):
     max_frozen_s: float = quantity(0.1, "s", 0.0, 60.0)
     max_left_out_percent: float = quantity(50.0, "%", 0.0, 100.0)
     axis: Axis = "unknown"
+    subject_present: bool = True
     gravity_nm: float = quantity(0.0, "N·m", 0.0, 1000.0)
     gravity_angle_deg: float = quantity(0.0, "deg", -180.0, 180.0)
     max_velocity_scale_percent: float = quantity(10.0, "%", 0.1, 1000.0)

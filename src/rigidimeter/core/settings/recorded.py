@@ -10,10 +10,7 @@ from rigidimeter.core.settings.models import Settings
 
 _RENAMED: Mapping[str, Mapping[str, str]] = {
     "guard": {"least_inertia_kg_m2": "min_inertia_kg_m2"},
-    "estimation": {
-        "shortest_epoch_s": "min_epoch_s",
-        "longest_delay_s": "max_delay_s",
-    },
+    "estimation": {"shortest_epoch_s": "min_epoch_s", "longest_delay_s": "max_delay_s"},
     "diagnostics": {
         "condition_number_most": "max_condition_number",
         "coherence_least": "min_coherence",

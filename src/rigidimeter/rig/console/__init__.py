@@ -1,6 +1,6 @@
 """What the operator sees and says while the rig runs."""
 
-from rigidimeter.rig.console.after_session import new_folder, next_steps, resume_command
+from rigidimeter.rig.console.after_session import next_steps, resume_command
 from rigidimeter.rig.console.alarms import Alarm, Alarms
 from rigidimeter.rig.console.emg_state import EmgState, EnvelopeReader
 from rigidimeter.rig.console.indicators import (

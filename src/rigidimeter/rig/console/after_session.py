@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-import re
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-_PLANNED = re.compile(r"-day-[^-]+-\d+$")
-"""The folder of the first part of a session of a plan."""
+from rigidimeter.core.session import codes_of
 
 
-def resume_command(folder: Path, rig: Path | str | None, out: Path | str) -> str:
-    """Return the command that continues a session in a new folder."""
-    rig_words = ["--rig", str(rig)] if rig is not None else []
-    return shlex.join(
-        ["rigidimeter", "run", "--resume", str(folder), *rig_words, "--out", str(out)]
-    )
+def resume_command(folder: Path, rig: Path | str | None, about: Mapping[str, Any]) -> str:
+    """Return the command that continues a session in a new folder.
+
+    That of a session of a plan is in the plan: the command need not name it.
+    """
+    words = ["rigidimeter", "run", "--resume", str(folder)]
+    words += ["--rig", str(rig)] if rig is not None else []
+    words += [] if about.get("plan") else ["--out", str(_new_folder(folder))]
+    return shlex.join(words)
 
 
 def next_steps(
@@ -25,8 +28,7 @@ def next_steps(
     good: int,
     left: int,
     rig: Path | None,
-    out: Path,
-    blinded: bool = False,
+    about: Mapping[str, Any],
 ) -> tuple[str, ...]:
     """Return what to do next, a command with its purpose on each line, the most pressing first.
 
@@ -40,19 +42,17 @@ def next_steps(
         Epochs that ended with success, and those that are left to run.
     rig : Path or None
         The rig file; None for the virtual rig.
-    out : Path
-        A folder that does not exist yet, for what is left.
-    blinded : bool
-        Whether conditions stay hidden behind codes.
+    about : mapping
+        Of its manifest: conditions that have codes there stay hidden behind them.
     """
     steps = []
     if not closed:
         steps.append((shlex.join(["rigidimeter", "recover", str(folder)]), "close the session"))
     if left:
         what = "the epoch that is left" if left == 1 else f"the {left} epochs that are left"
-        steps.append((resume_command(folder, rig, out), f"run {what}"))
+        steps.append((resume_command(folder, rig, about), f"run {what}"))
     if good:
-        hide = ["--blinded"] if blinded else []
+        hide = ["--blinded"] if codes_of(about) else []
         report = folder.with_name(f"{folder.name}-report")
         steps += [
             (
@@ -67,13 +67,10 @@ def next_steps(
     return tuple(f"{command}  # {purpose}" for command, purpose in steps)
 
 
-def new_folder(folder: Path) -> Path:
-    """Return a folder beside this one that does not exist: ``session-2`` after ``session``.
-
-    The number at the end of a planned session's folder is its place in the day, not its part.
-    """
+def _new_folder(folder: Path) -> Path:
+    """Return a folder beside this one that does not exist: ``session-2`` after ``session``."""
     stem, _, number = folder.name.rpartition("-")
-    if not (stem and number.isdigit()) or _PLANNED.search(folder.name):
+    if not (stem and number.isdigit()):
         stem, number = folder.name, "1"
     count = int(number) + 1
     while (made := folder.with_name(f"{stem}-{count}")).exists():

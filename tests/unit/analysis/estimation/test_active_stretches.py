@@ -142,7 +142,8 @@ def test_bursts_that_take_too_much_with_their_sides_are_said(relaxed, bursts, me
     assert (fit.activity.left_out_percent == 0) == (level == "caution")
     if level == "note":
         return
-    assert "nothing is left out: with 1 s on each side that would take" in finding.details
+    assert f"nothing is left out: {fit.activity.kept}" in finding.details
+    assert fit.activity.kept.startswith("with 1 s on each side that would take")
     assert "(at most 50 %)" in finding.details
     assert finding.effect == UNKNOWN_EFFECT
     stricter = {"diagnostics": {"levels": {"emg_activity": "exclude"}}}
@@ -163,7 +164,7 @@ def test_activity_is_in_files_and_read_back(pushed, tmp_path):
     assert " s emg_v" in text
 
 
-def test_keep_active_fits_everything(pushed, tmp_path):
+def test_a_column_that_looks_like_emg_is_used_where_the_user_names_it(pushed, tmp_path):
     _, epochs = pushed
     epoch = epochs[0].epoch
     time_s = epoch.channels["emg_v"].time_s[::2]
@@ -172,18 +173,21 @@ def test_keep_active_fits_everything(pushed, tmp_path):
         for name, one in epoch.channels.items()
         if name in ("torque_nm", "angle_rad", "velocity_rad_s")
     }
-    columns["emg_v"] = epoch.channels["emg_v"].values[::2]
+    columns["EMG biceps [V]"] = epoch.channels["emg_v"].values[::2]
     table = tmp_path / "elbow.csv"
     rows = np.column_stack([time_s, *columns.values()])
     np.savetxt(table, rows, delimiter=",", header=",".join(["time_s", *columns]), comments="")
-    percent = []
-    for more in ([], ["--keep-active"]):
+    named, found = ["--column", "emg=EMG biceps [V]"], []
+    for more in ([], named, [*named, "--keep-active"]):
         out = tmp_path / "estimates.json"
         result = CliRunner().invoke(app, ["estimate", str(table), "--json", str(out), *more])
         assert result.exit_code == 0, result.output
-        percent.append(read_estimates(out).fits[0].activity.left_out_percent)
-    assert percent[0] > 5
-    assert percent[1] == 0
+        found.append(read_estimates(out).fits[0])
+    unnamed, named_fit, kept = found
+    assert unnamed.activity is None
+    assert named_fit.activity.left_out_percent > 5
+    assert any("emg_v (column EMG biceps [V])" in one.details for one in named_fit.findings)
+    assert kept.activity.left_out_percent == 0
 
 
 def test_cocontraction_is_high_where_both_muscles_pull_and_low_where_they_alternate(relaxed):

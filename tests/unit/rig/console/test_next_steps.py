@@ -4,13 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from rigidimeter.rig.console import new_folder, next_steps
-
-OUT = Path("s-2")
+from rigidimeter.rig.console import next_steps, resume_command
 
 
 def steps(folder="s", **more):
-    values = {"closed": True, "good": 8, "left": 0, "rig": None, "out": OUT, **more}
+    values = {"closed": True, "good": 8, "left": 0, "rig": None, "about": {}, **more}
     return [step.split("  # ")[0] for step in next_steps(Path(folder), **values)]
 
 
@@ -25,7 +23,7 @@ def test_one_that_was_interrupted_is_continued_first():
     )
     assert (
         "run the 5 epochs that are left"
-        in next_steps(Path("s"), closed=True, good=3, left=5, rig=None, out=OUT)[0]
+        in next_steps(Path("s"), closed=True, good=3, left=5, rig=None, about={})[0]
     )
     assert len(steps(good=0, left=8)) == 1  # nothing to analyse
 
@@ -43,16 +41,7 @@ def test_names_are_quoted_as_a_shell_needs_them():
 
 @pytest.mark.parametrize(("name", "new"), [("s", "s-2"), ("s-2", "s-3"), ("a-b", "a-b-2")])
 def test_a_new_folder_is_one_that_is_not_there(tmp_path, name, new):
-    assert new_folder(tmp_path / name) == tmp_path / new
+    assert resume_command(tmp_path / name, None, {}).endswith(f"--out {tmp_path / new}")
     (tmp_path / new).mkdir()
-    assert not new_folder(tmp_path / name).exists()
-
-
-@pytest.mark.parametrize(
-    ("name", "new"), [("S01-day-1-1", "S01-day-1-1-2"), ("S01-day-1-1-2", "S01-day-1-1-3")]
-)
-def test_what_is_left_of_a_planned_session_does_not_take_the_folder_of_the_next(
-    tmp_path: Path, name: str, new: str
-) -> None:
-    (tmp_path / name).mkdir()
-    assert new_folder(tmp_path / name) == tmp_path / new
+    again = resume_command(tmp_path / name, None, {})
+    assert not Path(again.partition("--out ")[2]).exists()

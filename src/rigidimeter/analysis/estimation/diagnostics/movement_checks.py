@@ -12,8 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimeter.analysis.estimation.active_stretches import CHECK, to_leave_out
-from rigidimeter.analysis.estimation.bad_stretches import why_kept
+from rigidimeter.analysis.estimation.active_stretches import CHECK
 from rigidimeter.analysis.estimation.bandlimited import zero_phase_band
 from rigidimeter.analysis.estimation.diagnostics.channel_checks import rest_of
 from rigidimeter.analysis.estimation.diagnostics.check_record import (
@@ -95,7 +94,8 @@ def emg_activity(case: Case) -> Look | None:
         return None
     found, most = prepared.activity, case.settings.max_emg_active_percent
     value = found.active_percent
-    muscles = dict.fromkeys(one.channel for one in found.stretches)
+    active = (prepared.epoch.channels[one.channel] for one in found.stretches)
+    muscles = dict.fromkeys(one.spoken or one.name for one in active)
     facts: dict[str, Fact] = {"channel": " and ".join(muscles)}
     if prepared.with_active is not None:
         out = [one for one in case.epoch.left_out if one.check == CHECK]
@@ -118,8 +118,8 @@ def emg_activity(case: Case) -> Look | None:
         return Look(value, most, True, facts, "moved", effect)
     if _locked(case):
         return Look(value, most, True, facts)
-    if why := _kept(case):
-        return Look(value, most, True, {**facts, "why": why}, "too_much")
+    if found.kept:
+        return Look(value, most, True, {**facts, "why": found.kept}, "too_much")
     return at_most(value, most, **facts)
 
 
@@ -139,13 +139,8 @@ def _effect(case: Case) -> Effect:
 
 
 def _kept(case: Case) -> str:
-    """Return why stretches stay in that were to be left out, or an empty text."""
-    prepared = case.prepared
-    if prepared is None or prepared.activity is None or prepared.with_active is not None:
-        return ""
-    found = to_leave_out(prepared.activity.stretches)
-    wanted = bool(found) and prepared.settings.estimation.leave_out_active
-    return why_kept(prepared.epoch, found, prepared.settings) if wanted else ""
+    activity = None if case.prepared is None else case.prepared.activity
+    return "" if activity is None else activity.kept
 
 
 def _locked(case: Case) -> bool:

@@ -195,8 +195,8 @@ def _take(
             )
             return
         unit = header.unit if expression(header.unit) else ""
-        if not unit and column == standard:
-            unit = BY_STANDARD[standard].usual[0]
+        if not unit and column in BY_STANDARD:
+            unit = BY_STANDARD[column].usual[0]
         if not unit and standard in said.asserted and standard not in said.scales:
             unit, of_user = BY_STANDARD[standard].usual[0], True
     scale = said.scales.get(standard, "")

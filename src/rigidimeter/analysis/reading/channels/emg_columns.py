@@ -1,23 +1,24 @@
-"""Which columns of a table are EMG: each that is named so is one muscle, in the order of the file.
+"""Which columns of a table are EMG: those the user names, and those with a standard name.
 
-A column with a standard name (``emg_v``, ``emg_2_v``) is that muscle. Where the user names one, no
-other is taken by what it is called. An envelope, an RMS or a share of the largest contraction is no
-raw EMG.
+Active stretches are left out of the fit, so that a column that only looks like EMG is named and not
+used. Where the user says a unit or a scale of EMG, each column that looks like it is one muscle, in
+the order of the file. An envelope, an RMS or a share of the largest contraction is no raw EMG.
 """
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 
 from rigidimeter.analysis.reading.channels.headers import Header
-from rigidimeter.analysis.reading.channels.quantities import words_of
+from rigidimeter.analysis.reading.channels.quantities import BY_STANDARD, words_of
 from rigidimeter.analysis.reading.channels.unit_text import expression, factor
 from rigidimeter.analysis.reading.formats.table import Table
 from rigidimeter.core.records import EMG_CHANNELS
 
 _FIRST = EMG_CHANNELS[0]
 _PROCESSED = {"rms", "envelope", "env", "rectified", "smooth", "smoothed", "integrated", "iemg",
-              "mvc", "normalised", "normalized"}  # fmt: skip
+              "mvc", "normalised", "normalized", "filtered", "filt"}  # fmt: skip
 
 
 def of_every_muscle(said: Mapping[str, str]) -> Mapping[str, str]:
@@ -46,11 +47,13 @@ def emg_columns(
     units : set of str
         Standard names of which the user said a unit or a scale.
     """
-    found = {name: named.get(name, name) for name in EMG_CHANNELS}
+    of_others = table.columns.keys() - {*named.values()}
+    found = {name: named.get(name, name if name in of_others else "") for name in EMG_CHANNELS}
     found = {name: column for name, column in found.items() if column in table.columns}
     if any(name in named for name in EMG_CHANNELS):
         return found, []
     unused: list[str] = []
+    looking: list[str] = []
     slots = [name for name in EMG_CHANNELS if name not in found]
     for column in table.columns:
         header = headers[column]
@@ -65,8 +68,14 @@ def emg_columns(
             why = f"it is in {header.unit}, and EMG is needed in V or mV"
         if why:
             unused.append(f"{table.source}: column {column!r} is not used: {why}")
+        elif units.isdisjoint(EMG_CHANNELS):
+            option = shlex.quote(f"{BY_STANDARD[slots.pop(0)].name}={column}")
+            looking.append(f" --column {option}")
         else:
             found[slots.pop(0)] = column
+    if looking:
+        text = "what looks like EMG is not used; to leave out active stretches, say"
+        unused.append(f"{table.source}: {text}{''.join(looking)}")
     return found, unused
 
 

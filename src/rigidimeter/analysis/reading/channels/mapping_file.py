@@ -10,7 +10,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, create_model
 
 from rigidimeter.analysis.reading.channels.choice import LABELS
 from rigidimeter.analysis.reading.channels.quantities import QUANTITIES
@@ -31,9 +31,7 @@ class ColumnTable(Section):
     offset: str | None = Field(None, min_length=1, max_length=80)
 
 
-class MappingToml(Section):
-    """All of a mapping file but its schema."""
-
+class _Options(Section):
     rate_hz: float | None = Field(None, gt=0.0, json_schema_extra={"unit": "Hz"})
     reaction: bool = False
     epoch_length_s: float | None = Field(None, gt=0.0, json_schema_extra={"unit": "s"})
@@ -42,23 +40,14 @@ class MappingToml(Section):
     names: list[str] = Field(default_factory=list, max_length=2000)
     table: str = Field("", max_length=200)
     missing: str = Field("", max_length=200)
-    time: ColumnTable = ColumnTable()
-    torque: ColumnTable = ColumnTable()
-    angle: ColumnTable = ColumnTable()
-    velocity: ColumnTable = ColumnTable()
-    velocity_command: ColumnTable = ColumnTable()
-    perturbation: ColumnTable = ColumnTable()
-    emg: ColumnTable = ColumnTable()
-    emg_2: ColumnTable = ColumnTable()
-    emg_3: ColumnTable = ColumnTable()
-    emg_4: ColumnTable = ColumnTable()
-    emg_5: ColumnTable = ColumnTable()
-    emg_6: ColumnTable = ColumnTable()
-    emg_7: ColumnTable = ColumnTable()
-    emg_8: ColumnTable = ColumnTable()
     epoch_column: str | None = Field(None, min_length=1, max_length=200)
     condition_column: str | None = Field(None, min_length=1, max_length=200)
     task_column: str | None = Field(None, min_length=1, max_length=200)
+
+
+_TABLES: Mapping[str, Any] = {one.name: (ColumnTable, ColumnTable()) for one in QUANTITIES}
+MappingToml = create_model("MappingToml", __base__=_Options, **_TABLES)
+"""All of a mapping file but its schema."""
 
 
 def read_mapping(path: Path) -> ReadOptions:

@@ -64,6 +64,7 @@ def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], 
     notices += more
     _check_epochs(table.source, len(stretches))
     epochs: list[Epoch] = []
+    spoken = {name: _spoken(name, names[name]) for name in signals}
     losses: dict[str, dict[str, list[Loss]]] = {name: {} for name in signals}
     for stretch in stretches:
         try:
@@ -79,7 +80,7 @@ def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], 
                 signal, clock, stretch.start, stretch.stop
             )
             breaks += found
-        pieces, more = _pieces(table.source, present, clock, stretch, breaks)
+        pieces, more = _pieces(table.source, spoken, present, clock, stretch, breaks)
         notices += more
         _check_epochs(table.source, len(epochs) + len(pieces))
         epochs += [
@@ -89,7 +90,7 @@ def epochs_from_table(table: Table, options: ReadOptions) -> tuple[list[Epoch], 
             for label, channels in pieces
         ]
     for name, by_epoch in losses.items():
-        notices += about_losses(table.source, _spoken(name, names[name]), by_epoch)
+        notices += about_losses(table.source, spoken[name], by_epoch)
     if not epochs:
         reasons = "; ".join(notice.text for notice in notices if notice.level == "error")
         raise UserError(
@@ -248,6 +249,7 @@ def _enough(names: Mapping[str, object]) -> bool:
 
 def _pieces(
     source: str,
+    spoken: Mapping[str, str],
     signals: Mapping[str, Signal],
     clock: Rows,
     stretch: Stretch,
@@ -260,7 +262,7 @@ def _pieces(
     notices: list[Notice] = []
     for start, stop in kept_rows(stretch.start, stretch.stop, breaks):
         channels = {
-            name: Channel(name, signal.time_s[within], signal.values[within])
+            name: Channel(name, signal.time_s[within], signal.values[within], spoken[name])
             for name, signal in signals.items()
             for within in [signal.within(start, stop)]
             if within.stop - within.start >= _FEWEST

@@ -11,13 +11,13 @@ import os
 import tempfile
 import time
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from nicegui import ui
 
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.study_files import SESSIONS
 from rigidimeter.rig.console.page.button_words import in_buttons, unfinished_words
 from rigidimeter.rig.console.page.form_values import parse_line
 from rigidimeter.rig.console.page.jobs import Jobs
@@ -30,7 +30,7 @@ from rigidimeter.rig.console.page.sessions_found import (
     PAGE,
     FoundEpoch,
     FoundSession,
-    continued_words,
+    continued,
     exclude,
     extended,
     found_sessions,
@@ -171,20 +171,18 @@ class AfterView:
 
     def _run(self, session: str, **what: Any) -> None:
         """Continue a session; one of a plan, if it has to wait again, after asking for a reason."""
-        # The name of a planned session ends with its number, that of any other with its time.
-        planned = session.startswith(f"{SESSIONS}/")
-        stem = session if planned else session.rpartition("-")[0] or session
-        folder = f"{stem}-{time.strftime('%H%M%S')}"
+        try:
+            rest = continued(self._root, session)
+        except UserError as error:
+            ui.notify(str(error))
+            return
+        stem = session.rpartition("-")[0] or session  # the name ends with the time
+        folder = rest.due.folder if rest else f"{stem}-{time.strftime('%H%M%S')}"
 
         def run(reason: str = "") -> None:
             self._state.ask(StartRequest(folder, resume=session, begin_anyway=reason, **what))
 
-        try:
-            words = continued_words(self._root, session)
-        except UserError as error:
-            ui.notify(str(error))
-            return
-        if words:
+        if rest and (words := rest.words(datetime.now(UTC))):
             self._ask_anyway(words, run)
         else:
             run()

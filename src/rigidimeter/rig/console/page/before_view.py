@@ -17,7 +17,7 @@ from rigidimeter.core.settings import Settings, load_settings
 from rigidimeter.core.study_files import STUDY_FILE, PrimaryTable
 from rigidimeter.rig.console.page.computed import computed
 from rigidimeter.rig.console.page.jobs import Jobs
-from rigidimeter.rig.console.page.outside_plan import coded_form, read_coded_form
+from rigidimeter.rig.console.page.outside_plan import outside_form, read_coded_form
 from rigidimeter.rig.console.page.prediction import detected, dry_run_lines, prediction_lines
 from rigidimeter.rig.console.page.primary_view import PrimaryView
 from rigidimeter.rig.console.page.rig_steps import start_refusal
@@ -25,6 +25,7 @@ from rigidimeter.rig.console.page.rig_view import RigView
 from rigidimeter.rig.console.page.server_state import ServerState, StartRequest
 from rigidimeter.rig.console.page.session_form import (
     BLINDED,
+    DAY,
     MAX_BLOCKS,
     METADATA,
     NOTE,
@@ -57,10 +58,8 @@ class BeforeView:
     jobs : Jobs
     in_control : callable
         Whether the page may act.
-    codes : mapping of str to str
-        Of a blinded plan, what stands for each condition; empty for none.
-    start : str
-        The words of its button.
+    codes : mapping of str to str, optional
+        Beside a plan: what stands for each condition, empty where nobody is blinded.
     """
 
     def __init__(
@@ -69,13 +68,12 @@ class BeforeView:
         jobs: Jobs,
         in_control: Callable[[], bool],
         codes: Mapping[str, str] | None = None,
-        start: str = "Start session",
     ) -> None:
         self._state, self._jobs, self._in_control = state, jobs, in_control
         self._base, self._codes = state.place.settings, codes or {}
         self._form = restored_form(_stored(state.place.root / DRAFT), self._base)
-        if self._codes:
-            self._form = coded_form(self._form, self._codes)
+        if codes is not None:
+            self._form = outside_form(self._form, codes)
         self._inputs: dict[str, Any] = {}
         self._entered: EnteredSession | None = None
         place = state.place
@@ -92,12 +90,8 @@ class BeforeView:
         self._wrong_file = ui.label("").classes("problem").props('role="alert"')
         self._not_stored = ui.label("").classes("problem").props('role="alert"')
         self._rig = RigView(state, jobs, in_control, self._settings, self._show_steps)
-        with ui.row().classes("w-full"):
-            for one in (*METADATA, NOTE):
-                self._input(one)
-        with ui.row().classes("w-full"):
-            for one in RANGE:
-                self._input(one)
+        self._row(*METADATA, NOTE, *([DAY] if DAY.key in self._form else []))
+        self._row(*RANGE)
         self._blocks()
         with ui.row().classes("w-full items-start"):
             rests = "Rest between epochs (drawn if several: 10; 20)"
@@ -108,18 +102,16 @@ class BeforeView:
             blinded.on_value_change(lambda event: self._change(BLINDED, YES if event.value else ""))
             self._primary = PrimaryView(state.place, self._form[PRIMARY], self._change)
         with ui.expansion("Perturbation, controller and limits").classes("w-full").props("dense"):
-            with ui.row().classes("w-full"):
-                for one in SETTINGS:
-                    self._input(one)
+            self._row(*SETTINGS)
             ui.button("Back to the protocol's values", on_click=self._reset)
         stimulation = ui.expansion("Stimulation (leave empty if there is none)")
         stimulation.set_visibility(not self._codes)
-        with stimulation.classes("w-full").props("dense"), ui.row().classes("w-full"):
-            for one in STIMULATION:
-                self._input(one)
+        with stimulation.classes("w-full").props("dense"):
+            self._row(*STIMULATION)
         self._problem = ui.label("").classes("problem").props('role="alert"')
         self._refused = ui.label("").classes("problem").mark("refused").props('role="alert"')
         with ui.row():
+            start = "Start session" if codes is None else "Start outside the plan"
             self._start = ui.button(start, on_click=self._ask).mark("start")
             self._start.props("size=lg")
             if not self._codes:  # the numbers of a condition would say which one it is
@@ -149,6 +141,11 @@ class BeforeView:
         )
         self._store(restored_form(self._form, settings))
         ui.navigate.reload()
+
+    def _row(self, *fields: Field) -> None:
+        with ui.row().classes("w-full"):
+            for one in fields:
+                self._input(one)
 
     def _input(self, one: Field) -> None:
         label = f"{one.label} [{one.unit}]" if one.unit else one.label
@@ -246,12 +243,9 @@ class BeforeView:
 
     def _ask(self) -> None:
         entered = self._entered
-        if not self._rig.may_act():
+        if not self._rig.may_act() or entered is None or entered.settings is None:
             return
-        if entered is None or entered.settings is None:
-            return
-        now = time.localtime()
-        folder = f"{entered.subject}-{time.strftime('%Y%m%d-%H%M%S', now)}"
+        folder = f"{entered.subject}-{time.strftime('%Y%m%d-%H%M%S')}"
         request = StartRequest(
             self._state.place.one_session or folder, entered.settings, entered.about
         )

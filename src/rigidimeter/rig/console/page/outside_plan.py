@@ -1,7 +1,8 @@
 """A session outside of the plan, on the page of a study that has one.
 
-It is recorded without a place in the plan, so that the deviations list it. Where examiners are
-blinded its form takes the codes of the plan in place of conditions.
+It is recorded without a place in the plan, so that the deviations list it, and with the day of the
+study that it belongs to. Where examiners are blinded its form takes the codes of the plan in place
+of conditions.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from rigidimeter.core.study_files import read_plan
 from rigidimeter.rig.console.page.jobs import Jobs
 from rigidimeter.rig.console.page.server_state import ServerState
 from rigidimeter.rig.console.page.session_form import (
+    DAY,
     STIMULATION,
     EnteredSession,
     blocks_of,
@@ -26,14 +28,14 @@ from rigidimeter.rig.console.page.session_form import (
 )
 
 
-def coded_form(form: Mapping[str, str], codes: Mapping[str, str]) -> dict[str, str]:
-    """Return a form whose conditions are codes; any other is emptied.
+def outside_form(form: Mapping[str, str], codes: Mapping[str, str]) -> dict[str, str]:
+    """Return a form that asks for the day, and whose conditions are codes if there are any.
 
-    A code in place of the protocol's own condition would say what the code stands for.
+    Any other condition is emptied: a code in its place would say what the code stands for.
     """
-    conditions = {f"condition{k}": form[f"condition{k}"] for k in blocks_of(form)}
-    kept = {key: text if text in codes.values() else "" for key, text in conditions.items()}
-    return dict(form) | kept
+    keys = [f"condition{k}" for k in blocks_of(form)] if codes else []
+    kept = {key: form[key] if form[key] in codes.values() else "" for key in keys}
+    return {**form, **kept, DAY.key: ""}
 
 
 def read_coded_form(
@@ -66,7 +68,7 @@ class OutsideView:
     in_control : callable
         Whether the page may act.
     form : callable
-        Builds the form; takes the same, then the codes of the plan and the words of its button.
+        Builds the form; takes the same, then the codes of the plan.
     """
 
     def __init__(
@@ -96,4 +98,4 @@ class OutsideView:
                 "among the sessions not as planned."
             )
             codes = plan.about.codes if plan is not None else {}
-            self._form(codes, "Start outside the plan")
+            self._form(codes)

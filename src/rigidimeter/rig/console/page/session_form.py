@@ -43,6 +43,8 @@ class Field:
 
 METADATA = (Field("subject", "Subject (code)"), Field("operator", "Operator"))
 NOTE = Field("note", "Note on the session")
+DAY = Field("day", "Day of the study")
+"""Asked for beside a plan alone; without it the session would be of a day of its own."""
 RANGE = (
     Field("range_low", "Range of motion: lower end", "deg"),
     Field("range_high", "Range of motion: upper end", "deg"),
@@ -208,6 +210,8 @@ def read_form(form: Mapping[str, str], base: Settings) -> EnteredSession:
         "note": read("note", parse_line, "note"),
         "blinded": form.get(BLINDED) == YES,
     }
+    if DAY.key in form:
+        about["day"] = read(DAY.key, _needed, "day of the study")
     if any(form.get(one.key, "").strip() for one in RANGE):
         about["range"] = read("range_low", read_range, form, about["subject"], errors)
     stimulation: dict[str, Any] = {}
@@ -230,8 +234,7 @@ def read_form(form: Mapping[str, str], base: Settings) -> EnteredSession:
         settings = changed_settings(_with_subjects(base, blocks), changes, "form")
     except UserError as error:
         errors |= _placed(str(error).removeprefix("form: "), SETTINGS)
-    conditions = list(dict.fromkeys(block["condition"] for block in blocks))
-    about["conditions"] = conditions
+    about["conditions"] = list(dict.fromkeys(block["condition"] for block in blocks))
     primary = PRIMARIES.get(form.get(PRIMARY, ""))
     return EnteredSession(None if errors else settings, about, about["subject"], errors, primary)
 

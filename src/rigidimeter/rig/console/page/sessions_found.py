@@ -14,7 +14,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +30,7 @@ from rigidimeter.core.session import (
 from rigidimeter.core.study_files import (
     SESSIONS,
     STUDY_FILE,
+    ContinuedSession,
     ScannedSession,
     continued_session,
     exclude_epoch,
@@ -253,11 +253,9 @@ def _epochs(one: ScannedSession, excluded: dict[tuple[str, str], str]) -> list[F
     ]
 
 
-def continued_words(root: Path, session: str) -> str:
-    """Return why a session of a plan has to wait before it is continued; empty for any other."""
-    about = read_manifest(root / session).get("about", {})
-    found = continued_session(root / session, about)
-    return found.words(datetime.now(UTC)) if found is not None else ""
+def continued(root: Path, session: str) -> ContinuedSession | None:
+    """Return what is left of a session of a plan; None for any other."""
+    return continued_session(root / session, read_manifest(root / session).get("about", {}))
 
 
 def extended(place: Place) -> list[str]:

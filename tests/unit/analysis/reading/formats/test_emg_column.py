@@ -6,6 +6,7 @@ import pytest
 from rigidimeter.analysis.reading.formats.read_options import ReadOptions
 from rigidimeter.analysis.reading.formats.table import Table
 from rigidimeter.analysis.reading.formats.table_epochs import epochs_from_table
+from rigidimeter.core.records import EMG_CHANNELS
 
 N = 400
 
@@ -51,7 +52,8 @@ def test_microvolts_are_told(columns, name):
 )
 def test_each_muscle_is_read_in_volts(columns, names, scales):
     own = {n: k * s * EMG for k, (n, s) in enumerate(zip(names, scales, strict=True), start=1)}
-    channels, told = read({**columns, **own})
+    said = {} if set(names) <= set(EMG_CHANNELS) else dict(zip(EMG_CHANNELS, names, strict=False))
+    channels, told = read({**columns, **own}, columns=said)
     assert told == []
     muscles = {"emg_v": 1, "emg_2_v": 2}
     if names[0] == "emg_2_v":  # names of our own say which
@@ -83,21 +85,31 @@ def test_where_the_user_names_muscles_those_are_all(columns):
 
 
 def test_what_is_no_raw_emg_is_told_and_not_used(columns):
-    own = {"EMG rms [mV]": EMG, "EMG [%]": EMG, "EMG biceps [mV]": 1e3 * EMG}
-    channels, told = read({**columns, **own})
+    own = {"EMG rms [mV]": EMG, "EMG filt [mV]": EMG, "EMG [%]": EMG, "EMG biceps [mV]": EMG}
+    channels, told = read({**columns, **own}, units={"emg_2": "mV"})
     assert told == [
         "t: column 'EMG rms [mV]' is not used: it is not the raw EMG",
+        "t: column 'EMG filt [mV]' is not used: it is not the raw EMG",
         "t: column 'EMG [%]' is not used: it is in %, and EMG is needed in V or mV",
     ]
-    np.testing.assert_allclose(channels["emg_v"].values, EMG)
+    np.testing.assert_allclose(channels["emg_v"].values, 1e-3 * EMG)
     many = {f"EMG {k} [V]": EMG for k in range(9)}
-    channels, told = read({**columns, **many})
+    channels, told = read({**columns, **many}, units={"emg": "V"})
     assert len(channels) == 8
     assert told == ["t: column 'EMG 8 [V]' is not used: 8 muscles are read at most"]
 
 
-def test_emg_without_a_unit_is_told_and_not_used(columns):
-    channels, told = read({**columns, "EMG1": EMG, "EMG2": EMG})
+def test_what_looks_like_emg_is_told_and_not_used(columns):
+    channels, (told,) = read({**columns, "EMG1": EMG, "EMG biceps [mV]": EMG})
     assert not channels
-    assert "column 'EMG1' is not used because its unit is stated nowhere" in told[0]
-    assert "as in --unit emg=mV" in told[0]
+    assert told == (
+        "t: what looks like EMG is not used; to leave out active stretches, say "
+        "--column emg=EMG1 --column 'emg_2=EMG biceps [mV]'"
+    )
+
+
+def test_a_column_is_one_muscle(columns):
+    """`emg_2_v` named as the first muscle is not the second too."""
+    channels, _ = read({**columns, "emg_2_v": EMG}, columns={"emg": "emg_2_v"})
+    assert list(channels) == ["emg_v"]
+    assert channels["emg_v"].spoken == "emg_v (column emg_2_v)"

@@ -205,9 +205,14 @@ def test_a_session_outside_of_the_plan_has_no_place_in_it(client, study):
     shown.field("subject", outside=True).value = "S01"
     shown.field("operator", outside=True).value = "Kim"
     shown.start_outside()
+    assert shown.asked == []  # without its day it would be a day of its own
+    assert shown.field("day").error == "day of the study: must be given"
+    shown.field("day").value = "2"
+    shown.start_outside()
     (request,) = shown.asked
     assert request.folder.startswith("S01-")
     assert "plan" not in request.about
+    assert request.about["day"] == "2"
     assert request.about["subject"] == "S01"
     assert request.settings.protocol.blocks[0].condition == "OFF"
 
@@ -241,6 +246,7 @@ def test_a_session_outside_of_a_blinded_plan_takes_its_codes(client, study):
     shown.field("epochs0", outside=True).value = "many"
     assert not any(name in shown.words() for name in NAMES)
     shown.field("epochs0", outside=True).value = "2"
+    shown.field("day").value = "2"
     shown.start_outside()
     (request,) = shown.asked
     assert request.about["codes"] == codes

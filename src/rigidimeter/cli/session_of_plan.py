@@ -1,4 +1,4 @@
-"""The session of a plan that is due: what to run, after which wait, and what it leaves."""
+"""A session of a plan, or the rest of one: what to run, after which wait, and what it leaves."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from rigidimeter.cli.progress import Meter
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import in_codes
 from rigidimeter.core.study_files import (
+    SESSIONS,
     ContinuedSession,
     DueBlock,
     StudyPlan,
@@ -65,30 +66,30 @@ class SaidOfSession:
 
     def facts(self) -> dict[str, str]:
         """Return what a manifest says of a session of no plan."""
-        said = {
-            "subject": self.subject,
-            "operator": self.operator,
-            "note": self.note,
-            "day": self.day,
-        }
+        said = {key: getattr(self, key) for key in ("subject", "operator", "note", "day")}
         return {key: text for key, text in said.items() if text}
 
 
 @dataclass(frozen=True)
-class NextSession:
-    """A session of a plan, before its wait is over."""
+class SessionOfPlan:
+    """A session of a plan, or what is left of one, before its wait is over.
+
+    Attributes
+    ----------
+    plan : StudyPlan
+    due : DueBlock
+    said : SaidOfSession
+    rest : ContinuedSession or None
+        Where it continues one.
+    """
 
     plan: StudyPlan
     due: DueBlock
     said: SaidOfSession
-
-    @property
-    def folder(self) -> Path:
-        """The new folder of the session; its name does not give the condition away."""
-        return self.plan.folder / self.due.folder
+    rest: ContinuedSession | None = None
 
     def planned(self) -> PlannedSession:
-        """Return the session as it is to be run now, with its place in the plan."""
+        """Return a new session as it is to be run now, with its place in the plan."""
         said = self.said
         begun = begun_session(
             self.plan,
@@ -101,21 +102,49 @@ class NextSession:
         )
         return new_session(begun.settings, begun.about, begun.source)
 
-    def waited(self) -> NextSession:
-        """Count down to the end of the wait; return the session as it is due then.
+    def waited(self) -> Mapping[str, Any]:
+        """Count down to the end of the wait; return what the manifest says of one begun then.
 
         Raises
         ------
         UserError
             If the wait has not begun, or the stimulation was changed meanwhile.
         """
-        said = self.said
-        return replace(self, due=_after_wait(self.plan, self.due, said.begin_anyway, said.speed))
+        said, rest = self.said, self.rest
+        if rest is None:
+            due = _after_wait(self.plan, self.due, said.begin_anyway, said.speed)
+            return replace(self, due=due).planned().about
+        if words := rest.words(datetime.now(UTC)):
+            echo(words)
+            due = _after_wait(self.plan, self.due, said.begin_anyway, rest.speed)
+            rest = replace(rest, due=due)
+        return {"plan": rest.facts(datetime.now(UTC), said.begin_anyway)}
+
+    def folder(self, out: Path | None = None) -> Path:
+        """Return the new folder of the session, whose name does not give the condition away.
+
+        Raises
+        ------
+        UserError
+            If another was named that is not in the study.
+        """
+        study = self.plan.folder
+        if out is not None and out.resolve().parent not in (study, study / SESSIONS):
+            raise UserError(f"--out {out}: is outside the study {study}; leave it out")
+        return study / self.due.folder if out is None else out
+
+    def add(self, folder: Path) -> None:
+        """Add the recorded session to the study, and say what is left of the plan."""
+        for line in extend_study(self.plan.folder, [folder]):
+            echo(in_codes(line, self.plan.about.codes))
+        echo(next_words(self.plan, self.due.block.subject))
 
 
 def _after_wait(plan: StudyPlan, due: DueBlock, begin_anyway: str, speed: float) -> DueBlock:
     """Count down to the end of the wait; return the session as it is due then."""
     left = due.left_min(datetime.now(UTC), speed)
+    if left == 0.0:
+        return due
     if begin_anyway:
         echo(f"Begun without waiting: {begin_anyway}")
         return due
@@ -124,8 +153,6 @@ def _after_wait(plan: StudyPlan, due: DueBlock, begin_anyway: str, speed: float)
             f"{wait_words(due, datetime.now(UTC))}; enter it with --stimulation "
             '"on since 10:42", or begin with --begin-anyway REASON'
         )
-    if left <= 0.0:
-        return due
     echo(wait_words(due, datetime.now(UTC), speed))
     total_s = 60.0 * left / speed
     start_s = time.monotonic()
@@ -142,41 +169,34 @@ def _after_wait(plan: StudyPlan, due: DueBlock, begin_anyway: str, speed: float)
     return found
 
 
-def continued(
+def rest_of_plan(
     resume: Path, about: Mapping[str, Any], said: SaidOfSession
-) -> ContinuedSession | None:
-    """Return the session of a plan that is continued; None where it is of none.
+) -> SessionOfPlan | None:
+    """Return what is left of a session of a plan; None where it is of none.
 
     Raises
     ------
     UserError
-        If something was said that has a meaning with a plan alone, or is wrong.
+        If something was said that has a meaning with a plan alone, is wrong, or contradicts it.
     """
     found = continued_session(resume, about)
     refuse_without_next(said, continued=found is not None)
-    if found is not None and said.stimulation:
-        subject, now = found.due.block.subject, datetime.now(UTC)
-        add_change(found.plan.folder, parse_change(said.stimulation, subject, now, said.operator))
-        return continued_session(resume, about)
-    return found
+    if found is None:
+        return None
+    subject, day, _ = found.due.block.key
+    for option, other, own in (("subject", said.subject, subject), ("day", said.day, day)):
+        if other not in ("", own):
+            raise UserError(
+                f"--{option} {other}: the session that is continued is of {own}; leave it out"
+            )
+    if said.stimulation:
+        change = parse_change(said.stimulation, subject, datetime.now(UTC), said.operator)
+        add_change(found.plan.folder, change)
+        found = continued_session(resume, about) or found
+    return SessionOfPlan(found.plan, found.due, said, found)
 
 
-def continued_place(session: ContinuedSession, begin_anyway: str) -> dict[str, Any]:
-    """Wait where the stimulation was changed; return `about.plan` of the part that begins then.
-
-    Raises
-    ------
-    UserError
-        If the wait has not begun, or the stimulation was changed meanwhile.
-    """
-    if words := session.words(datetime.now(UTC)):
-        echo(words)
-        due = _after_wait(session.plan, session.due, begin_anyway, session.speed)
-        session = replace(session, due=due)
-    return session.facts(datetime.now(UTC), begin_anyway)
-
-
-def next_session(study: Path, said: SaidOfSession, *, virtual: bool) -> NextSession:
+def next_session(study: Path, said: SaidOfSession, *, virtual: bool) -> SessionOfPlan:
     """Return the session of a study that is due, or the one that was named.
 
     Raises
@@ -190,53 +210,24 @@ def next_session(study: Path, said: SaidOfSession, *, virtual: bool) -> NextSess
     subject = subject_of(plan, said.subject)
     if said.stimulation:
         add_change(study, parse_change(said.stimulation, subject, datetime.now(UTC), said.operator))
-    if said.block:
-        found = _named(plan, subject, said.block)
-    else:
-        due = next_block(plan, subject)
-        if due is None:
-            raise UserError(
-                f"{study}: all sessions of {subject} are recorded; name one with --block DAY/ORDER "
-                "to run it again"
-            )
-        found = due
+    found = _named(plan, subject, said.block) if said.block else next_block(plan, subject)
+    if found is None:
+        raise UserError(
+            f"{study}: all sessions of {subject} are recorded; name one with --block DAY/ORDER "
+            "to run it again"
+        )
     echo(due_words(plan, found))
-    return NextSession(plan, found, said)
+    return SessionOfPlan(plan, found, said)
 
 
-def added(session: NextSession) -> None:
-    """Add the recorded session to the study, and say what is left of the plan."""
-    for line in extend_study(session.plan.folder, [session.folder]):
-        echo(in_codes(line, session.plan.about.codes))
-    echo(next_words(session.plan, session.due.block.subject))
-
-
-def refuse_with_next(
-    out: Path | None,
-    protocol: Path | None,
-    resume: Path | None,
-    seed: int | None,
-    day: str,
-    *,
-    page: bool,
-    blinded: bool,
-) -> None:
-    """Refuse what the plan of a study says.
+def refuse_with_next(given: Mapping[str, bool]) -> None:
+    """Refuse options of what the plan of a study says, where one is given.
 
     Raises
     ------
     UserError
         Naming the option.
     """
-    given = {
-        "--out": out is not None,
-        "PROTOCOL.toml": protocol is not None,
-        "--resume": resume is not None,
-        "--seed": seed is not None,
-        "--day": bool(day),
-        "--blinded": blinded,
-        "--console": page,
-    }
     for option, there in given.items():
         if there:
             raise UserError(f"{option} does not go with --next: the plan of the study says it")
