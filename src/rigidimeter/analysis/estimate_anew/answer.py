@@ -1,43 +1,41 @@
 """Which terms the torque holds beside J, B and K, and J, B and K beside them.
 
 1. Every term is tested beside what is fitted (`score`), with Holm's adjustment over all.
-2. Of those that are sure the first by χ² and its rivals are settled: J, B, K, coefficients, inner
+2. Of those that are sure, the first by χ² and its rivals are settled: J, B, K, coefficients, inner
    parameters, instruments and the power S of the noise are iterated together (Gauss and Newton).
-3. Rivals are compared by what remains, the χ² that the instruments of all terms together still
-   explain of the residual (Hansen's J), all with the S of the best.
-4. The one that leaves least is accepted if it is large enough to matter; then from 1 beside it.
+3. They are compared by what remains: the χ² that the instruments of all terms together explain of
+   the residual, with the S of the best (Hansen's J).
+4. The one that leaves least is accepted if it is large enough to matter. Then from 1 beside it.
 
-Slopes by the inner parameters stay among the columns at the end, so intervals hold that the form
-of a term is not known: how late a reflex is, how slow the muscle, how sharp the friction.
+Slopes by the inner parameters stay among the columns, so intervals hold that the form of a term is
+not known: how late a reflex is, how slow the muscle, how sharp the friction.
 
 J, B and K beside the terms are an answer where nothing that is linear remains in the torque's
-response to the perturbation, or where it could change none of them by 1 %. Otherwise no number is
-one, and they are withheld.
+response to the perturbation, or where it could change none of them by 1 %; else no number is one.
 
-Where no perturbation was recorded the motion is its own instrument. Terms that are not linear are
-then tested on what no free linear filter of the motion explains, since whatever the subject does by
-the loop is linear; linear ones must be larger.
+Where no perturbation was recorded the motion is its own instrument, and whatever the subject does
+by the loop is linear. Terms that are not linear are then tested in what no free linear filter of
+the motion explains; linear ones must be larger; rivals are compared by the power of the residual.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimate_anew.grid import Array, Complex
+from rigidimeter.analysis.estimate_anew.grid import SAME_TIME, Array, Complex
 from rigidimeter.analysis.estimate_anew.observation import Observation, torque_filter_of
 from rigidimeter.analysis.estimate_anew.score import (
     EVERY,
-    Fitted,
     Part,
     Place,
     Score,
     Sums,
     blocks,
+    explained,
     fitted,
     free_filter,
     holm,
@@ -47,19 +45,18 @@ from rigidimeter.analysis.estimate_anew.score import (
     solved,
     sums_of,
 )
-from rigidimeter.analysis.estimate_anew.signals import values_at
+from rigidimeter.analysis.estimate_anew.signals import values_at, velocity_at
 from rigidimeter.analysis.estimate_anew.solve import Problem, Solution, noise_powers
 from rigidimeter.analysis.estimate_anew.terms import (
     ANY_LINEAR,
-    CUFF,
     FILTER,
+    FINER,
     TERMS,
     Motion,
     Term,
     over_phase,
     over_time,
 )
-from rigidimeter.core.records import PARAMETERS
 from rigidimeter.model import lowpass
 
 CHANCE, MOST_TERMS = 1e-3, 3
@@ -67,34 +64,35 @@ REMAINS, LITTLE = 1e-3, 0.01
 """J, B and K are withheld where p of what remains is below the first, unless it could change them
 by less than the second."""
 
-LEAST_SHARE, LEAST_RANGE, LEAST_DELAY_S, LEAST_FURTHER = 0.02, 0.10, 2e-4, 0.03
-LEAST_CUFF, MOST_CUFF = 0.002, 0.3
+LEAST_SHARE, LEAST_RANGE, LEAST_DELAY_S = 0.02, 0.10, 2e-4
+LEAST_CUFF, MOST_CUFF, FURTHER, ALONE = 0.002, 0.3, 0.03, 3.0
 """How large a term must be: of the torque that the perturbation causes; of J, B or K where one
-changes; a delay; χ² of a further one, of the first's; K of the joint over that of a cuff."""
+changes; a delay; K of the joint over that of a coupling. χ² of a further term, of the first's.
+Without a perturbation linear terms must be so many times as large."""
 
-UNKNOWN = 3.0
-"""Without a perturbation linear terms must be so many times as large."""
+RIVAL, RIVALS, CLEAR = 0.5, 4, 200.0
+"""Rivals have so much of the χ² of the first, and are that many. One that is clearer than the last
+and leaves nothing has none."""
 
-RIVAL, RIVALS = 0.5, 4
-ROUNDS, SETTLED = 8, 0.02
-MOST_STEPS = 10
-ACTIVE = 4
-"""An inner parameter moves by so many of its steps at most, and if it is so many above its end."""
+ROUNDS, SETTLED, MOST_STEPS, ACTIVE = 8, 0.02, 10, 4
+"""An inner parameter moves by so many of its steps at once, and is fitted if so many above its
+lower bound."""
+
+FAINT = 0.01
+"""Of the window: what was simulated rings at its end."""
 
 JOINT: tuple[Place, ...] = ((0, EVERY), (1, EVERY), (2, EVERY))
-PLACES = 61
+_LATE = ("delay", "cuff", "filter")
+_ELASTIC = ("stiffness by side", "stiffness by angle")
+NOT_BESIDE = {name: _LATE for name in _LATE} | {name: _ELASTIC for name in _ELASTIC}
+"""What is no longer looked for beside a term that was found."""
+
+PLACES, INNER_TIME, INNER_ANGLE = 61, 0.8, (0.05, 0.95)
+"""Where a parameter that changes is looked at: at the ends polynomials follow the noise."""
 
 
 class Taken(NamedTuple):
-    """A term in the model.
-
-    Attributes
-    ----------
-    term : Term
-    inner : array, shape (d,)
-    values : array, shape (q,)
-        Coefficients of its places, empty before they are known.
-    """
+    """A term in the model, its inner parameters and coefficients (none before they are known)."""
 
     term: Term
     inner: Array
@@ -105,37 +103,32 @@ class Taken(NamedTuple):
         """Which inner parameters are fitted beside the coefficients."""
         if self.term.bent is not None or not self.values.size or not self.inner.size:
             return np.zeros(self.inner.size, dtype=bool)
-        return self.inner > self.term.low + ACTIVE * self.term.steps
+        return np.asarray(self.inner > self.term.low + ACTIVE * self.term.steps)
 
     def columns(self, motion: Motion) -> Complex:
         """Return its columns, then its slopes."""
-        if self.term.parameter is not None:
-            return np.empty((0, motion.grid.line.size), dtype=np.complex128)
-        own = self.term.columns(motion, self.inner)
-        if not np.any(self.moving):
-            return own
-        slopes = self.term.slopes(motion, self.inner, self.moving)
-        return np.concatenate([own, self.values[0] * slopes])
+        found = self.term.with_slopes(motion, self.inner, self.moving)
+        if np.any(self.moving):
+            found[1:] *= self.values[0]
+        return found
 
 
 class State(NamedTuple):
-    """Where the model is linearised: J, B, K, the noise of every epoch, terms."""
+    """Where the model is linearised: J, B, K, the power of the noise of every epoch, terms."""
 
     joint: Array
     powers: Sequence[Array]
     taken: tuple[Taken, ...] = ()
 
+    def beside(self, *more: Taken) -> State:
+        """Return it with more terms."""
+        return self._replace(taken=(*self.taken, *more))
+
 
 class Case(NamedTuple):
-    """The epochs of a condition.
+    """The epochs of a condition: what was measured, and whether perturbations are instruments.
 
-    Attributes
-    ----------
-    observations : sequence of Observation
-    measured : list of Motion
-    instruments : list of complex array, shape (m, 3)
-        Where no perturbation is the instrument.
-    caused : bool
+    Where they are not, `instruments` are those of J, B and K, shape (m, 3) each.
     """
 
     observations: Sequence[Observation]
@@ -154,6 +147,8 @@ class Found(NamedTuple):
         By Holm's method.
     values, half : array
         Coefficients, or the parameters of a term that bends the model; half their 95 % intervals.
+    covariance : array
+        Of the values.
     inner, inner_half : array, shape (d,)
         NaN where it was not fitted.
     size : float
@@ -166,6 +161,7 @@ class Found(NamedTuple):
     p: float
     values: Array
     half: Array
+    covariance: Array
     inner: Array
     inner_half: Array
     size: float
@@ -177,43 +173,34 @@ class Answer(NamedTuple):
 
     Attributes
     ----------
-    joint, half : array, shape (3,)
-        J, B, K and half their 95 % intervals.
+    joint, half, degrees : array, shape (3,)
+        J, B, K, half their 95 % intervals, and degrees of freedom.
     covariance : array, shape (3, 3)
-    degrees : array, shape (3,)
     found : tuple of Found
     p : dict
         Of every term beside J, B and K alone, by Holm's method.
     remains : float
         p of what is linear and remains; NaN without a perturbation.
-    change : float
-        By what share of J, B or K it could change them.
+    left : float
+        Its share of the torque that the perturbation causes.
+    change : array, shape (3,)
+        How J, B and K change where low lines count more.
     answered : bool
-    state : State
+    case, state : Case, State
     """
 
     joint: Array
     half: Array
-    covariance: Array
     degrees: Array
+    covariance: Array
     found: tuple[Found, ...]
     p: dict[str, float]
     remains: float
-    change: float
+    left: float
+    change: Array
     answered: bool
+    case: Case
     state: State
-
-
-def between(symbol: str, unit: str) -> Term:
-    """Return the term of a J, B or K that differs between epochs: no column, places alone."""
-    none: Callable[[Motion, Array], Complex] = lambda m, inner: np.empty((0, m.grid.line.size))  # noqa: E731
-    return Term(
-        f"{symbol} between epochs", unit, f"{symbol} that differs between epochs", none,
-        parameter="JBK".index(symbol), linear=True, finding="varying_between_epochs",
-    )  # fmt: skip
-
-
-BETWEEN = tuple(between(one.symbol, one.unit) for one in PARAMETERS)
 
 
 def answer(
@@ -241,30 +228,34 @@ def answer(
     """
     case = case_of(solution.problems, phases)
     state = State(solution.values, list(solution.powers))
-    left = _offered(case, person, more)
+    offered = [one for one in (*TERMS, *more) if _offered(case, one, person)]
     first: dict[str, float] = {}
     found: list[tuple[Taken, float, float]] = []
     strongest = 0.0
-    while left and len(found) < MOST_TERMS:
-        round_ = _Round.of(case, state, left)
-        adjusted = dict(zip(left, holm([round_.scores[one].p for one in left]), strict=True))
-        first = first or {one.name: p for one, p in adjusted.items()}
-        sure = [one for one in left if adjusted[one] < chance and round_.possible(one)]
-        best = round_.best(sure, strongest)
-        strongest = strongest or max((one[1] for one in best.values()), default=0.0)
-        chosen = round_.chosen(best)
+    while True:
+        tested = _tested(case, state, offered)
+        names = [one.name for one in offered]
+        p = dict(zip(names, holm([tested.scores[name].p for name in names]), strict=True))
+        first = first or p
+        if len(found) == MOST_TERMS:
+            break
+        sure = [one for one in offered if p[one.name] < chance]
+        gains = _gains(case, state, tested, sure)
+        strongest = strongest or max((gain for gain, _ in gains.values()), default=0.0)
+        gains = {name: one for name, one in gains.items() if one[0] > FURTHER * strongest}
+        chosen = _chosen(case, state, tested, [one for one in sure if one.name in gains], gains)
         if chosen is None:
             break
-        state, taken, size = chosen
-        found.append((taken, adjusted[taken.term], size))
-        gone = {taken.term.name, *_SAME.get(taken.term.name, ())}
-        left = [one for one in left if one.name not in gone]
-    return _answered(case, state, solution, found, first)
-
-
-_LATE = ("delay", "cuff", "filter")
-_SAME = {name: _LATE for name in _LATE} | {"cuff": (*_LATE, "reflex")}
-"""Terms that are no longer looked for beside one that was found."""
+        state, size = chosen
+        taken = state.taken[-1]
+        found.append((taken, p.get(taken.term.name, min(p.values())), size))
+        if taken.term.name in FINER:
+            state = settled(case, state.beside(Taken(FINER[taken.term.name], np.zeros(0))))
+        gone = {taken.term.name, *NOT_BESIDE.get(taken.term.name, ())}
+        offered = [one for one in offered if one.name not in gone]
+    return _answered(
+        case, state, tested.model, tested.scores[ANY_LINEAR.name], solution, found, first
+    )
 
 
 def case_of(problems: Sequence[Problem], phases: Sequence[Array] | None = None) -> Case:
@@ -272,17 +263,19 @@ def case_of(problems: Sequence[Problem], phases: Sequence[Array] | None = None) 
     measured = []
     for e, one in enumerate(problems):
         observation, grid = one.observation, one.observation.grid
-        own = observation.epoch.channels["torque_nm"]
-        torque = grid.lines(values_at(own, grid.time_s, 0.01), 2).T
-        # An observation whose torque was made earlier has only its lines turned.
+        channel = observation.epoch.channels["torque_nm"]
+        torque = grid.lines(values_at(channel, grid.time_s, SAME_TIME), 2).T
+        # Where the torque of an observation was made earlier, its lines alone were turned.
         torque = torque * (one.target / torque[:, 0])[:, None]
-        through = 1.0
+        through: Complex | float = 1.0
         if (through_filter := torque_filter_of(observation.settings)) is not None:
             through = lowpass(np.asarray(1j * grid.omega_rad_s), *through_filter)
+        phase = None if phases is None else phases[e]
+        unseen = -observation.changes[0] if len(observation.changes) else 0.0
         measured.append(
             Motion(
-                grid, *observation.coarse, one.regressors, torque, np.zeros(3), through,
-                phase=None if phases is None else phases[e],
+                grid, *observation.coarse, one.regressors, torque, np.zeros(3), through, True,
+                phase, unseen, velocity_at(observation.epoch, grid.time_s),
             )
         )  # fmt: skip
     observations = [one.observation for one in problems]
@@ -290,143 +283,144 @@ def case_of(problems: Sequence[Problem], phases: Sequence[Array] | None = None) 
     return Case(observations, measured, [one.instruments for one in problems], caused)
 
 
-def _offered(case: Case, person: bool, more: Sequence[Term]) -> list[Term]:
-    phase = case.measured[0].phase is not None
-    several = len(case.observations) > 1
-    return [
-        one
-        for one in (*TERMS, *(BETWEEN if several else ()), *more)
-        if one.tested
-        and (person or not one.muscle)
-        and (phase or one.finding != "varying_with_phase")
-        and (case.caused or one.name[0] not in "JB" or " " not in one.name)
+def _offered(case: Case, term: Term, person: bool) -> bool:
+    several, phase = len(case.observations) > 1, case.measured[0].phase is not None
+    return (
+        term.tested
+        and (person or not term.muscle)
+        and (phase or term.finding != "varying_with_phase")
+        and (several or term.parameter is None)
+        and (case.caused or term.name[:2] not in ("J ", "B "))
+    )
+
+
+# --- The lines of a state
+
+
+class Model(NamedTuple):
+    """Whitened columns of a state, the places of what is fitted, and which are whose.
+
+    `of_terms` and `of_slopes` are where those of each term are among the places; `tested` are the
+    places of each further term.
+    """
+
+    parts: list[Part]
+    base: list[Place]
+    of_terms: list[slice]
+    of_slopes: list[slice]
+    tested: dict[str, list[Place]]
+
+
+def _rows(
+    motion: Motion, state: State, tested: Sequence[tuple[Term, Array]]
+) -> tuple[Complex, list[int]]:
+    """Return the lines of J, B, K and all columns at a state, and how many each term has."""
+    motion = motion._replace(joint=state.joint)
+    for one in state.taken:
+        if one.term.bent is not None:
+            motion = one.term.bent(motion, one.inner)
+    own = [one.columns(motion) for one in state.taken]
+    own += [term.columns(motion, inner) for term, inner in tested]
+    return np.concatenate([motion.torque[None, :, 0], motion.lines.T, *own]), [
+        len(one) for one in own
     ]
 
 
-# --- Lines of a state
-
-
-def _instruments(case: Case, state: State) -> list[Motion]:
-    """Return the motions whose columns are instruments; epochs that share one share the object."""
-    if not case.caused:
-        return [
-            m._replace(lines=z, joint=state.joint)
-            for m, z in zip(case.measured, case.instruments, strict=True)
-        ]
+def _caused(case: Case, state: State) -> list[Motion]:
+    """Return what the perturbations cause; epochs that share one share the object."""
+    causes = {id(one.cause): one.cause for one in case.observations}
+    by_cause = {key: one.at(state.joint) for key, one in causes.items() if one is not None}
     made: dict[tuple[int, int], Motion] = {}
-    by_cause = {
-        id(one.cause): one.cause.at(state.joint)
-        for one in {id(o.cause): o for o in case.observations}.values()
-    }
     found = []
     for one, own in zip(case.observations, case.measured, strict=True):
         key = id(one.cause), id(own.phase)
         if key not in made:
-            caused = by_cause[id(one.cause)]
-            lines = one.of_lines(caused.lines)
-            if one.periods > 1:
-                lines = lines * one.excited[:, None]
-            s = 1j * one.grid.omega_rad_s
+            caused, grid = by_cause[id(one.cause)], one.grid
+            lines, s = one.of_lines(caused.lines), 1j * grid.omega_rad_s
             torque = (lines @ state.joint)[:, None] * np.stack([np.ones_like(s), s, s * s], axis=1)
+            velocity, angle = caused.coarse * (grid.coarse_window[0] > FAINT)
             made[key] = Motion(
-                one.grid, *caused.coarse, lines, torque, state.joint, own.through, False, own.phase
+                grid, velocity, angle, lines, torque, state.joint, own.through, False, own.phase
             )
         found.append(made[key])
     return found
 
 
-def _bent(motion: Motion, state: State) -> Motion:
-    for one in state.taken:
-        if one.term.bent is not None:
-            motion = one.term.bent(motion, one.inner)
-    return motion
-
-
-def _parts(case: Case, state: State, columns: Callable[[Motion], Complex]) -> list[Part]:
-    """Return the whitened lines of J, B, K and further columns."""
+def _instruments(case: Case, state: State, tested: Sequence[tuple[Term, Array]]) -> list[Complex]:
+    """Return the whitened instruments of each epoch; epochs that share them share the object."""
+    made: dict[int, Complex] = {}
     found = []
-    made: dict[int, tuple[Complex, Array]] = {}
-    for own, cause, one, power in zip(
-        case.measured, _instruments(case, state), case.observations, state.powers, strict=True
+    for one, motion, power in zip(
+        case.observations, _caused(case, state), state.powers, strict=True
     ):
-        own, weight = _bent(own._replace(joint=state.joint), state), 1 / np.sqrt(power)
-        C = np.concatenate([own.lines.T, columns(own)]) * weight
-        if not case.caused:
-            D = np.concatenate([cause.lines.T * weight, C[3:]])
-            courses = own.grid.in_time(D)
-        elif id(cause) in made:
-            D, courses = made[id(cause)]
-        else:
-            bent = _bent(cause, state)
-            D = np.concatenate([bent.lines.T, columns(bent)]) * weight
-            if one.periods > 1:
-                D = D * one.excited
-            courses = own.grid.in_time(D)
-            made[id(cause)] = D, courses
-        found.append(Part(own.grid, D, C, own.torque[:, 0] * weight, courses))
+        if id(motion) not in made:
+            weight = one.excited / np.sqrt(power) if one.periods > 1 else 1 / np.sqrt(power)
+            made[id(motion)] = _rows(motion, state, tested)[0][1:] * weight
+        found.append(made[id(motion)])
     return found
 
 
-def _freed(case: Case, state: State, columns: Callable[[Motion], Complex]) -> list[Part]:
-    """Return what a free linear filter of the motion leaves of torque and columns, whitened."""
-    filters = [free_filter(m.grid, m.lines) for m in case.measured]
-    targets = [f.without(m.torque[:, 0]) for f, m in zip(filters, case.measured, strict=True)]
-    found = []
-    for f, m, target in zip(filters, case.measured, targets, strict=True):
-        power = f.power(target)
-        own = np.concatenate([m.lines.T, columns(m._replace(joint=state.joint))])
-        C = f.without(own) / np.sqrt(power)
-        found.append(Part(m.grid, C, C, target / np.sqrt(power), m.grid.in_time(C)))
-    return found
-
-
-def _own_places(case: Case, term: Term, columns: Sequence[int]) -> list[Place]:
+def model_of(
+    case: Case, state: State, tested: Sequence[tuple[Term, Array]] = (), free: bool = False
+) -> Model:
+    """Return the model of a state; `free`: beside a free linear filter in place of J, B and K."""
+    every = [_rows(one, state, tested) for one in case.measured]
+    sizes = every[0][1]
+    base, of_terms, of_slopes, by_itself, column = [*JOINT][3 * free :], [], [], [], 3
+    places: list[list[Place]] = []
     epochs = range(len(case.observations))
-    if term.parameter is not None:
-        return [(term.parameter, e) for e in epochs[:-1]]
-    return [(c, e) for e in (epochs if term.own else (EVERY,)) for c in columns]
+    for i, size in enumerate(sizes):
+        if i < len(state.taken):
+            term, slopes = state.taken[i].term, int(np.sum(state.taken[i].moving))
+        else:
+            term, slopes = tested[i - len(state.taken)][0], 0
+        own = [
+            (c, e)
+            for e in (epochs if term.own else (EVERY,))
+            for c in range(column, column + size - slopes)
+        ]
+        if term.parameter is not None:
+            own = [(term.parameter, e) for e in epochs[:-1]]
+        moved = [(c, EVERY) for c in range(column + size - slopes, column + size)]
+        if i < len(state.taken):
+            of_terms.append(slice(len(base), len(base) + len(own)))
+            of_slopes.append(slice(len(base) + len(own), len(base) + len(own) + slopes))
+            base += [*own, *moved]
+            by_itself += [c for c, _ in moved] if term.itself else []
+        else:
+            places.append(own)
+        column += size
+    parts = []
+    instruments = _instruments(case, state, tested) if case.caused else None
+    courses: dict[int, Array] = {}
+    for e, (rows, _) in enumerate(every):
+        grid = case.measured[e].grid
+        if free:
+            filter_ = free_filter(grid, rows[1:4].T)
+            left = filter_.without(rows)
+            left = left / np.sqrt(filter_.power(left[0]))
+            target, C = left[0], left[1:]
+        else:
+            weighted = rows / np.sqrt(state.powers[e])
+            target, C = weighted[0], weighted[1:]
+        D = C
+        if instruments is not None:
+            D = instruments[e]
+            if by_itself:
+                D = D.copy()
+                D[by_itself] = C[by_itself]
+        elif not free:
+            D = C.copy()
+            D[:3] = case.instruments[e].T / np.sqrt(state.powers[e])
+        if id(D) not in courses:
+            courses[id(D)] = grid.in_time(D)
+        parts.append(Part(grid, D, C, target, courses[id(D)]))
+    names = [term.name for term, _ in tested]
+    return Model(parts, base, of_terms, of_slopes, dict(zip(names, places, strict=True)))
 
 
-class _Model(NamedTuple):
-    """The columns of a state: their places, and those of each term and of its slopes."""
-
-    parts: list[Part]
-    places: list[Place]
-    of_terms: list[slice]
-    of_slopes: list[slice]
-
-    @classmethod
-    def of(
-        cls,
-        case: Case,
-        state: State,
-        extra: Callable[[Motion], Complex] | None = None,
-        free: bool = False,
-    ) -> _Model:
-        def columns(motion: Motion) -> Complex:
-            own = [one.columns(motion) for one in state.taken]
-            own += [] if extra is None else [extra(motion)]
-            return np.concatenate([np.empty((0, motion.grid.line.size)), *own])
-
-        parts = (_freed if free else _parts)(case, state, columns)
-        places, of_terms, of_slopes = list(JOINT), [], []
-        column = 3
-        probe = case.measured[0]._replace(joint=state.joint)
-        for one in state.taken:
-            moving = int(np.sum(one.moving))
-            count = one.columns(_bent(probe, state)).shape[0] - moving
-            own = _own_places(case, one.term, range(column, column + count))
-            of_terms.append(slice(len(places), len(places) + len(own)))
-            places += own
-            column += count
-            of_slopes.append(slice(len(places), len(places) + moving))
-            places += [(c, EVERY) for c in range(column, column + moving)]
-            column += moving
-        return cls(parts, places, of_terms, of_slopes)
-
-
-def _settled(case: Case, state: State, rounds: int = ROUNDS) -> State:
-    """Iterate J, B, K, coefficients, inner parameters, instruments and noise.
+def settled(case: Case, state: State, rounds: int = ROUNDS) -> State:
+    """Iterate J, B, K, coefficients, inner parameters, instruments and the power of the noise.
 
     Raises
     ------
@@ -434,276 +428,232 @@ def _settled(case: Case, state: State, rounds: int = ROUNDS) -> State:
         If the columns cannot be told apart.
     """
     for _ in range(rounds):
-        model = _Model.of(case, state)
-        values, inverse = solved(sums_of(model.parts, model.places), model.places)
-        left = residuals(model.parts, model.places, values)
-        problems = []
-        for one, part, power, e in zip(
-            case.observations, model.parts, state.powers, left, strict=True
-        ):
-            x = (part.columns[:3] * np.sqrt(power)).T
-            problems.append(Problem(x, x, e * np.sqrt(power), one))
-        powers = noise_powers(problems, np.zeros(3))
-        taken = []
-        moved = 0.0
+        model = model_of(case, state)
+        values, inverse = solved(sums_of(model.parts, model.base), model.base)
+        left = residuals(model.parts, model.base, values)
+        problems = [
+            Problem(m.lines[:, :0], m.lines[:, :0], e * np.sqrt(power), one)
+            for m, e, power, one in zip(
+                case.measured, left, state.powers, case.observations, strict=True
+            )
+        ]
+        taken, moved = [], 0.0
         for one, own, slopes in zip(state.taken, model.of_terms, model.of_slopes, strict=True):
             new, change = _moved(one, values[own], values[slopes])
             taken.append(new)
             moved = max(moved, change)
-        se = np.sqrt(np.abs(np.diag(inverse)[:3]) / 2)
-        step = float(np.max(np.abs(values[:3] - state.joint) / se))
+        step = np.abs(values[:3] - state.joint) / np.sqrt(np.abs(np.diag(inverse)[:3]) / 2)
+        powers = noise_powers(problems, np.zeros(0))
         state = State(values[:3], powers, tuple(taken))
-        if step < SETTLED and moved < SETTLED:
+        if float(np.max(step)) < SETTLED and moved < SETTLED:
             break
     return state
 
 
 def _moved(one: Taken, values: Array, by: Array) -> tuple[Taken, float]:
-    """Return a term at new values, and how far they moved of themselves."""
-    inner = one.inner.copy()
-    if one.term.bent is not None:
+    """Return a term at new values, and by what share they moved."""
+    inner, term = one.inner.copy(), one.term
+    if term.bent is not None:
         inner[: values.size] += values
-        inner = np.clip(inner, one.term.low, one.term.high)
-        moved = float(np.max(np.abs(inner - one.inner) / (np.abs(inner) + 1e-12)))
-        return Taken(one.term, inner, values), moved
-    moved = 1.0
+        inner = np.clip(inner, term.low, term.high)
+        return Taken(term, inner, values), float(
+            np.max(np.abs(inner - one.inner) / (np.abs(inner) + 1e-12))
+        )
     if one.values.size:
-        moved = float(np.max(np.abs(values - one.values)) / (np.max(np.abs(values)) + 1e-300))
-        most = MOST_STEPS * one.term.steps[one.moving]
+        most = MOST_STEPS * term.steps[one.moving]
         inner[one.moving] += np.clip(by, -most, most)
-        inner = np.clip(inner, one.term.low, one.term.high) if inner.size else inner
-    return Taken(one.term, inner, values), moved
+        inner = np.clip(inner, term.low, term.high) if inner.size else inner
+        apart = np.max(np.abs(values - one.values), initial=0.0)
+        share = float(apart / np.max(np.abs(values), initial=1e-300))
+        return Taken(term, inner, values), share
+    return Taken(term, inner, values), 1.0
 
 
 # --- Which term
 
 
-class _Round(NamedTuple):
-    """One round of tests beside a state."""
+class _Tested(NamedTuple):
+    """The scores of terms beside a state; a model in which a free filter takes the place of J, B, K
+    where no perturbation is the instrument."""
 
-    case: Case
-    state: State
-    model: _Model
-    free: _Model | None
-    at: dict[Term, list[int]]
-    sums: Sums
-    scores: dict[Term, Score]
+    model: Model
+    free: Model | None
+    scores: dict[str, Score]
     left: list[Complex]
 
-    @classmethod
-    def of(cls, case: Case, state: State, terms: Sequence[Term]) -> _Round:
-        def columns(motion: Motion) -> Complex:
-            return np.concatenate(
-                [
-                    t.columns(motion, inner)
-                    for t in terms
-                    if t.parameter is None
-                    for inner in t.first
-                ]
-            )
 
-        model = _Model.of(case, state, columns)
-        at, column = {}, model.parts[0].columns.shape[0]
-        probe = case.measured[0]._replace(joint=state.joint)
-        counts = [
-            0 if t.parameter is not None else len(t.first) * len(t.columns(probe, t.first[0]))
-            for t in terms
-        ]
-        column -= sum(counts)
-        for term, count in zip(terms, counts, strict=True):
-            at[term] = list(range(column, column + count))
-            column += count
-        places = {t: _own_places(case, t, at[t]) for t in terms}
-        sums, local, left = cls._solved(model, [p for own in places.values() for p in own])
-        scores = {t: score(sums, local, model.places, places[t]) for t in terms}
-        free = None
-        if not case.caused:
-            free = _Model.of(case, state, columns, free=True)
-            base = [p for p in free.places[3:]]
-            free = free._replace(places=base)
-            bent = [t for t in terms if not t.linear]
-            sums_f, local_f, _ = cls._solved(free, [p for t in bent for p in places[t]])
-            scores |= {t: score(sums_f, local_f, base, places[t]) for t in bent}
-        return cls(case, state, model, free, at, sums, scores, left)
+def _tested(case: Case, state: State, terms: Sequence[Term]) -> _Tested:
+    tested = [*((one, one.first) for one in terms), (ANY_LINEAR, ANY_LINEAR.first)]
+    model = model_of(case, state, tested)
+    sums, local, left = _solved(model, model.tested)
+    scores = {name: score(sums, local, model.base, own) for name, own in model.tested.items()}
+    free = None
+    if not case.caused:
+        free = model_of(case, state, tested, free=True)
+        bent = {one.name: free.tested[one.name] for one in terms if not one.linear}
+        sums, local, left_free = _solved(free, bent)
+        scores |= {name: score(sums, local, free.base, own) for name, own in bent.items()}
+        del left_free
+    return _Tested(model, free, scores, left)
 
-    @staticmethod
-    def _solved(model: _Model, more: Sequence[Place]) -> tuple[Sums, list[Array], list[Complex]]:
-        sums = sums_of(model.parts, [*model.places, *more])
-        values, _ = solved(sums, model.places)
-        left = residuals(model.parts, model.places, values)
-        return sums, blocks(model.parts, left), left
 
-    def possible(self, term: Term) -> bool:
-        """Return whether a term that resists does so."""
-        return not term.resists or bool(self.scores[term].values[0] > 0)
+def _solved(
+    model: Model, tested: dict[str, list[Place]]
+) -> tuple[Sums, list[Array], list[Complex]]:
+    sums = sums_of(model.parts, [*model.base, *(p for own in tested.values() for p in own)])
+    left = residuals(model.parts, model.base, solved(sums, model.base)[0])
+    return sums, blocks(model.parts, left), left
 
-    def best(self, sure: Sequence[Term], strongest: float) -> dict[Term, tuple[Array, float]]:
-        """Return the best inner parameter of each, and what it explains less twice its columns."""
-        found = {}
-        for term in sure:
-            inner, gain = term.inner[0], self.scores[term].explained - 2 * len(self.at[term] or [0])
-            if len(term.inner) > 1 and term.bent is None and term.name != "friction":
-                inner, explained = self._scanned(term)
-                gain = explained - 4
-            if gain >= LEAST_FURTHER * strongest:
-                found[term] = inner, gain
-        return found
 
-    def _scanned(self, term: Term) -> tuple[Array, float]:
-        """Return the inner parameter whose instrument explains most, and how much."""
-        model = self.model
-        joint = self.state.joint
-        if self.free is not None and not term.linear:
-            model = self.free
-        b = [c for c, e in model.places if e == EVERY]
-        g = size = cross = own = gram = within = 0.0
-        for part, cause, power, left in zip(
-            model.parts,
-            _instruments(self.case, self.state),
-            self.state.powers,
-            self.left,
-            strict=True,
-        ):
-            D = np.concatenate([term.columns(cause, one) for one in term.inner])
-            D = D / np.sqrt(power) if model is self.model else D
-            if model is not self.model:
-                raise NotImplementedError
-            Z, X = part.instruments[b], part.columns[b]
-            g = g + real(D, left[None])[:, 0]
-            size = size + np.sum(np.abs(D) ** 2, axis=1)
-            cross, own = cross + real(D, X), own + real(D, Z)
-            gram, within = gram + real(Z, X), within + real(Z, Z)
-        del joint
-        if b:
-            through = np.linalg.solve(gram.T, cross.T).T
-            size = (
-                size
-                - 2 * np.sum(through * own, axis=1)
-                + np.sum(through @ within * through, axis=1)
-            )
-        explained = 2 * g**2 / size
-        best = int(np.argmax(explained))
-        return term.inner[best], float(explained[best])
+def _gains(
+    case: Case, state: State, tested: _Tested, sure: Sequence[Term]
+) -> dict[str, tuple[float, Array]]:
+    """Return what each explains beyond twice its columns, and the best inner parameters."""
+    found = {}
+    for term in sure:
+        one = tested.scores[term.name]
+        if term.resists and not one.values[0] > 0:
+            continue
+        gain, inner = one.explained - 2 * len(tested.model.tested[term.name]), term.first[0]
+        if len(term.inner) > 1 and term.bent is None and case.caused:
+            model = tested.model
+            instruments = _instruments(case, state, [(term, term.inner)])
+            own = [one[-len(term.inner) :] for one in instruments]
+            each = explained(own, model.parts, model.base, tested.left)
+            gain, inner = float(np.max(each)) - 4, term.inner[int(np.argmax(each))]
+        found[term.name] = gain, inner
+    return found
 
-    def chosen(self, best: dict[Term, tuple[Array, float]]) -> tuple[State, Taken, float] | None:
-        """Return the state with the term that leaves least of those that matter."""
-        settled: list[tuple[State, Taken, float]] = []
-        most = max((gain for _, gain in best.values()), default=0.0)
-        ranked = sorted(best, key=lambda t: -best[t][1])
-        rivals = [t for t in ranked if best[t][1] >= RIVAL * most][:RIVALS]
-        if any(t.linear for t in rivals):
-            rivals += [
-                t for t in (*(b for b in ranked if b.name == "cuff"), FILTER) if t not in rivals
-            ]
-        rivals += [t for t in ranked if t not in rivals]
-        for n, term in enumerate(rivals):
-            if n >= RIVALS + 2 and settled:
+
+def _chosen(
+    case: Case,
+    state: State,
+    tested: _Tested,
+    sure: Sequence[Term],
+    gains: dict[str, tuple[float, Array]],
+) -> tuple[State, float] | None:
+    """Return the state with the term that leaves least of those that matter, and its size."""
+    ranked = sorted(sure, key=lambda term: -gains[term.name][0])
+    first = gains[ranked[0].name][0] if ranked else 0.0
+    rivals = [one for one in ranked[:RIVALS] if gains[one.name][0] >= RIVAL * first]
+    if any(one.linear and not one.own and one.parameter is None for one in rivals):
+        late = [one for one in ranked if one.name in _LATE and one not in rivals]
+        rivals += [*late, FILTER]
+    found: list[tuple[State, float]] = []
+    for term in [*rivals, *(one for one in ranked if one not in rivals)]:
+        if found and term not in rivals:
+            break
+        inner = gains[term.name][1] if term.name in gains else term.first[0]
+        try:
+            new = _with(case, state, term, inner)
+            size, least = size_of(case, new)
+        except ValueError:
+            continue
+        if size < least * (ALONE if term.linear and not case.caused else 1.0):
+            continue
+        found.append((new, size))
+        if len(found) == 1 and first > CLEAR and case.caused:
+            remains, dimension = _remains(case, new, tested, new.powers)
+            if remains < dimension + 4 * np.sqrt(2 * dimension):
                 break
-            inner = best[term][0] if term in best else term.inner[0]
-            try:
-                state = self._with(term, inner)
-            except ValueError:
-                continue
-            taken = state.taken[-1]
-            size, least = size_of(self.case, state, taken)
-            if not self.case.caused and term.linear:
-                least *= UNKNOWN
-            if size >= least:
-                settled.append((state, taken, size))
-        if not settled:
-            return None
-        if len(settled) == 1:
-            return settled[0]
-        powers = min(
-            (s.powers for s, _, _ in settled),
-            key=lambda p: sum(float(np.sum(np.log(one))) for one in p),
+    if len(found) < 2:
+        return found[0] if found else None
+    best = min((new.powers for new, _ in found), key=_unlikely)
+    if not case.caused:
+        return min(found, key=lambda one: _unlikely(one[0].powers))
+    return min(found, key=lambda one: _remains(case, one[0], tested, best)[0])
+
+
+def _unlikely(powers: Sequence[Array]) -> float:
+    return sum(float(np.sum(np.log(one))) for one in powers)
+
+
+def _with(case: Case, state: State, term: Term, inner: Array) -> State:
+    """Return the state settled with one more term.
+
+    A coupling bends the model so far that instruments made of J, B and K without it lead nowhere:
+    it begins at the likeliest of least squares.
+    """
+    if term.name == "cuff" and case.caused:
+        direct = case._replace(caused=False, instruments=[m.lines for m in case.measured])
+        starts = [settled(direct, state.beside(Taken(term, one)), 10) for one in term.inner]
+        return settled(case, min(starts, key=lambda one: _unlikely(one.powers)))
+    return settled(case, state.beside(Taken(term, inner)))
+
+
+def _remains(
+    case: Case, state: State, tested: _Tested, powers: Sequence[Array]
+) -> tuple[float, float]:
+    """Return the χ² of the instruments of all terms in what a state leaves, and how many."""
+    model = model_of(case, state._replace(powers=powers))
+    values, _ = solved(sums_of(model.parts, model.base), model.base)
+    left = residuals(model.parts, model.base, values)
+    g: Array = np.zeros(())
+    own: Array = np.zeros(())
+    for one, e in zip(tested.model.parts, left, strict=True):
+        g, own = (
+            g + real(one.instruments, e[None])[:, 0],
+            own + real(one.instruments, one.instruments),
         )
-        return min(settled, key=lambda one: self._remains(one[0], powers))
-
-    def _with(self, term: Term, inner: Array) -> State:
-        state = self.state
-        if term.name == "cuff" and self.case.caused:
-            started = []
-            for one in term.inner:
-                own = self.case._replace(
-                    caused=False, instruments=[m.lines for m in self.case.measured]
-                )
-                new = _settled(own, state._replace(taken=(*state.taken, Taken(term, one))), 10)
-                started.append(
-                    (sum(float(np.sum(np.log(p))) for p in new.powers), len(started), new)
-                )
-            state = min(started)[2]
-            return _settled(self.case, state)
-        return _settled(self.case, state._replace(taken=(*state.taken, Taken(term, inner))))
-
-    def _remains(self, state: State, powers: Sequence[Array]) -> float:
-        """Return the χ² that the instruments of all terms explain of what a state leaves."""
-        model = _Model.of(self.case, state._replace(powers=powers))
-        values, _ = solved(sums_of(model.parts, model.places), model.places)
-        left = residuals(model.parts, model.places, values)
-        g = own = 0.0
-        for e, part, power, old in zip(
-            left, self.model.parts, powers, self.state.powers, strict=True
-        ):
-            D = part.instruments * np.sqrt(old / power)
-            g, own = g + real(D, e[None])[:, 0], own + real(D, D)
-        scale = np.sqrt(np.diag(own)) + 1e-300
-        precision = np.linalg.pinv(own / np.outer(scale, scale), rcond=1e-8, hermitian=True)
-        return float(2 * (g / scale) @ precision @ (g / scale)) + len(model.places)
+    size = np.sqrt(np.diag(own)) + 1e-300
+    scaled = own / np.outer(size, size)
+    precision = np.linalg.pinv(scaled, rcond=1e-8, hermitian=True)
+    return float(2 * (g / size) @ precision @ (g / size)) + len(model.base), float(len(g))
 
 
 # --- How large
 
 
-def size_of(case: Case, state: State, taken: Taken) -> tuple[float, float]:
-    """Return how large a term is, and how large it must be."""
+def size_of(case: Case, state: State) -> tuple[float, float]:
+    """Return how large the last term is, and how large it must be."""
+    taken = state.taken[-1]
     term = taken.term
-    if term.name == "delay":
-        return abs(float(taken.inner[0])), LEAST_DELAY_S
-    if term.name == "filter":
-        return float(np.sqrt(2) * taken.inner[0]), LEAST_DELAY_S
     if term.name == "cuff":
         size = float(taken.inner[0] * state.joint[2])
         return (size if size < MOST_CUFF else 0.0), LEAST_CUFF
+    if term.bent is not None:
+        return abs(float(taken.inner[0])), LEAST_DELAY_S
     if term.finding.startswith("varying"):
         return max(
             float(np.ptp(functions @ values) / np.abs(state.joint[j] + np.mean(functions @ values)))
-            for j, functions, values, _ in courses(case, taken)
+            for j, functions, values, _ in courses(case, taken.term, taken.inner, taken.values)
         ), LEAST_RANGE
     own = whole = 0.0
-    for motion, power in zip(_instruments(case, state), state.powers, strict=True):
+    motions = _caused(case, state) if case.caused else case.measured
+    for motion, power in zip(motions, state.powers, strict=True):
+        part = taken.values @ term.columns(motion, taken.inner[None])
         whole += float(np.sum(np.abs(motion.lines @ state.joint) ** 2 / power))
-        part = taken.values @ term.columns(motion, taken.inner)
         own += float(np.sum(np.abs(part) ** 2 / power))
     return float(np.sqrt(own / whole)), LEAST_SHARE
 
 
-def courses(case: Case, taken: Taken) -> list[tuple[int, Array, Array, str]]:
-    """Return how a parameter goes in each epoch.
+def courses(
+    case: Case, term: Term, inner: Array, values: Array
+) -> list[tuple[int, Array, Array, list[str]]]:
+    """Return how J, B or K goes, in each epoch or once: which, functions, coefficients, places.
 
-    Which of J, B and K; functions at some places, shape (g, q), and their coefficients, shape (q,),
-    which together are its change; and the label of the epoch, empty where all share it.
+    The change of the parameter at the places is functions @ coefficients.
     """
-    term, values, epochs = taken.term, taken.values, len(case.observations)
+    labels = [one.epoch.label for one in case.observations]
     if term.parameter is not None:
-        return [(term.parameter, np.eye(epochs)[:, :-1], values, "")]
+        return [(term.parameter, np.eye(len(labels))[:, :-1], values, labels)]
     if term.finding == "varying_with_time":
-        x = np.linspace(-0.8, 0.8, PLACES)
-        labels = [one.epoch.label for one in case.observations]
-        return [
-            ("JBK".index(term.name[0]), over_time(x).T, v, label)
-            for v, label in zip(values.reshape(epochs, -1), labels, strict=True)
-        ]
+        x, j = np.linspace(-INNER_TIME, INNER_TIME, PLACES), "JBK".index(term.name[0])
+        found = []
+        for one, own in zip(case.observations, values.reshape(len(labels), -1), strict=True):
+            at_s = float(one.grid.time_s[0]) + (x + 1) / 2 * one.grid.duration_s
+            found.append((j, over_time(x).T, own, [f"{t:.1f} s" for t in at_s]))
+        return found
     if term.finding == "varying_with_phase":
-        return [
-            ("JBK".index(term.name[0]), over_phase(np.linspace(0, 2 * np.pi, PLACES)).T, values, "")
-        ]
+        x, j = np.linspace(0, 2 * np.pi, PLACES), "JBK".index(term.name[0])
+        return [(j, over_phase(x).T, values, [f"{t:.0f}° of the cycle" for t in np.degrees(x)])]
     angle = np.concatenate([m.angle for m in case.measured])
-    x = np.linspace(*np.quantile(angle, [0.05, 0.95]), PLACES)
-    slope = {"quadratic": 2 * x, "cubic": 3 * x**2}.get(term.name)
-    if slope is None:
-        slope = np.tanh(x / taken.inner[0])
-    return [(2, slope[:, None], values, "")]
+    x = np.linspace(*np.quantile(angle, INNER_ANGLE), PLACES)
+    slopes = [2 * x, 3 * x**2]
+    if term.name == "stiffness by side":
+        slopes = [np.tanh((x - inner[1]) / inner[0])]
+    at = [f"{t:+.1f}° from the mean" for t in np.degrees(x)]
+    return [(2, np.stack(slopes, axis=1), values, at)]
 
 
 # --- The answer
@@ -712,80 +662,77 @@ def courses(case: Case, taken: Taken) -> list[tuple[int, Array, Array, str]]:
 def _answered(
     case: Case,
     state: State,
+    model: Model,
+    linear: Score,
     solution: Solution,
     found: Sequence[tuple[Taken, float, float]],
     p: dict[str, float],
 ) -> Answer:
-    state = _settled(case, state) if found else state
-    model = _Model.of(case, state, lambda motion: ANY_LINEAR.columns(motion, np.zeros(0)))
-    first = model.parts[0].columns.shape[0] - len(
-        ANY_LINEAR.columns(case.measured[0]._replace(joint=state.joint), np.zeros(0))
+    values, inverse = solved(sums_of(model.parts, model.base), model.base)
+    fit = fitted(
+        blocks(model.parts, residuals(model.parts, model.base, values)), model.base, values, inverse
     )
-    more = [(c, EVERY) for c in range(first, model.parts[0].columns.shape[0])]
-    sums = sums_of(model.parts, [*model.places, *more])
-    values, inverse = solved(sums, model.places)
-    local = blocks(model.parts, residuals(model.parts, model.places, values))
-    fit = fitted(local, model.places, values, inverse)
-    remains = score(sums, local, model.places, more).p if case.caused else np.nan
-    change = _could_change(model, values) if case.caused else np.zeros(3)
-    share = float(np.max(np.abs(change / values[:3])))
-    answered = not (remains < REMAINS and share > LITTLE)
-    mean = np.eye(len(model.places))[:3]
+    mean = np.eye(len(model.base))[:3]
     for one, own in zip(state.taken, model.of_terms, strict=True):
         if one.term.parameter is not None:
             mean[one.term.parameter, own] = 1 / len(case.observations)
-    joint, covariance = mean @ fit.values, mean @ fit.covariance @ mean.T
-    t = fit.half / np.sqrt(np.diag(fit.covariance))
-    half = t[:3] * np.sqrt(np.diag(covariance))
+    joint, covariance = mean @ values, mean @ fit.covariance @ mean.T
+    half = fit.half[:3] * np.sqrt(np.diag(covariance) / np.diag(fit.covariance)[:3])
+    half = half + _by_other_drives(case, state, model, values)
+    remains, left, change = np.nan, 0.0, np.zeros(3)
+    if case.caused:
+        remains = linear.p
+        left = float(np.sqrt(np.mean(linear.values**2) * 2))
+        change = _where_low_counts(model, values)
+    answered = not (remains < REMAINS and np.max(np.abs(change / joint)) > LITTLE)
     if remains < REMAINS and answered:
         half = half + np.abs(change)
     terms = []
-    for i, (one, own, slopes, (_, chance, size)) in enumerate(
-        zip(state.taken, model.of_terms, model.of_slopes, found, strict=True)
+    named = {taken.term.name: (chance, size) for taken, chance, size in found}
+    for i, (one, own, slopes) in enumerate(
+        zip(state.taken, model.of_terms, model.of_slopes, strict=True)
     ):
+        if one.term.name not in named:
+            continue
         without = solution.values
-        if len(state.taken) > 1:
+        if len(found) > 1:
             rest = state._replace(taken=(*state.taken[:i], *state.taken[i + 1 :]))
-            without = _settled(case, rest, 3).joint
+            without = settled(case, rest, 3).joint
         inner_half = np.full(one.inner.size, np.nan)
         inner_half[one.moving] = fit.half[slopes]
-        values_ = (
-            one.inner[: own.stop - own.start] if one.term.bent is not None else fit.values[own]
-        )
+        own_values = one.inner[: own.stop - own.start] if one.term.bent else values[own]
         terms.append(
             Found(
-                one.term,
-                chance,
-                values_,
-                fit.half[own],
-                one.inner,
-                inner_half,
-                size,
+                one.term, named[one.term.name][0], own_values, fit.half[own],
+                fit.covariance[own, own], one.inner, inner_half, named[one.term.name][1],
                 without - joint,
             )
-        )
+        )  # fmt: skip
     return Answer(
-        joint,
-        half,
-        covariance,
-        fit.degrees[:3],
-        tuple(terms),
-        p,
-        float(remains),
-        share,
-        answered,
-        state,
-    )
+        joint, half, fit.degrees[:3], covariance, tuple(terms), p, float(remains), left, change,
+        answered, case, state,
+    )  # fmt: skip
 
 
-def _could_change(model: _Model, values: Array) -> Array:
-    """Return how far J, B and K go where low or high lines count more, shape (3,)."""
-    found = []
-    for power in (-0.5, 0.5):
+def _by_other_drives(case: Case, state: State, model: Model, values: Array) -> Array:
+    """Return how far J, B and K move with the drives that may be the one."""
+    most = np.zeros(3)
+    for k in range(1, max(len(one.changes) for one in case.observations)):
         parts = []
-        for part in model.parts:
-            tilt = (part.grid.omega_rad_s / part.grid.omega_rad_s[-1]) ** power
-            parts.append(part._replace(instruments=part.instruments * tilt**2))
-        other, _ = solved(sums_of(parts, model.places), model.places)
-        found.append(np.abs(other - values)[:3])
-    return np.asarray(np.max(found, axis=0))
+        for one, part, power in zip(case.observations, model.parts, state.powers, strict=True):
+            columns = part.columns.copy()
+            if k < len(one.changes):
+                columns[:3] += one.changes[k].T / np.sqrt(power)
+            parts.append(part._replace(columns=columns))
+        other, _ = solved(sums_of(parts, model.base), model.base)
+        most = np.maximum(most, np.abs(other - values)[:3])
+    return most
+
+
+def _where_low_counts(model: Model, values: Array) -> Array:
+    """Return how J, B and K change where a line counts by one over its frequency."""
+    parts = [
+        one._replace(instruments=one.instruments * (one.grid.omega_rad_s[0] / one.grid.omega_rad_s))
+        for one in model.parts
+    ]
+    return np.asarray((solved(sums_of(parts, model.base), model.base)[0] - values)[:3])

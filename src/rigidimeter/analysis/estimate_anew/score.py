@@ -225,6 +225,31 @@ def score(
     return Score(chance(own / scale), 2 * float(one @ precision @ one), values)
 
 
+def explained(
+    instruments: Sequence[Complex],
+    parts: Sequence[Part],
+    base: Sequence[Place],
+    left: Sequence[Complex],
+) -> Array:
+    """Return χ² of each of many single instruments, shape (k, m) an epoch, beside a base."""
+    b = [column for column, epoch in base if epoch == EVERY]
+    names = ("score", "size", "cross", "own", "gram", "within")
+    total: dict[str, Array] = dict.fromkeys(names, np.zeros(()))
+    for D, part, residual in zip(instruments, parts, left, strict=True):
+        Z, X = part.instruments[b], part.columns[b]
+        found = (
+            real(D, residual[None])[:, 0], np.sum(np.abs(D) ** 2, axis=1),
+            real(D, X), real(D, Z), real(Z, X), real(Z, Z),
+        )  # fmt: skip
+        total = {name: total[name] + one for name, one in zip(names, found, strict=True)}
+    size = total["size"]
+    if b:
+        through = np.linalg.solve(total["gram"].T, total["cross"].T).T
+        size = size - 2 * np.sum(through * total["own"], axis=1)
+        size = size + np.sum(through @ total["within"] * through, axis=1)
+    return np.asarray(2 * total["score"] ** 2 / size)
+
+
 def chance(of_blocks: Array) -> float:
     """Return the probability of a sum as far from zero if only signs of blocks are chance."""
     of_blocks = of_blocks[np.any(of_blocks != 0.0, axis=1)]
