@@ -48,7 +48,7 @@ from rigidimeter.analysis.estimate_anew.signals import (
     velocity_at,
 )
 from rigidimeter.analysis.estimate_anew.solve import of_fit, smoother
-from rigidimeter.analysis.estimate_anew.stretches import sound
+from rigidimeter.analysis.estimate_anew.stretches import bridged, obstacle, sound
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Epoch, Fit, Outcome
 from rigidimeter.core.settings import EstimationSettings, Settings
@@ -303,12 +303,19 @@ def epoch_signals(
     Parameters
     ----------
     epoch : Epoch
-        As it is analysed: what is left out bridged.
     settings : Settings
     method : str
     drive : Drive, optional
         That the recording shows.
+
+    Raises
+    ------
+    ValueError
+        If the epoch cannot be fitted; the text says why.
     """
+    if reason := obstacle(epoch, settings.estimation):
+        raise ValueError(reason)
+    epoch = bridged(epoch)
     if method == "published":
         return published_signals(epoch, settings.estimation)
     return bandlimited_signals(epoch, settings.estimation, drive)

@@ -9,6 +9,7 @@ from scipy import signal, stats
 from rigidimeter.analysis.estimate_anew.methods import Ready
 from rigidimeter.analysis.estimate_anew.published import (
     acceleration_seen,
+    epoch_signals,
     fit_inertia_damping_stiffness,
     fit_published,
     least_squares,
@@ -54,7 +55,7 @@ def test_the_published_method_is_eq_6_row_by_row():
     t = np.arange(2000) / 100.0
     v = signal.lfilter([1.0], [1.0, -0.8], RNG.normal(size=2000))
     torque = 0.1 * v + 0.01 * RNG.normal(size=2000)
-    channels = {"torque_nm": torque, "velocity_command_rad_s": v}
+    channels = {"torque_nm": torque, "velocity_command_rad_s": v, "velocity_rad_s": -v}
     epoch = Epoch("file", "1", {name: Channel(name, t, x) for name, x in channels.items()})
     position = np.concatenate(([0.0], np.cumsum(v[1:]) / 100.0))
     highpass = signal.butter(2, 0.2, "highpass", fs=100.0, output="sos")
@@ -63,6 +64,9 @@ def test_the_published_method_is_eq_6_row_by_row():
     expected = np.linalg.lstsq(rows, torque[:-1], rcond=None)[0]
     assert fit.value == pytest.approx(expected, rel=1e-8, abs=1e-9)
     assert fit.n_samples == 1999
+    np.testing.assert_allclose(epoch_signals(epoch, Settings(), "published").motion, rows)
+    with pytest.raises(ValueError, match="torque_nm was not recorded"):
+        epoch_signals(Epoch("file", "1", {}), Settings(), "iv")
     twice = fit_published([Ready(epoch, Settings())] * 2)
     assert twice.value == pytest.approx(fit.value, rel=1e-9, abs=1e-9)
     assert twice.angle_rms_rad == pytest.approx(fit.angle_rms_rad)
