@@ -1,8 +1,10 @@
 """From epochs to J, B and K, to scores, and to what else the torque holds: offline and pure."""
 
 from rigidimeter.analysis.estimate_anew.answer import Answer, answer
+from rigidimeter.analysis.estimate_anew.checks import Pull, at_least, at_most, found
 from rigidimeter.analysis.estimate_anew.delay import aligned
 from rigidimeter.analysis.estimate_anew.estimate import (
+    CHECKS,
     METHODS,
     Impedance,
     Progress,

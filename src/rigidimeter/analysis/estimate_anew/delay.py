@@ -6,26 +6,25 @@ off the work of a cycle and turn stiffness into damping. With the delay τ as a 
     y = e^(−iωτ) X p        columns e^(−iωτ) X and −iω e^(−iωτ) X p
 
 it is solved for like J, B and K, by the perturbation where that was recorded. Friction, a reflex
-and a soft cuff turn the torque against the motion as a delay does: each is put in its place, and the
-torque is moved only if the delay is the likelier of them, by Whittle's likelihood, −Σ log S over
-the lines of all epochs, and is the same in the lower half of the band.
+and a soft cuff turn the torque against the motion as a delay does: the torque is moved only where
+the test of all terms (`answer`) names the delay first, or none.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import scipy
 
+from rigidimeter.analysis.estimate_anew.answer import answer
 from rigidimeter.analysis.estimate_anew.checks import found, half_widths
 from rigidimeter.analysis.estimate_anew.grid import Array
 from rigidimeter.analysis.estimate_anew.methods import (
     Ready,
-    all_caused,
     direct,
     instrumental,
     start_of,
@@ -41,7 +40,6 @@ from rigidimeter.analysis.estimate_anew.solve import (
     solve,
     sums,
 )
-from rigidimeter.analysis.estimate_anew.terms import CUFF, TERMS, Motion, Term
 from rigidimeter.core.findings import Effect, Finding
 from rigidimeter.core.records import Delay, Epoch, Fit
 
@@ -63,18 +61,8 @@ SIGNIFICANT, LEAST_S = 3.0, 1e-4
 """A delay within so many standard errors of zero is not corrected, nor one below this: it changes B
 by less than 1e-4 K seconds."""
 
-SAME_S, SAME_SHARE = 3e-4, 0.1
-"""Delays of two bands that differ by less than this, or by three standard errors, are one."""
-
-CLEAR = 10.0
-"""Of the log-likelihood: a delay that is not better than a term by this is not told from it."""
-
-REFLEXES_S = 0.03, 0.045, 0.06
-CUFF_RATIOS = 5.0, 20.0, 80.0, 320.0
-"""Stiffness of a cuff over that of the joint."""
-
-CUFF_LAGS_S = 0.0, 0.005, 0.01
-"""Damping over stiffness of the cuff: one that is damped looks like a delay."""
+TURNS_S = 0.005
+"""A delay that is longer turns the upper lines so far that it is no small change of the torque."""
 
 
 class Found(NamedTuple):
@@ -121,7 +109,7 @@ def delay_of(source: str, epochs: Sequence[Ready], known: bool, observed: Observ
     if not matters(found.delay_s, found.error_s):
         why = f"shorter than {1e3 * LEAST_S:g} ms or not significantly different from zero"
         return replace(delay, remark=f"not corrected: {why}")
-    if why := _of_half_the_band(found, pose) or _of_terms(plain, found, pose):
+    if why := _of_other_terms(plain, pose, found.delay_s):
         return replace(delay, remark=f"not corrected: {why}")
     if not estimation.correct_delay:
         return replace(delay, remark="not corrected: estimation.correct_delay is false")
@@ -394,91 +382,20 @@ def _unexplained(problems: Sequence[Problem], delays_s: Array) -> Array:
     return left
 
 
-def _of_half_the_band(found: Found, pose: Pose) -> str:
-    """Return that the delay is another one in the lower half of the band, or an empty text."""
-    seen = [one.observation for one in found.solution.problems]
-    halves = []
-    for one in seen:
-        low_hz, high_hz = one.grid.band_hz
-        highest_hz = max(0.5 * high_hz, 2.0 * low_hz)
-        lines = np.searchsorted(one.grid.line, highest_hz * one.grid.duration_s, side="right")
-        halves.append(one.part(slice(int(lines))))
+def _of_other_terms(used: Sequence[Observation], pose: Pose, delay_s: float) -> str:
+    """Return that something else explains the torque at least as well, or an empty text."""
+    by_s = delay_s if abs(delay_s) > TURNS_S else 0.0
+    turned = [one.late(by_s) for one in used] if by_s else used
     try:
-        half = solve(halves, delayed(pose), np.append(found.solution.values[:-1], 0.0))
+        told = answer(solve(turned, pose, start_of(turned)))
     except ValueError as error:
-        return f"of the lower half of the band, {error}"
-    # What is left of it where the torque was moved by it already.
-    moved_s = found.delay_s - float(found.solution.values[-1])
-    half_s, half_error_s = moved_s + float(half.values[-1]), float(half.se[-1])
-    allowed_s = SIGNIFICANT * float(np.hypot(found.error_s, half_error_s))
-    if abs(half_s - found.delay_s) <= max(allowed_s, SAME_S + SAME_SHARE * abs(found.delay_s)):
-        return ""
-    return (
-        f"in the lower half of the band it is {1e3 * half_s:.3g} ms; a delay is the same at all "
-        "frequencies, a soft cuff between drive and joint is not"
-    )
-
-
-def _of_terms(plain: Sequence[Observation], found: Found, pose: Pose) -> str:
-    """Return that a term explains the torque as well as the delay, or an empty text."""
-    joint = found.solution.values[:3]
-    best, name = -np.inf, ""
-    for term, inner in _rivals(float(joint[2])):
-        begin = np.append(start_of(plain), 0.0)
-        try:
-            rival = solve(plain, beside(pose, term, inner), begin)
-        except ValueError:
-            continue
-        if likelihood(rival) > best:
-            best, name = likelihood(rival), term.label
-    better_by = best - likelihood(found.solution)
-    if better_by <= -CLEAR:
-        return ""
-    than = "explains it better" if better_by > CLEAR else "explains it as well"
-    return (
-        f"{name} {than}, by {better_by:.2g} of the log-likelihood; `rigidimeter model --compare` "
-        "fits such terms"
-    )
-
-
-def _rivals(stiffness_nm_rad: float) -> Iterator[tuple[Term, Array]]:
-    for term in TERMS:
-        if term.name == "friction":
-            yield term, term.first[0]
-        elif term.muscle:
-            yield from ((term, np.array([delay_s, 0.0])) for delay_s in REFLEXES_S)
-    for ratio in CUFF_RATIOS:
-        give = 1 / (ratio * abs(stiffness_nm_rad))
-        yield from ((CUFF, np.array([give, lag_s, 0.0])) for lag_s in CUFF_LAGS_S)
-
-
-def beside(pose: Pose, term: Term, inner: Array) -> Pose:
-    """Return the problems with the columns of a term as further parameters."""
-
-    def with_term(observations: Sequence[Observation], values: Array) -> list[Problem]:
-        joint, problems = values[:3], []
-        own = pose(observations, joint)
-        caused = all_caused(observations, joint) if observations[0].cause is not None else None
-        for place, one in enumerate(own):
-            seen, grid = one.observation, one.observation.grid
-            turn = (1j * grid.omega_rad_s[:, None]) ** np.arange(3)
-            measured = Motion(grid, seen.coarse[0], seen.coarse[1], one.regressors, one.target[:, None] * turn, joint)
-            motions = [measured, measured]
-            if caused is not None:
-                made = caused[place].coarse[0], caused[place].coarse[1]
-                answered = (one.instruments @ joint)[:, None] * turn
-                motions[0] = Motion(
-                    grid, *made, one.instruments, answered, joint, measured=False
-                )
-            columns = [term.columns(motion, inner)[:1].T for motion in motions]
-            if term.bent is not None:
-                motions = [term.bent(motion, inner) for motion in motions]
-            problems.append(
-                one._replace(
-                    instruments=np.hstack([motions[0].lines, columns[0]]),
-                    regressors=np.hstack([motions[1].lines, columns[1]]),
-                )
-            )
-        return problems
-
-    return with_term
+        return str(error)
+    first = next((one.term for one in told.found), None)
+    if first is not None and first.finding != "torque_delay":
+        return (
+            f"{first.label} explains the torque better; `rigidimeter model --compare` fits "
+            "such terms"
+        )
+    if by_s and not told.answered:
+        return "with the torque moved by it, something else is left that follows the motion"
+    return ""

@@ -22,15 +22,20 @@ import numpy as np
 import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 
-from rigidimeter.analysis.estimate_anew.activity import activities
 from rigidimeter.analysis.estimate_anew import answer as _a
+from rigidimeter.analysis.estimate_anew.activity import activities
 from rigidimeter.analysis.estimate_anew.answer import answer
 
 findings_of = getattr(_a, "findings_of", lambda *_: ())
 from rigidimeter.analysis.estimate_anew.between import band_estimates, between_epochs
-from rigidimeter.analysis.estimate_anew.checks import Pull, excitation, in_half_intervals, sensors
-from rigidimeter.analysis.estimate_anew.checks import fit as fit_checks
-from rigidimeter.analysis.estimate_anew.checks import motion as motion_checks
+from rigidimeter.analysis.estimate_anew.checks import (
+    Pull,
+    excitation,
+    in_half_intervals,
+    motion,
+    sensors,
+)
+from rigidimeter.analysis.estimate_anew.checks import fit as of_fit
 from rigidimeter.analysis.estimate_anew.delay import (
     corrected_s,
     delay_of,
@@ -83,6 +88,25 @@ PUBLISHED = Method(
 
 METHODS: list[Method] = [PUBLISHED, BANDLIMITED, IV, SPECTRAL]
 """Every estimator. Code from outside the package may append its own."""
+
+Check = Callable[[Observation, Fit, Pull], list[Finding]]
+"""From an epoch, its fit, and what torque of the subject does to that, to findings."""
+
+CHECKS: list[Check] = [
+    lambda seen, fit, _: sensors.sensors(seen.epoch, seen.settings, seen.drive_known),
+    lambda seen, fit, _: sensors.velocity(seen.epoch, fit, seen.settings),
+    excitation.excitation,
+    lambda seen, fit, _: sensors.static_torque(seen.epoch, seen.settings),
+    of_fit.residual,
+    of_fit.least_squares,
+    lambda seen, fit, pull: motion.pushing(seen, fit, seen.settings, pull),
+    lambda seen, fit, pull: motion.tremor(seen, fit, seen.settings, pull),
+    lambda seen, fit, pull: of_fit.parameters(seen.epoch, fit, pull, seen.settings.diagnostics),
+    lambda seen, fit, pull: of_fit.controller(
+        seen.epoch, fit, pull, seen.settings, of_fit.controller_shown(seen.epoch, seen.settings)
+    ),
+]
+"""Every check of an epoch. Code from outside the package may append its own."""
 
 MOST_TRIED = 5
 """From so many epochs it is known whether the motion follows the perturbation."""
@@ -245,8 +269,8 @@ def _observation(
     epoch, settings, drive = ready.epoch, ready.settings, ready.drive
     loop: Loop | None = loop_of(settings, epoch.channels["torque_nm"].rate_hz, drive)
     if causes is None:
-        shown = fit_checks.controller_shown(epoch, settings)
-        loop = fit_checks.loop_shown(epoch, settings, drive, shown)
+        shown = of_fit.controller_shown(epoch, settings)
+        loop = of_fit.loop_shown(epoch, settings, drive, shown)
     # A window with a hole would spread excited lines over those between them.
     part = longest_part(epoch) if periodic else epoch
     return observe(part, settings, drive, loop, causes, periodic=periodic)
@@ -537,7 +561,7 @@ def _checked(
         return fit  # it has said why
     pull = Pull(instruments=True)
     if not method.uses_perturbation:
-        pull = fit_checks.pull_of(seen, fit, by_noise=method.by_noise)
+        pull = of_fit.pull_of(seen, fit, by_noise=method.by_noise)
     delay = next((one for one in delays if one.source == fit.source), None)
     findings = list(_findings(method, ready, seen, fit, pull, delay))
     serious = [one for one in findings if one.level == "exclude"]
@@ -551,25 +575,16 @@ def _checked(
 def _findings(
     method: Method, ready: Ready, seen: Observation, fit: Fit, pull: Pull, delay: Delay | None
 ) -> Iterator[Finding]:
-    epoch, settings = ready.epoch, ready.settings
-    followed = not method.as_recorded and ready.drive is not None
-    yield from sensors.sensors(epoch, settings, followed)
-    yield from sensors.velocity(epoch, fit, settings)
-    yield from excitation.excitation(seen, fit, pull)
-    yield from sensors.static_torque(epoch, settings)
-    yield from fit_checks.residual(seen, fit, pull)
-    yield from fit_checks.least_squares(seen, fit, pull)
-    yield from motion_checks.pushing(seen, fit, settings, pull)
-    yield from motion_checks.tremor(seen, fit, settings, pull)
+    # What follows the samples as they are does not know what the drive does with a command it holds.
+    checked = replace(seen, drive_known=False) if method.as_recorded else seen
+    for check in CHECKS:
+        yield from check(checked, fit, pull)
     whole = _with_active(method, ready)
-    yield from motion_checks.emg_activity(epoch, ready.activity, fit, whole, settings, pull)
-    yield from fit_checks.parameters(epoch, fit, pull, settings.diagnostics)
-    shown = fit_checks.controller_shown(epoch, settings)
-    yield from fit_checks.controller(epoch, fit, pull, settings, shown)
+    yield from motion.emg_activity(ready.epoch, ready.activity, fit, whole, ready.settings, pull)
     if not pull.instruments:
         yield from late_torque(seen, fit, delay)
     if ready.drive is None:
-        yield from fit_checks.between_samples(epoch, fit, pull, settings, delay)
+        yield from of_fit.between_samples(ready.epoch, fit, pull, ready.settings, delay)
 
 
 def _with_active(method: Method, ready: Ready) -> Fit | None:
