@@ -242,7 +242,8 @@ def answer(
         sure = [one for one in offered if p[one.name] < chance]
         gains = _gains(case, state, tested, sure)
         strongest = strongest or max((gain for gain, _ in gains.values()), default=0.0)
-        gains = {name: one for name, one in gains.items() if one[0] > FURTHER * strongest}
+        # The gain of a coupling is that of a straight column, and it bends.
+        gains = {n: one for n, one in gains.items() if one[0] > FURTHER * strongest or n == "cuff"}
         chosen = _chosen(case, state, tested, [one for one in sure if one.name in gains], gains)
         if chosen is None:
             break
@@ -552,7 +553,8 @@ def _chosen(
         if size < least * (ALONE if term.linear and not case.caused else 1.0):
             continue
         found.append((new, size))
-        if len(found) == 1 and first > CLEAR and case.caused:
+        late = term.name in (*_LATE, "reflex")
+        if len(found) == 1 and first > CLEAR and case.caused and not late:
             remains, dimension = _remains(case, new, tested, new.powers)
             if remains < dimension + 4 * np.sqrt(2 * dimension):
                 break
@@ -569,16 +571,32 @@ def _unlikely(powers: Sequence[Array]) -> float:
 
 
 def _with(case: Case, state: State, term: Term, inner: Array) -> State:
-    """Return the state settled with one more term.
-
-    A coupling bends the model so far that instruments made of J, B and K without it lead nowhere:
-    it begins at the likeliest of least squares.
-    """
-    if term.name == "cuff" and case.caused:
-        direct = case._replace(caused=False, instruments=[m.lines for m in case.measured])
-        starts = [settled(direct, state.beside(Taken(term, one)), 10) for one in term.inner]
-        return settled(case, min(starts, key=lambda one: _unlikely(one.powers)))
+    """Return the state settled with one more term."""
+    if term.name == "cuff":
+        state, inner = _coupled(case, state)
     return settled(case, state.beside(Taken(term, inner)))
+
+
+def _coupled(case: Case, state: State) -> tuple[State, Array]:
+    """Return J, B, K, and c and lag of a soft coupling, where the search for them begins.
+
+    With M (1 + lag s) + c (J s² + B s + K) M = (1 + lag s) (J s² + B s + K) θ the torque is linear
+    in θ and three derivatives, and in two of its own; so many of the caused angle are instruments.
+    """
+    gram, moment = np.zeros((6, 6)), np.zeros(6)
+    causes = _caused(case, state) if case.caused else case.measured
+    for own, cause, power in zip(case.measured, causes, state.powers, strict=True):
+        s, moved = 1j * own.grid.omega_rad_s, (own.lines - own.unseen).T
+        columns = np.stack([*moved[::-1], s * moved[0], -own.torque[:, 1], -own.torque[:, 2]])
+        instruments = cause.lines[:, 2] * s ** np.arange(6)[:, None] if case.caused else columns
+        both = np.concatenate([columns, own.torque[None, :, 0]])
+        found = real(instruments / np.sqrt(power), both / np.sqrt(power))
+        gram, moment = gram + found[:, :-1], moment + found[:, -1]
+    rows = np.abs(gram).max(axis=1)
+    stiff, damped, heavy, third, _, second = np.linalg.solve(gram / rows[:, None], moment / rows)
+    c, lag_s = max(second / heavy, 1e-6), float(np.clip(third / heavy, 0.0, 0.01))
+    joint = np.array([heavy - lag_s * damped, damped - lag_s * stiff, stiff])
+    return state._replace(joint=joint / max(1 - c * stiff, 0.1)), np.array([c, lag_s])
 
 
 def _remains(
