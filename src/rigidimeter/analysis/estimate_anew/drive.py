@@ -63,14 +63,14 @@ MOST_POLES = 4  # a velocity PI has two; a lag and a position loop add one each
 # the samples show poles up to the last, of which 1 % is left at the next tick.
 SLOWEST, FASTEST, QUICKEST, SEEN = 5e-4, 6.0, 3.0, 4.6
 DOUBLE = 1e-4  # poles this close, as a share of their size, are taken for so far apart
-BESIDE = 0.3  # where the search for a further pole begins, in times the first
+BESIDE = 0.3, 4.0  # where the search for a further pole begins, in times the first
 LONGEST_S, LONGEST_TICKS, SHORTEST_TICKS = 0.1, 4.0, 0.25  # of delays
 PASSED_HZ = 10.0  # an angle is used as the velocity through a low-pass with this corner
 # Of stretches of past commands, ever longer the longer ago.
 EDGES_TICKS = (0, 1, *sorted(step << octave for octave in range(13) for step in (2, 3)))
-MOST_STEPS, ENOUGH = 12, 1e-4  # of a search, and the last share of the power to gain
+MOST_STEPS, ENOUGH = 12, 1e-6  # of a search; the last share of the power to gain
 STEP = 1e-4  # of a coordinate, for its slope
-FAR = 30.0  # a delay is not searched where more times the power of others is left near it
+FAR = 20.0  # a delay is not searched where more times the power of others is left near it
 
 WORTH = 0.02  # a further pole is tried where past commands explain this share of what is left
 # A drive that leaves no more than so many times the power of the best, and this share of the SD of
@@ -333,8 +333,8 @@ def _climbed(record: _Record, start: DriveModel) -> list[_Fitted]:
     for poles in range(2, MOST_POLES + 1):
         least = min((one.power for one in found), default=1.0)
         near = [*models, *regressed.get(poles, []), *(one.model for one in found[-2:])]
-        begins = [_coordinates(one, record.interval_s, poles) for one in near]
-        for zeros in (poles - 2, poles - 1):
+        begins = [_coordinates(one, record.interval_s, poles, x) for one in near for x in BESIDE]
+        for zeros in range(poles - 2 + rubs, poles):
             found.append(_best(record, begins, zeros, least))
             begins.append(found[-1].place)
         best = min(found, key=_power)
@@ -344,13 +344,14 @@ def _climbed(record: _Record, start: DriveModel) -> list[_Fitted]:
         if rubs:
             done = poles > 2 and RUBBED * best.power > least
         elif best.power > QUIET**2 and (done or poles > 2):
-            least = best.power * (1.0 if done or poles == MOST_POLES else EARLY)
-            if (rubbed := _rubbed(found[1], least)) is not None:
+            most = best.power * (1.0 if done or poles == MOST_POLES else EARLY)
+            if (rubbed := _rubbed(found[1], most)) is not None:
                 return _climbed(rubbed.record, rubbed.model)
         if done:
             break
     single = [_coordinates(one, record.interval_s, 1) for one in (*models, *regressed.get(1, []))]
-    return [_best(record, single, 0, best.power), *found]
+    found.append(_best(record, single, 0, best.power))
+    return sorted(found, key=lambda one: (one.place.size, one.zeros))
 
 
 def _best(record: _Record, begins: Sequence[Array], zeros: int, least: float) -> _Fitted:
@@ -361,11 +362,13 @@ def _best(record: _Record, begins: Sequence[Array], zeros: int, least: float) ->
     at = [_answer(record, np.append(one[:-1], 0.0), zeros) for one in begins]
     still = _searched(record, min(at, key=_power).place, zeros, False)
     step, scatter, _ = _scatter(still)
-    if step[still.place.size - 1] <= ERRORS * np.linalg.norm(scatter[still.place.size - 1]):
+    delay = still.place.size - 1
+    if step[delay] <= ERRORS * np.linalg.norm(scatter[delay]):
         return still
-    ticks = np.geomspace(SHORTEST_TICKS, _longest(record), 8)
     places = [one for one in begins if one[-1] > 0]
-    places = places or [np.append(still.place[:-1], late) for late in ticks]
+    ticks = np.geomspace(SHORTEST_TICKS, _longest(record), 0 if places else 8)
+    places += [np.append(still.place[:-1], late) for late in ticks]
+    places.append(still.place + step[: delay + 1])
     late = min((_answer(record, one, zeros) for one in places), key=_power)
     if late.power > FAR * least:
         return still
@@ -384,17 +387,16 @@ def _searched(record: _Record, begin: Array, zeros: int, delayed: bool) -> _Fitt
         along = _slopes(one, begin.size - 1 + delayed)
         table = one.table / (np.linalg.norm(one.table, axis=1, keepdims=True) + TINY)
         along = along - np.linalg.lstsq(table @ table.T, table @ along.T)[0].T @ table
-        gram, down = along @ along.T, along @ one.left
-        before = one
-        while one is before and damping < 1e6:
+        gram, down, step = along @ along.T, along @ one.left, np.zeros(begin.size)
+        tried = None
+        while tried is None or tried.power >= one.power:
             damped = gram + np.diag(damping * np.diag(gram) + TINY)
-            step = np.zeros(begin.size)
             step[: down.size] = np.linalg.solve(damped, -down)
-            tried = _answer(record, before.place + step, zeros)
-            one = tried if tried.power < before.power else before
-            damping *= 0.1 if one is tried else 10.0
-        if before.power - one.power <= ENOUGH * (before.power + UNSEEN**2):
-            break
+            if -down @ step[: down.size] <= ENOUGH * one.left.size * (one.power + UNSEEN**2):
+                return one
+            tried = _answer(record, one.place + step, zeros)
+            damping *= 10.0 if tried.power >= one.power else 0.2
+        one = tried
     return one
 
 
@@ -532,10 +534,10 @@ def _shapes(poles: tuple[complex, ...], zeros: int) -> Complex:
                      for pole, rest in zip(poles, rests, strict=True)])  # fmt: skip
 
 
-def _coordinates(drive: DriveModel, interval_s: float, poles: int) -> Array:
+def _coordinates(drive: DriveModel, interval_s: float, poles: int, beside: float = 1.0) -> Array:
     """Return where a search with so many poles begins at a drive."""
     everyone = with_conjugates(sorted(drive.poles_rad_s, key=lambda pole: -abs(pole.imag)))[:poles]
-    everyone += [complex(-abs(everyone[0]) * BESIDE**n)
+    everyone += [complex(-abs(everyone[0]) * beside**n)
                  for n in range(1, poles - len(everyone) + 1)]  # fmt: skip
     found: list[float] = []
     for a, b in zip(everyone[::2], everyone[1::2], strict=False):
