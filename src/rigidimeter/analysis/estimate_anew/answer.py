@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.analysis.estimate_anew.checks import found as said
 from rigidimeter.analysis.estimate_anew.grid import SAME_TIME, Array, Complex
 from rigidimeter.analysis.estimate_anew.observation import Observation, torque_filter_of
 from rigidimeter.analysis.estimate_anew.score import (
@@ -51,12 +52,16 @@ from rigidimeter.analysis.estimate_anew.terms import (
     ANY_LINEAR,
     FILTER,
     FINER,
+    MOVEMENT,
     TERMS,
     Motion,
     Term,
     over_phase,
     over_time,
 )
+from rigidimeter.core.findings import Effect, Fact, Finding
+from rigidimeter.core.records import PARAMETERS
+from rigidimeter.core.settings import DiagnosticsSettings, Settings
 from rigidimeter.model import lowpass
 
 CHANCE, MOST_TERMS = 1e-3, 3
@@ -78,12 +83,17 @@ ROUNDS, SETTLED, MOST_STEPS, ACTIVE = 8, 0.02, 10, 4
 """An inner parameter moves by so many of its steps at once, and is fitted if so many above its
 lower bound."""
 
+FEWEST_CYCLES, FASTEST_HZ, PERIODIC, PERIODIC_OF_ALL = 3, 2.0, 0.6, 0.25
+"""An imposed movement has so many cycles in an epoch, so many a second at most, and such shares of
+the power of the angle that the perturbation does not cause, and of all of it. A perturbation in the
+loop reaches 0.5 of the first at its slowest line."""
+
 FAINT = 0.01
 """Of the window: what was simulated rings at its end."""
 
 JOINT: tuple[Place, ...] = ((0, EVERY), (1, EVERY), (2, EVERY))
 _LATE = ("delay", "cuff", "filter")
-_ELASTIC = ("stiffness by side", "stiffness by angle")
+_ELASTIC = ("stiffness by side", "stiffness by angle", "K over phase")
 NOT_BESIDE = {name: _LATE for name in _LATE} | {name: _ELASTIC for name in _ELASTIC}
 """What is no longer looked for beside a term that was found."""
 
@@ -207,7 +217,6 @@ def answer(
     solution: Solution,
     *,
     person: bool = True,
-    phases: Sequence[Array] | None = None,
     more: Sequence[Term] = (),
     chance: float = CHANCE,
 ) -> Answer:
@@ -219,15 +228,15 @@ def answer(
         J, B and K of all epochs together.
     person : bool
         Whether one is on the axis; without, no reflex is looked for.
-    phases : sequence of array, optional
-        The phase of an imposed movement at the coarse samples of each epoch, in rad.
     more : sequence of Term
         To be tested beside the usual ones.
     chance : float
         Probability of any false term.
     """
-    case = case_of(solution.problems, phases)
     state = State(solution.values, list(solution.powers))
+    case = with_phases(case_of(solution.problems), state)
+    if not case.caused and case.measured[0].phase is not None:
+        state = settled(case, state.beside(Taken(MOVEMENT, np.zeros(0))))
     offered = [one for one in (*TERMS, *more) if _offered(case, one, person)]
     first: dict[str, float] = {}
     found: list[tuple[Taken, float, float]] = []
@@ -259,10 +268,10 @@ def answer(
     )
 
 
-def case_of(problems: Sequence[Problem], phases: Sequence[Array] | None = None) -> Case:
+def case_of(problems: Sequence[Problem]) -> Case:
     """Return what is known of epochs, whatever J, B and K."""
     measured = []
-    for e, one in enumerate(problems):
+    for one in problems:
         observation, grid = one.observation, one.observation.grid
         channel = observation.epoch.channels["torque_nm"]
         torque = grid.lines(values_at(channel, grid.time_s, SAME_TIME), 2).T
@@ -271,17 +280,46 @@ def case_of(problems: Sequence[Problem], phases: Sequence[Array] | None = None) 
         through: Complex | float = 1.0
         if (through_filter := torque_filter_of(observation.settings)) is not None:
             through = lowpass(np.asarray(1j * grid.omega_rad_s), *through_filter)
-        phase = None if phases is None else phases[e]
         unseen = -observation.changes[0] if len(observation.changes) else 0.0
         measured.append(
             Motion(
                 grid, *observation.coarse, one.regressors, torque, np.zeros(3), through, True,
-                phase, unseen, velocity_at(observation.epoch, grid.time_s),
+                None, unseen, velocity_at(observation.epoch, grid.time_s),
             )
         )  # fmt: skip
     observations = [one.observation for one in problems]
     caused = all(one.cause is not None for one in observations)
     return Case(observations, measured, [one.instruments for one in problems], caused)
+
+
+def with_phases(case: Case, state: State) -> Case:
+    """Return the case with the phase of an imposed movement, 0 where the angle is highest.
+
+    That is a motion at one slow frequency in every epoch which the perturbation does not cause.
+    """
+    causes = _caused(case, state) if case.caused else case.measured
+    found = []
+    for own, cause in zip(case.measured, causes, strict=True):
+        w, T, n = own.grid.coarse_window[0], own.grid.duration_s, own.angle.size
+        rest = own.angle
+        if case.caused:
+            x = (cause.angle - cause.angle.mean()) * w
+            rest = rest - cause.angle * float((own.angle * w) @ x / (x @ x))
+        power = np.abs(np.fft.rfft((rest - rest.mean()) * w)) ** 2
+        all_of_it = float(np.sum(np.abs(np.fft.rfft((own.angle - own.angle.mean()) * w)) ** 2))
+        first, last = int(np.ceil(FEWEST_CYCLES)), int(min(FASTEST_HZ * T, n // 2 - 3))
+        if last <= first:
+            return case
+        peak = first + int(np.argmax(power[first : last + 1]))
+        near = np.arange(peak - 2, peak + 3)
+        if power[near].sum() < max(PERIODIC * power[1:].sum(), PERIODIC_OF_ALL * all_of_it):
+            return case
+        line = float(power[near] @ near / power[near].sum())
+        # Mirrored at the end, so that no whole number of cycles leaves a step there.
+        spectrum = np.fft.fft(np.concatenate([rest, rest[::-1]]))
+        spectrum *= np.exp(-4.5 * ((np.arange(2 * n) / 2 - line) / line) ** 2)
+        found.append(own._replace(phase=np.angle(np.fft.ifft(spectrum)[:n])))
+    return case._replace(measured=found)
 
 
 def _offered(case: Case, term: Term, person: bool) -> bool:
@@ -754,3 +792,109 @@ def _where_low_counts(model: Model, values: Array) -> Array:
         for one in model.parts
     ]
     return np.asarray((solved(sums_of(parts, model.base), model.base)[0] - values)[:3])
+
+
+# --- What is told
+
+
+def findings_of(
+    found: Answer, solution: Solution, settings: Settings, method: str = ""
+) -> tuple[Finding, ...]:
+    """Return the findings of an answer, one for each kind.
+
+    Parameters
+    ----------
+    found : Answer
+    solution : Solution
+        J, B and K without terms.
+    settings : Settings
+    method : str
+        Not shown yet.
+    """
+    del method
+    by_kind: dict[str, list[Found]] = {}
+    for one in found.found:
+        by_kind.setdefault(one.term.finding, []).append(one)
+    told = []
+    harmless = "answered" if found.answered else ""
+    for kind, own in by_kind.items():
+        if kind == "varying_between_epochs":
+            continue  # told with the fits of single epochs
+        added = np.sum([one.effect for one in own], axis=0)
+        value, limit, facts, variant = _told(kind, own, added, found, settings.diagnostics)
+        facts |= {"remains": found.remains, "stands": "beside" if found.answered else "withheld"}
+        told.append(
+            said(
+                kind, settings.diagnostics, value, limit, p=max(one.p for one in own),
+                effect=Effect.of(added, found.joint + added, found.half), facts=facts,
+                variant=variant, harmless=harmless,
+            )
+        )  # fmt: skip
+    percent = 100 * found.left
+    if not found.answered and percent > settings.diagnostics.max_lack_of_fit_percent:
+        low_hz, high_hz = found.case.measured[0].grid.band_hz
+        halves = zip("JBK", (100 * found.change / found.joint).tolist(), strict=True)
+        facts = {"low_hz": low_hz, "high_hz": high_hz} | {f"half_{s}": one for s, one in halves}
+        most = settings.diagnostics.max_lack_of_fit_percent
+        told.append(
+            said("lack_of_fit", settings.diagnostics, percent, most, p=found.remains, facts=facts)
+        )
+    return tuple(told)
+
+
+def _told(
+    kind: str, own: Sequence[Found], added: Array, found: Answer, settings: DiagnosticsSettings
+) -> tuple[float, float, dict[str, Fact], str]:
+    """Return value, limit, facts and variant of a kind's finding."""
+    first = own[0]
+    if kind == "torque_delay":
+        late_ms = 1e3 * float(first.values[0]) * (np.sqrt(2) if first.term is FILTER else 1)
+        facts: dict[str, Fact] = {"late_ms": late_ms, "half_ms": 1e3 * float(first.half[0])}
+        return abs(late_ms), 1e3 * LEAST_DELAY_S, facts | {"terms": first.term.label}, ""
+    if kind.startswith("varying"):
+        ranges = [_range(one, found) for one in own]
+        ranges.sort(key=lambda one: -one[0])
+        others = [str(one["symbol"]) for _, one in ranges[1:]]
+        text = f"; so does {' and '.join(others)}" if others else ""
+        return ranges[0][0], settings.max_varying_percent, {**ranges[0][1], "others": text}, ""
+    asked = ["inertia", "damping", "stiffness", *(one.term.asked for one in own)]
+    if "directional-damping" in asked:
+        asked.remove("damping")  # the whole and its two halves are one too many
+    sizes = [_size(one) for one in own]
+    facts = {
+        "terms": " and ".join(one.term.label for one in own), "asked": ",".join(asked),
+        "sizes": " and ".join(sizes), "size": float(first.values[0]), "share": 100 * first.size,
+    }  # fmt: skip
+    variant = "several" if len(own) > 1 else ""
+    if first.term.muscle:
+        facts["late_ms"] = 1e3 * float(first.inner[0])
+    if first.term.name == "cuff" and not variant:
+        variant, facts["size"] = "coupling", 1 / float(first.values[0])
+    return 100 * float(np.max(np.abs(added) / found.half)), 100.0, facts, variant
+
+
+def _size(one: Found) -> str:
+    late = f" {1e3 * one.inner[0]:.0f} ms late" if one.term.muscle else ""
+    each = [f"{v:.3g} ± {h:.2g}" for v, h in zip(one.values, one.half, strict=True)]
+    return f"{one.term.label} of {each[0]} {one.term.unit}{late}"
+
+
+def _range(one: Found, found: Answer) -> tuple[float, dict[str, Fact]]:
+    """Return from where to where a parameter goes, in % of its mean, and what is shown of it."""
+    best: tuple[float, dict[str, Fact]] = (0.0, {})
+    column = 0
+    for j, functions, values, at in courses(found.case, one.term, one.inner, one.values):
+        within = slice(column, column + values.size)
+        column += values.size
+        goes = found.joint[j] + functions @ values
+        spread = np.einsum("gi,ij,gj->g", functions, one.covariance[within, within], functions)
+        half = 1.96 * np.sqrt(spread + found.covariance[j, j])
+        low, high = int(np.argmin(goes)), int(np.argmax(goes))
+        percent = 100 * float(np.ptp(goes) / np.abs(goes[low] + goes[high]) * 2)
+        if percent > best[0]:
+            best = percent, {
+                "symbol": PARAMETERS[j].symbol, "size_unit": PARAMETERS[j].unit,
+                "low": float(goes[low]), "low_half": float(half[low]), "low_at": at[low],
+                "high": float(goes[high]), "high_half": float(half[high]), "high_at": at[high],
+            }  # fmt: skip
+    return best

@@ -30,7 +30,7 @@ SMOOTH = 0.12
 """Of the RMS of the caused velocity: within so much of zero the instrument of friction turns. The
 best instrument of a jump is smooth where the caused velocity is not quite the true one."""
 
-DEGREE, FINER_DEGREE, HARMONICS, PARTS = 3, 9, 2, 10
+DEGREE, FINER_DEGREE, HARMONICS, MOVEMENT_HARMONICS, PARTS = 3, 9, 2, 6, 10
 """Of polynomials over time, and of those that are fitted beside once a change is known: no other
 term shall be found in what a few leave of it; of a phase; parts of the band for what has no name."""
 
@@ -208,9 +208,9 @@ def over_time(x: Array, first: int = 1, last: int = DEGREE) -> Array:
     return np.asarray(legvander(x, last)[:, first:].T)
 
 
-def over_phase(phase: Array) -> Array:
-    """Return cosine and sine of the harmonics, shape (4, n)."""
-    of = [h * phase for h in range(1, HARMONICS + 1)]
+def over_phase(phase: Array, harmonics: int = HARMONICS) -> Array:
+    """Return cosine and sine of the harmonics, shape (2 harmonics, n)."""
+    of = [h * phase for h in range(1, harmonics + 1)]
     return np.concatenate([[np.cos(one), np.sin(one)] for one in of])
 
 
@@ -220,6 +220,13 @@ def _in_time(first: int, last: int) -> Callable[[Motion], Array]:
         return over_time((2 * np.arange(count) + 1) / count - 1, first, last)
 
     return factors
+
+
+def _movement(motion: Motion, inner: Array) -> Complex:
+    """Return the torque that an imposed movement takes, as far as it repeats."""
+    del inner
+    assert motion.phase is not None  # offered where there is one
+    return motion.of(over_phase(motion.phase, MOVEMENT_HARMONICS))
 
 
 def _in_phase(motion: Motion) -> Array:
@@ -339,6 +346,7 @@ def _late(name: str, label: str, bent: Callable[[Motion, Array], Motion], **limi
     )  # fmt: skip
 
 
+MOVEMENT = Term("movement", "N·m", "", _movement, own=True, linear=True, finding="")
 ANY_LINEAR = Term("any linear", "1", "anything linear", any_linear, linear=True, finding="")
 FILTER = _late(
     "filter", "a filter of the torque", _before_filter, low=np.zeros(1), high=np.array([0.03])
