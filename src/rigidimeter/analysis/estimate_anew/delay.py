@@ -46,9 +46,9 @@ from rigidimeter.core.records import Delay, Epoch, Fit
 MOST_EPOCHS = 12
 """A delay is common to its recording; from so many epochs it is known well enough."""
 
-SCAN_STEP_S, SCAN_HIGH_HZ, MOST_VALLEYS, REWEIGHTED = 0.005, 20.0, 3, 3
-"""The search begins at the best of steps this far apart, a quarter of a period at 50 Hz, below this
-frequency; so many valleys are tried, each with weights found so often."""
+SCAN_STEP_S, SCAN_HIGH_HZ, CLEARLY = 0.005, 20.0, 0.97
+"""The search begins at the valleys of steps this far apart, a quarter of a period at 50 Hz, below
+this frequency; a valley leaves less than so much of what is left without a delay."""
 
 ROUNDS, SETTLED_S = 6, 1e-5
 """The torque is moved and the rest estimated again until less is left: between coarse samples the
@@ -311,17 +311,16 @@ def _searched(observations: Sequence[Observation], pose: Pose, longest_s: float)
     """Return J, B, K and the delay of the torque, the likeliest within ± `longest_s`."""
     begin = start_of(observations)
     problems = pose(observations, begin)
+    powers = noise_powers(problems, begin)
     delays_s = np.linspace(-longest_s, longest_s, 2 * max(round(longest_s / SCAN_STEP_S), 1) + 1)
-    left = _unexplained(problems, delays_s)
-    # The valleys of the scan, the deepest first, and none: the subject may have dug the deepest.
+    left = _unexplained(problems, powers, delays_s)
+    # The valleys of the scan that are clearly deeper than none, and none.
     inner = np.r_[True, left[1:] < left[:-1]] & np.r_[left[:-1] < left[1:], True]
-    valleys = sorted(np.flatnonzero(inner), key=lambda i: float(left[i]))[:MOST_VALLEYS]
+    inner &= left < CLEARLY * left[delays_s.size // 2]
     best: Solution | None = None
-    for near_s in dict.fromkeys([*(round(float(delays_s[i]), 9) for i in valleys), 0.0]):
+    for near_s in dict.fromkeys([0.0, *(round(float(one), 9) for one in delays_s[inner])]):
         turned = [_turned(one, near_s) for one in problems]
-        near = shortest(*sums(turned))
-        for _ in range(REWEIGHTED):  # torque of the subject decides where lines count alike
-            near = shortest(*sums(turned, noise_powers(turned, near)))
+        near = shortest(*sums(turned, powers))
         try:
             found = solve(observations, delayed(pose), np.append(near, near_s))
         except ValueError:
@@ -368,15 +367,15 @@ def _turned(one: Problem, delay_s: float) -> Problem:
     return one._replace(target=one.target * turn)
 
 
-def _unexplained(problems: Sequence[Problem], delays_s: Array) -> Array:
-    """Return the power of the torque that the instruments leave at each delay, shape (k,)."""
+def _unexplained(problems: Sequence[Problem], powers: Sequence[Array], delays_s: Array) -> Array:
+    """Return the power of the torque over its noise that is left at each delay, shape (k,)."""
     left = np.zeros(delays_s.size)
-    for one in problems:
-        omega = one.observation.grid.omega_rad_s
+    for one, power in zip(problems, powers, strict=True):
+        omega, scale = one.observation.grid.omega_rad_s, 1 / np.sqrt(power)
         low = omega < 2 * np.pi * SCAN_HIGH_HZ
-        rows = one.instruments[low]
+        rows = one.instruments[low] * scale[low, None]
         basis = np.linalg.qr(np.vstack([rows.real, rows.imag]))[0]
-        turned = one.target[low, None] * np.exp(1j * omega[low, None] * delays_s)
+        turned = (one.target * scale)[low, None] * np.exp(1j * omega[low, None] * delays_s)
         both = np.vstack([turned.real, turned.imag])
         left += np.sum(both**2, axis=0) - np.sum((basis.T @ both) ** 2, axis=0)
     return left

@@ -233,23 +233,21 @@ def by_other_drives(solution: Solution) -> Array:
     """Return δ, shape (p,)."""
     values = solution.values
     count = max(len(one.observation.changes) for one in solution.problems)
-    moved = []
-    for place in range(count):
-        gram, moment = solution.gram.copy(), solution.gram @ values
-        for one, power in zip(solution.problems, solution.powers, strict=True):
-            if place >= len(one.observation.changes):
-                continue
-            change, held = one.observation.changes[place], len(one.held)
-            target = -(change[:, :held] @ np.array(one.held)) if held else 0 * one.target
-            other = one._replace(regressors=change[:, held:], target=target)
-            more = sums([other], [power])
-            gram, moment = gram + more[0], moment + more[1]
-        moved.append(np.abs(shortest(gram, moment) - values))
-    if len(moved) < 2:
+    if count < 2:
         return np.zeros(values.size)
-    most = np.max(moved[1:], axis=0)
+    grams = np.repeat(solution.gram[None], count, axis=0)
+    moments = grams @ values
+    for one, power in zip(solution.problems, solution.powers, strict=True):
+        changes, held = one.observation.changes, len(one.held)
+        weighted = (one.instruments / power[:, None]).conj().T
+        grams[: len(changes)] += (weighted @ changes[:, :, held:]).real
+        if held:
+            moved = (weighted @ changes[:, :, :held]).real
+            moments[: len(changes)] -= moved @ np.array(one.held)
+    without, *others = np.abs(shortest(grams, moments) - values)
+    most = np.max(others, axis=0)
     depends = most > DEPENDS * np.abs(values)
-    return np.asarray(np.where(depends, np.maximum(most, 2 * moved[0]), most))
+    return np.asarray(np.where(depends, np.maximum(most, 2 * without), most))
 
 
 def loop_pull(
@@ -379,7 +377,7 @@ def fit_epochs(
             if one.epoch.closed.included and condition in ("", one.epoch.condition)
         ]
         observations = [one for i in members if isinstance(one := observed[i], Observation)]
-        sound = [epochs[i] for i in members if not epochs[i].obstacle]
+        sound = [epochs[i] for i in members if fits[i].outcome.included]
         fit: Fit | None = None
         if pose is None and sound:
             fit = _by_function(method, sound, inertia_kg_m2)

@@ -253,9 +253,17 @@ def inverse_of(matrix: Array) -> Array:
 
 
 def shortest(gram: Array, moment: Array) -> Array:
-    """Return the solution, the shortest where columns of unit length are alike, shape (p,)."""
-    size = np.sqrt(np.maximum(np.abs(np.diag(gram)), np.finfo(np.float64).tiny))
-    return np.asarray(np.linalg.pinv(gram / np.outer(size, size)) @ (moment / size) / size)
+    """Return the solution, the shortest where columns of unit length are alike.
+
+    Parameters
+    ----------
+    gram : array, shape (..., p, p)
+    moment : array, shape (..., p)
+    """
+    size = np.abs(np.diagonal(gram, axis1=-2, axis2=-1))
+    size = np.sqrt(np.maximum(size, np.finfo(np.float64).tiny))
+    inverse = np.linalg.pinv(gram / (size[..., :, None] * size[..., None, :]))
+    return np.asarray((inverse @ (moment / size)[..., None])[..., 0] / size)
 
 
 def noise_powers(problems: Sequence[Problem], values: Array) -> list[Array]:
