@@ -70,10 +70,10 @@ REMAINS, LITTLE = 1e-3, 0.01
 by less than the second."""
 
 LEAST_SHARE, LEAST_RANGE, LEAST_DELAY_S = 0.02, 0.10, 2e-4
-LEAST_CUFF, MOST_CUFF, FURTHER, ALONE = 0.002, 0.3, 0.03, 3.0
+LEAST_CUFF, MOST_CUFF, FURTHER, ALONE = 0.002, 0.3, 0.03, 1.0
 """How large a term must be: of the torque that the perturbation causes; of J, B or K where one
 changes; a delay; K of the joint over that of a coupling. χ² of a further term, of the first's.
-Without a perturbation linear terms must be so many times as large."""
+Without a perturbation a linear term must lower the logarithm of the noise by the last."""
 
 RIVAL, RIVALS, CLEAR = 0.5, 4, 200.0
 """Rivals have so much of the χ² of the first, and are that many. One that is clearer than the last
@@ -249,6 +249,8 @@ def answer(
         if len(found) == MOST_TERMS:
             break
         sure = [one for one in offered if p[one.name] < chance]
+        if not case.caused and any(not one.linear for one in sure):
+            sure = [one for one in sure if not one.linear]
         gains = _gains(case, state, tested, sure)
         strongest = strongest or max((gain for gain, _ in gains.values()), default=0.0)
         # The gain of a coupling is that of a straight column, and it bends.
@@ -385,16 +387,21 @@ def _caused(case: Case, state: State) -> list[Motion]:
     return found
 
 
-def _instruments(case: Case, state: State, tested: Sequence[tuple[Term, Array]]) -> list[Complex]:
-    """Return the whitened instruments of each epoch; epochs that share them share the object."""
+def _instruments(
+    case: Case, state: State, tested: Sequence[tuple[Term, Array]], last: int = 0
+) -> list[Complex]:
+    """Return the whitened instruments of each epoch; epochs that share them share the object.
+
+    With `last` only so many rows from the end.
+    """
     made: dict[int, Complex] = {}
     found = []
-    for one, motion, power in zip(
-        case.observations, _caused(case, state), state.powers, strict=True
-    ):
+    motions = _caused(case, state) if case.caused else case.measured
+    for one, motion, power in zip(case.observations, motions, state.powers, strict=True):
         if id(motion) not in made:
             weight = one.excited / np.sqrt(power) if one.periods > 1 else 1 / np.sqrt(power)
-            made[id(motion)] = _rows(motion, state, tested)[0][1:] * weight
+            rows = _rows(motion, state, tested)[0][1:] * weight
+            made[id(motion)] = rows[-last:]
         found.append(made[id(motion)])
     return found
 
@@ -554,11 +561,11 @@ def _gains(
         if term.resists and not one.values[0] > 0:
             continue
         gain, inner = one.explained - 2 * len(tested.model.tested[term.name]), term.first[0]
-        if len(term.inner) > 1 and term.bent is None and case.caused:
-            model = tested.model
-            instruments = _instruments(case, state, [(term, term.inner)])
-            own = [one[-len(term.inner) :] for one in instruments]
-            each = explained(own, model.parts, model.base, tested.left)
+        if len(term.inner) > 1 and term.bent is None:
+            each = explained(
+                _instruments(case, state, [(term, term.inner)], len(term.inner)),
+                tested.model.parts, tested.model.base, tested.left,
+            )  # fmt: skip
             gain, inner = float(np.max(each)) - 4, term.inner[int(np.argmax(each))]
         found[term.name] = gain, inner
     return found
@@ -588,7 +595,7 @@ def _chosen(
             size, least = size_of(case, new)
         except ValueError:
             continue
-        if size < least * (ALONE if term.linear and not case.caused else 1.0):
+        if size < least or (not case.caused and term.linear and not _clear(state, new)):
             continue
         found.append((new, size))
         late = term.name in (*_LATE, "reflex")
@@ -602,6 +609,12 @@ def _chosen(
     if not case.caused:
         return min(found, key=lambda one: _unlikely(one[0].powers))
     return min(found, key=lambda one: _remains(case, one[0], tested, best)[0])
+
+
+def _clear(state: State, new: State) -> bool:
+    """Return whether the power of the residual falls as far as torque of a subject does not let it."""
+    lines = sum(one.size for one in state.powers)
+    return _unlikely(state.powers) - _unlikely(new.powers) > ALONE * lines
 
 
 def _unlikely(powers: Sequence[Array]) -> float:

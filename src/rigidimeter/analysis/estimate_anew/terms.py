@@ -400,14 +400,14 @@ TERMS: tuple[Term, ...] = (
     *(
         Term(
             f"{p} over time", unit, f"{p} that changes", _varying(j, _in_time(1, DEGREE)),
-            own=True, linear=True, finding="varying_with_time",
+            own=True, finding="varying_with_time",
         )
         for j, (p, unit) in enumerate(_UNITS.items())
     ),
     *(
         Term(
             f"{p} over phase", _UNITS[p], f"{p} that goes with the phase",
-            _varying(j, _in_phase), linear=True, finding="varying_with_phase",
+            _varying(j, _in_phase), finding="varying_with_phase",
         )
         for j, p in ((1, "B"), (2, "K"))
     ),
