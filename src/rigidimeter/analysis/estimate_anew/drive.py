@@ -70,7 +70,7 @@ PASSED_HZ = 10.0  # an angle is used as the velocity through a low-pass with thi
 EDGES_TICKS = (0, 1, *sorted(step << octave for octave in range(13) for step in (2, 3)))
 MOST_STEPS, ENOUGH = 12, 1e-6  # of a search; the last share of the power to gain
 STEP = 1e-4  # of a coordinate, for its slope
-FAR = 20.0  # a delay is not searched where more times the power of others is left near it
+FAR = 1e3  # a delay is not searched where more times the power of others is left near it
 
 WORTH = 0.02  # a further pole is tried where past commands explain this share of what is left
 # A drive that leaves no more than so many times the power of the best, and this share of the SD of
@@ -349,7 +349,8 @@ def _climbed(record: _Record, start: DriveModel) -> list[_Fitted]:
                 return _climbed(rubbed.record, rubbed.model)
         if done:
             break
-    single = [_coordinates(one, record.interval_s, 1) for one in (*models, *regressed.get(1, []))]
+    near = [*models, *regressed.get(1, []), *(one.model for one in found[:2])]
+    single = [_coordinates(one, record.interval_s, 1) for one in near]
     found.append(_best(record, single, 0, best.power))
     return sorted(found, key=lambda one: (one.place.size, one.zeros))
 
@@ -370,7 +371,7 @@ def _best(record: _Record, begins: Sequence[Array], zeros: int, least: float) ->
     places += [np.append(still.place[:-1], late) for late in ticks]
     places.append(still.place + step[: delay + 1])
     late = min((_answer(record, one, zeros) for one in places), key=_power)
-    if late.power > FAR * least:
+    if ticks.size and late.power > FAR * (least + UNSEEN**2):
         return still
     moved = _searched(record, late.place, zeros, True)
     shown = 1.0 - ERRORS**2 / record.measured.size if len(record.inputs) == 1 else 1.0 / RUBBED
@@ -536,7 +537,8 @@ def _shapes(poles: tuple[complex, ...], zeros: int) -> Complex:
 
 def _coordinates(drive: DriveModel, interval_s: float, poles: int, beside: float = 1.0) -> Array:
     """Return where a search with so many poles begins at a drive."""
-    everyone = with_conjugates(sorted(drive.poles_rad_s, key=lambda pole: -abs(pole.imag)))[:poles]
+    slowest = sorted(drive.poles_rad_s, key=lambda pole: (pole.imag == 0, abs(pole)))
+    everyone = with_conjugates(slowest)[:poles]
     everyone += [complex(-abs(everyone[0]) * beside**n)
                  for n in range(1, poles - len(everyone) + 1)]  # fmt: skip
     found: list[float] = []
