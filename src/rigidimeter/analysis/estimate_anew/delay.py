@@ -76,7 +76,9 @@ class Found(NamedTuple):
 Observe = Callable[[Sequence[Ready]], list[Observation]]
 
 
-def delay_of(source: str, epochs: Sequence[Ready], known: bool, observed: Observe) -> Delay:
+def delay_of(
+    source: str, epochs: Sequence[Ready], observed: Sequence[Observation], again: Observe
+) -> Delay:
     """Return how late the torque of a recording is, and whether that is corrected.
 
     Parameters
@@ -84,19 +86,20 @@ def delay_of(source: str, epochs: Sequence[Ready], known: bool, observed: Observ
     source : str
     epochs : sequence of Ready
         Of the recording, those that can be fitted.
-    known : bool
-        Whether their perturbation was recorded, so that it is the instrument.
-    observed : callable
-        Observes epochs so; ValueError says why it cannot.
+    observed : sequence of Observation
+        The same at their lines, with what the perturbation causes where that was recorded.
+    again : callable
+        Observes epochs whose torque was moved; ValueError says why it cannot.
     """
-    used = list(epochs[:MOST_EPOCHS])
+    used, plain = epochs[:MOST_EPOCHS], observed[:MOST_EPOCHS]
     if not used:
         return Delay(source, remark="no perturbation epoch tells the channels' delay")
-    estimation, pose = used[0].settings.estimation, instrumental if known else direct
+    estimation, pose = used[0].settings.estimation, direct
+    if plain[0].cause is not None:
+        pose = instrumental
     longest_s = estimation.max_delay_s
     try:
-        plain = observed(used)
-        found = _settled(used, plain, pose, observed, longest_s)
+        found = _settled(used, plain, pose, again, longest_s)
     except ValueError as error:
         return Delay(source, remark=f"the delay of the torque was not estimated: {error}")
     if found is None or abs(found.delay_s) > longest_s - SCAN_STEP_S / 2:

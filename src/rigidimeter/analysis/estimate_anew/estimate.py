@@ -27,7 +27,7 @@ from rigidimeter.analysis.estimate_anew.activity import activities
 from rigidimeter.analysis.estimate_anew.answer import answer
 
 findings_of = getattr(_a, "findings_of", lambda *_: ())
-from rigidimeter.analysis.estimate_anew.between import band_estimates, between_epochs
+from rigidimeter.analysis.estimate_anew.between import band_estimates, band_finding, between_epochs
 from rigidimeter.analysis.estimate_anew.checks import (
     Pull,
     excitation,
@@ -141,6 +141,9 @@ class Recorded(NamedTuple):
         Those that are scored, as recorded.
     delays : tuple of Delay
         How late the torque of each recording is; empty where that was not wanted.
+    observed : tuple of Observation or str
+        The perturbed epochs at their lines, as the delays were found; with what the perturbation
+        causes where that was recorded.
     """
 
     epochs: tuple[Epoch, ...]
@@ -148,6 +151,7 @@ class Recorded(NamedTuple):
     perturbed: tuple[Ready, ...]
     imposed: tuple[Epoch, ...]
     delays: tuple[Delay, ...] = ()
+    observed: tuple[Observation | str, ...] = ()
 
     def analysed(self, *, as_recorded: bool) -> list[Ready]:
         """Return the epochs of both kinds, perturbed ones first, on one clock or as recorded."""
@@ -233,11 +237,19 @@ def prepare(
         )
         for whole, (epoch, activity) in zip(measured, active, strict=True)
     ]
+    causes: list[tuple[Array, Cause]] = []
+    observed = [
+        _observed(one, None if no_instrument(one.epoch) else causes) if clocks else ""
+        for one in ready
+    ]
     delays = []
     for source in sources if clocks else ():
-        delays.append(_delay_of(source, [one for one in ready if one.epoch.source == source]))
+        own = [i for i, one in enumerate(ready) if one.epoch.source == source]
+        delays.append(_delay_of(source, [ready[i] for i in own], [observed[i] for i in own]))
         progress(1.0 / len(sources))
-    return Recorded(everyone, settings, tuple(ready), tuple(imposed), tuple(delays))
+    return Recorded(
+        everyone, settings, tuple(ready), tuple(imposed), tuple(delays), tuple(observed)
+    )
 
 
 def _drive_of(source: str, epochs: Sequence[Epoch], settings: Settings) -> Drive | None:
@@ -249,15 +261,16 @@ def _drive_of(source: str, epochs: Sequence[Epoch], settings: Settings) -> Drive
     return find_drive(sound, settings)
 
 
-def _delay_of(source: str, ready: Sequence[Ready]) -> Delay:
-    sound = [one for one in ready if not one.obstacle]
-    known = [one for one in sound if not no_instrument(one.epoch)]
+def _delay_of(source: str, ready: Sequence[Ready], observed: Sequence[Observation | str]) -> Delay:
+    both = [(r, o) for r, o in zip(ready, observed, strict=True) if isinstance(o, Observation)]
+    known = [one for one in both if one[1].cause is not None]
+    causes: list[tuple[Array, Cause]] | None = [] if known else None
 
-    def observed(epochs: Sequence[Ready]) -> list[Observation]:
-        causes: list[tuple[Array, Cause]] | None = [] if known else None
+    def again(epochs: Sequence[Ready]) -> list[Observation]:
         return [_observation(one, causes) for one in epochs]
 
-    return delay_of(source, known or sound, bool(known), observed)
+    used = known or both
+    return delay_of(source, [one for one, _ in used], [seen for _, seen in used], again)
 
 
 def _observation(
@@ -276,19 +289,42 @@ def _observation(
     return observe(part, settings, drive, loop, causes, periodic=periodic)
 
 
-def observed_for(method: Method, epochs: Sequence[Ready]) -> list[Observation | str]:
+def _observed(
+    ready: Ready, causes: list[tuple[Array, Cause]] | None, *, periodic: bool = False
+) -> Observation | str:
+    """Return `_observation`, or why there is none."""
+    try:
+        return _observation(ready, causes, periodic=periodic)
+    except ValueError as error:
+        return str(error)
+
+
+def observed_for(
+    method: Method, epochs: Sequence[Ready], recorded: Recorded | None = None
+) -> list[Observation | str]:
     """Return epochs as a method sees them, or why it cannot.
 
     Epochs with one perturbation share what it causes. A method without a pose is checked with
     the lines of the motion alone.
+
+    Parameters
+    ----------
+    method : Method
+    epochs : sequence of Ready
+    recorded : Recorded, optional
+        Whose epochs they are: what was observed already, and not moved, is not observed again.
     """
     causes: list[tuple[Array, Cause]] | None = [] if method.uses_perturbation else None
+    known: dict[int, Observation | str] = {}
+    if recorded is not None and not method.periodic:
+        known = dict(zip(map(id, recorded.perturbed), recorded.observed, strict=True))
     found: list[Observation | str] = []
     for one in epochs:
-        try:
-            found.append(_observation(one, causes, periodic=method.periodic))
-        except ValueError as error:
-            found.append(str(error))
+        seen = known.get(id(one), "")
+        if isinstance(seen, Observation) and (seen.cause is None) == (causes is None):
+            found.append(seen)
+        else:
+            found.append(_observed(one, causes, periodic=method.periodic))
     return found
 
 
@@ -433,13 +469,14 @@ def estimate_recorded(
     delays = () if estimator.as_recorded else recorded.delays
     every = recorded.analysed(as_recorded=estimator.as_recorded)
     epochs, imposed = every[: len(recorded.perturbed)], every[len(recorded.perturbed) :]
-    observed = observed_for(estimator, epochs)
+    observed = observed_for(estimator, epochs, recorded)
     progress(0.3)
     fitted = _fitted(estimator, epochs, observed, None, delays, pooled=not fits_alone)
     progress(0.2)
+    pulls = [_pull(estimator, seen, fit) for seen, fit in zip(observed, fitted.fits, strict=True)]
     fits = [
-        _checked(estimator, ready, seen, fit, delays)
-        for ready, seen, fit in zip(epochs, observed, fitted.fits, strict=True)
+        _checked(estimator, *each, delays)
+        for each in zip(epochs, observed, fitted.fits, pulls, strict=True)
     ]
     counted = [_closed_as(one, fit) for one, fit in zip(epochs, fits, strict=True)]
     if not fits_alone and any(a is not b for a, b in zip(counted, epochs, strict=True)):
@@ -448,7 +485,7 @@ def estimate_recorded(
     pooled: list[Fit] = fitted.pooled
     bands: list[BandEstimate] = []
     if not fits_alone:
-        fits, pooled, bands = _together(estimator, counted, observed, fits, fitted)
+        fits, pooled, bands = _together(estimator, counted, observed, fits, fitted, pulls, delays)
     progress(0.3)
     included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
     inertia_kg_m2 = float(np.median(included)) if included else float("nan")
@@ -552,16 +589,25 @@ def _closed_as(ready: Ready, fit: Fit) -> Ready:
     return ready._replace(epoch=replace(ready.epoch, closed=fit.outcome))
 
 
+def _pull(method: Method, seen: Observation | str, fit: Fit) -> Pull:
+    """Return what torque of the subject does to a fit."""
+    if method.uses_perturbation or fit.n_samples == 0 or not isinstance(seen, Observation):
+        return Pull(instruments=method.uses_perturbation)
+    return of_fit.pull_of(seen, fit, by_noise=method.by_noise)
+
+
 def _checked(
-    method: Method, ready: Ready, seen: Observation | str, fit: Fit, delays: Sequence[Delay]
+    method: Method,
+    ready: Ready,
+    seen: Observation | str,
+    fit: Fit,
+    pull: Pull,
+    delays: Sequence[Delay],
 ) -> Fit:
     """Return the fit with what the checks of its epoch found, excluded if one of them says so."""
     fit = replace(fit, activity=ready.activity)
     if fit.n_samples == 0 or not isinstance(seen, Observation):
         return fit  # it has said why
-    pull = Pull(instruments=True)
-    if not method.uses_perturbation:
-        pull = of_fit.pull_of(seen, fit, by_noise=method.by_noise)
     delay = next((one for one in delays if one.source == fit.source), None)
     findings = list(_findings(method, ready, seen, fit, pull, delay))
     serious = [one for one in findings if one.level == "exclude"]
@@ -583,8 +629,6 @@ def _findings(
     yield from motion.emg_activity(ready.epoch, ready.activity, fit, whole, ready.settings, pull)
     if not pull.instruments:
         yield from late_torque(seen, fit, delay)
-    if ready.drive is None:
-        yield from of_fit.between_samples(ready.epoch, fit, pull, ready.settings, delay)
 
 
 def _with_active(method: Method, ready: Ready) -> Fit | None:
@@ -602,37 +646,61 @@ def _together(
     observed: Sequence[Observation | str],
     fits: Sequence[Fit],
     fitted: Fitted,
+    pulls: Sequence[Pull],
+    delays: Sequence[Delay],
 ) -> tuple[list[Fit], list[Fit], list[BandEstimate]]:
     """Return fits and pooled fits with what epochs of a condition show together, and bands."""
-    settings = epochs[0].settings if epochs else None
-    found_in: dict[str, list[Finding]] = {}
+    told: dict[str, list[Finding]] = {}
     bands: list[BandEstimate] = []
     for condition, (solution, values) in _shared(method, epochs, observed, fits, fitted).items():
-        assert settings is not None  # there are epochs
-        members = [f for f in fits if f.outcome.included and f.condition == condition]
-        pool = next((one for one in fitted.pooled if one.condition == condition), None)
         seen = [one.observation for one in solution.problems]
+        pool = next((one for one in fitted.pooled if one.condition == condition), None)
         if seen[0].cause is not None:
             bands += band_estimates(seen, values, pool if method.uses_perturbation else None)
-        labels = tuple(one.epoch for one in members)
-        found_in[condition] = [
+        labels = tuple(f.epoch for f in fits if f.outcome.included and f.condition == condition)
+        told[condition] = [
             replace(one, condition=condition, epochs=labels)
-            for one in findings_of(answer(solution), solution, settings)
+            for one in findings_of(answer(solution), solution, seen[0].settings)
         ]
-    alone = [
-        in_half_intervals(replace(one, findings=(*one.findings, *found_in.get(one.condition, ()))))
-        if one.outcome.included
-        else one
-        for one in fits
-    ]
+
+    def with_shared(fit: Fit, more: Sequence[Finding], settings: Settings) -> Fit:
+        shared = told.get(fit.condition, [])
+        own = [one for one in bands if one.condition == fit.condition]
+        if not shared and own:  # what has no other name
+            labels = tuple(f.epoch for f in fits if f.outcome.included)
+            shared = [
+                replace(one, condition=fit.condition, epochs=labels)
+                for one in band_finding(fit, own, settings.diagnostics)
+            ]
+        return in_half_intervals(replace(fit, findings=(*fit.findings, *shared, *more)))
+
+    alone = []
+    for ready, fit, pull in zip(epochs, fits, pulls, strict=True):
+        if not fit.outcome.included:
+            alone.append(fit)
+            continue
+        delay = next((one for one in delays if one.source == fit.source), None)
+        missing, more = told.get(fit.condition, []), []
+        if ready.drive is None:
+            more = of_fit.between_samples(ready.epoch, fit, pull, ready.settings, delay, missing)
+        alone.append(with_shared(fit, more, ready.settings))
     pooled = []
     for pool in fitted.pooled:
         own = [f for f in alone if f.outcome.included and pool.condition in ("", f.condition)]
-        more = list(found_in.get(pool.condition, ()))
-        if pool.condition and settings is not None:
-            one = between_epochs(own, method.uses_perturbation, settings.diagnostics)
-            more += [] if one is None else [one]
-        pool = in_half_intervals(replace(pool, findings=(*pool.findings, *more)))
+        settings = epochs[0].settings
+        biases = [
+            pull.bias
+            for pull, fit in zip(pulls, alone, strict=True)
+            if pull.bias is not None and any(fit is one for one in own)
+        ]
+        more = []
+        if biases:
+            mean = Pull(np.mean(biases, axis=0), method.by_noise)
+            more = of_fit.loop_bias(pool, mean, settings.diagnostics)
+        differing = between_epochs(own, method.uses_perturbation, settings.diagnostics)
+        if pool.condition and differing is not None:
+            more = [*more, differing]
+        pool = with_shared(pool, more, settings)
         pooled.append(replace(pool, findings=(*pool.findings, *_of_every(pool, own))))
     return alone, pooled, bands
 

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import scipy
+from numpy.lib.stride_tricks import sliding_window_view
 
 from rigidimeter.analysis.estimate_anew.checks import Pull, at_least, at_most, found
 from rigidimeter.analysis.estimate_anew.grid import SAME_TIME, Array, Complex
@@ -152,8 +153,16 @@ def coherence(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
     lines = np.stack([perturbation_lines(seen), seen.torque_nm, seen.motion[:, 1]])
     few, rate_hz = in_time(seen, lines)
     length = scipy.fft.prev_fast_len(max(2 * few.shape[1] // (SEGMENTS + 1), 8), real=True)
-    frequency, shared = scipy.signal.coherence(few[0], few[1:], rate_hz, nperseg=length)
-    medians = np.median(shared[:, lines_inside(frequency, _band_hz(seen))], axis=1).tolist()
+    parts = sliding_window_view(few, length, axis=1)[:, :: length - length // 2]
+    parts = (parts - np.mean(parts, axis=2, keepdims=True)) * scipy.signal.windows.hann(length)
+    inside = lines_inside(scipy.fft.rfftfreq(length, 1.0 / rate_hz), _band_hz(seen))
+    cause, *effects = scipy.fft.rfft(parts)[:, :, inside]
+    of_cause, *power = (np.mean(np.abs(one) ** 2, axis=0) for one in (cause, *effects))
+    both = (np.mean(cause.conj() * one, axis=0) for one in effects)
+    medians = [
+        float(np.median(np.abs(one) ** 2 / (of_cause * own)))
+        for one, own in zip(both, power, strict=True)
+    ]
     value, weaker = min(zip(medians, ("torque", "velocity"), strict=True))
     more = by_push(fit, pull, settings, signal=weaker, percent=100.0 * value)
     return at_least("coherence", settings, value, settings.min_coherence, **more)
