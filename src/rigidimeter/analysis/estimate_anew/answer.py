@@ -15,50 +15,27 @@ response to the perturbation, or where it could change none of them by 1 %; else
 
 Where no perturbation was recorded the motion is its own instrument, and whatever the subject does
 by the loop is linear. Terms that are not linear are then tested in what no free linear filter of
-the motion explains; linear ones must be larger; rivals are compared by the power of the residual.
+the motion explains, and come first; linear ones must explain most of the noise; rivals are compared
+by the power of the residual.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigidimeter.analysis.estimate_anew import score as by
+from rigidimeter.analysis.estimate_anew import terms as of
 from rigidimeter.analysis.estimate_anew.checks import found as said
 from rigidimeter.analysis.estimate_anew.grid import SAME_TIME, Array, Complex
 from rigidimeter.analysis.estimate_anew.observation import Observation, torque_filter_of
-from rigidimeter.analysis.estimate_anew.score import (
-    EVERY,
-    Part,
-    Place,
-    Score,
-    Sums,
-    blocks,
-    explained,
-    fitted,
-    free_filter,
-    holm,
-    real,
-    residuals,
-    score,
-    solved,
-    sums_of,
-)
+from rigidimeter.analysis.estimate_anew.score import EVERY, Part, Place, Score, real
 from rigidimeter.analysis.estimate_anew.signals import values_at, velocity_at
 from rigidimeter.analysis.estimate_anew.solve import Problem, Solution, noise_powers
-from rigidimeter.analysis.estimate_anew.terms import (
-    ANY_LINEAR,
-    FILTER,
-    FINER,
-    MOVEMENT,
-    TERMS,
-    Motion,
-    Term,
-    over_phase,
-    over_time,
-)
+from rigidimeter.analysis.estimate_anew.terms import TERMS, Motion, Term
 from rigidimeter.core.findings import Effect, Fact, Finding
 from rigidimeter.core.records import PARAMETERS
 from rigidimeter.core.settings import DiagnosticsSettings, Settings
@@ -91,22 +68,23 @@ loop reaches 0.5 of the first at its slowest line."""
 FAINT = 0.01
 """Of the window: what was simulated rings at its end."""
 
-JOINT: tuple[Place, ...] = ((0, EVERY), (1, EVERY), (2, EVERY))
+PLACES, INNER_TIME, INNER_ANGLE = 61, 0.8, (0.05, 0.95)
+"""Where a parameter that changes is looked at: at the ends polynomials follow the noise."""
+
 _LATE = ("delay", "cuff", "filter")
 _ELASTIC = ("stiffness by side", "stiffness by angle", "K over phase")
 NOT_BESIDE = {name: _LATE for name in _LATE} | {name: _ELASTIC for name in _ELASTIC}
-"""What is no longer looked for beside a term that was found."""
+"""What is no longer looked for beside a term that was found: one cause has one name."""
 
-PLACES, INNER_TIME, INNER_ANGLE = 61, 0.8, (0.05, 0.95)
-"""Where a parameter that changes is looked at: at the ends polynomials follow the noise."""
+NONE = np.zeros(0)
 
 
 class Taken(NamedTuple):
     """A term in the model, its inner parameters and coefficients (none before they are known)."""
 
     term: Term
-    inner: Array
-    values: Array = np.zeros(0)
+    inner: Array = NONE
+    values: Array = NONE
 
     @property
     def moving(self) -> NDArray[np.bool_]:
@@ -122,6 +100,23 @@ class Taken(NamedTuple):
             found[1:] *= self.values[0]
         return found
 
+    def moved(self, values: Array, steps: Array) -> tuple[Taken, float]:
+        """Return it at new values, inner parameters moved, and by what share it changed."""
+        inner, before = self.inner.copy(), self.inner if self.term.bent else self.values
+        if self.term.bent is not None:
+            inner[: values.size] += values
+        elif self.values.size and inner.size:
+            most = MOST_STEPS * self.term.steps[self.moving]
+            inner[self.moving] += np.clip(steps, -most, most)
+        inner = np.clip(inner, self.term.low, self.term.high) if inner.size else inner
+        after = inner if self.term.bent else values
+        if before.size != after.size:
+            return Taken(self.term, inner, values), 1.0
+        size = np.max(np.abs(after), initial=by.TINY)
+        return Taken(self.term, inner, values), float(
+            np.max(np.abs(after - before), initial=0.0) / size
+        )
+
 
 class State(NamedTuple):
     """Where the model is linearised: J, B, K, the power of the noise of every epoch, terms."""
@@ -129,6 +124,11 @@ class State(NamedTuple):
     joint: Array
     powers: Sequence[Array]
     taken: tuple[Taken, ...] = ()
+
+    @property
+    def unlikely(self) -> float:
+        """The logarithm of the noise, summed over lines and epochs."""
+        return sum(float(np.sum(np.log(one))) for one in self.powers)
 
     def beside(self, *more: Taken) -> State:
         """Return it with more terms."""
@@ -155,27 +155,27 @@ class Found(NamedTuple):
     term : Term
     p : float
         By Holm's method.
+    size : float
+        As a share of the torque, of J, B or K, or in s.
     values, half : array
         Coefficients, or the parameters of a term that bends the model; half their 95 % intervals.
     covariance : array
         Of the values.
     inner, inner_half : array, shape (d,)
         NaN where it was not fitted.
-    size : float
-        As a share of the torque, of J, B or K, or in s.
     effect : array, shape (3,)
         What leaving it out adds to J, B and K.
     """
 
     term: Term
     p: float
-    values: Array
-    half: Array
-    covariance: Array
-    inner: Array
-    inner_half: Array
     size: float
-    effect: Array
+    values: Array = NONE
+    half: Array = NONE
+    covariance: Array = NONE
+    inner: Array = NONE
+    inner_half: Array = NONE
+    effect: Array = NONE
 
 
 class Answer(NamedTuple):
@@ -183,16 +183,14 @@ class Answer(NamedTuple):
 
     Attributes
     ----------
-    joint, half, degrees : array, shape (3,)
-        J, B, K, half their 95 % intervals, and degrees of freedom.
+    joint, half : array, shape (3,)
+        J, B, K and half their 95 % intervals.
     covariance : array, shape (3, 3)
     found : tuple of Found
     p : dict
         Of every term beside J, B and K alone, by Holm's method.
-    remains : float
-        p of what is linear and remains; NaN without a perturbation.
-    left : float
-        Its share of the torque that the perturbation causes.
+    remains, left : float
+        p of what is linear and remains, NaN without a perturbation, and its share of the torque.
     change : array, shape (3,)
         How J, B and K change where low lines count more.
     answered : bool
@@ -201,7 +199,6 @@ class Answer(NamedTuple):
 
     joint: Array
     half: Array
-    degrees: Array
     covariance: Array
     found: tuple[Found, ...]
     p: dict[str, float]
@@ -214,11 +211,7 @@ class Answer(NamedTuple):
 
 
 def answer(
-    solution: Solution,
-    *,
-    person: bool = True,
-    more: Sequence[Term] = (),
-    chance: float = CHANCE,
+    solution: Solution, *, person: bool = True, more: Sequence[Term] = (), chance: float = CHANCE
 ) -> Answer:
     """Return what the torque of a condition holds, and J, B and K beside it.
 
@@ -236,15 +229,15 @@ def answer(
     state = State(solution.values, list(solution.powers))
     case = with_phases(case_of(solution.problems), state)
     if not case.caused and case.measured[0].phase is not None:
-        state = settled(case, state.beside(Taken(MOVEMENT, np.zeros(0))))
+        state = settled(case, state.beside(Taken(of.MOVEMENT)))
     offered = [one for one in (*TERMS, *more) if _offered(case, one, person)]
     first: dict[str, float] = {}
-    found: list[tuple[Taken, float, float]] = []
+    found: list[Found] = []
     strongest = 0.0
     while True:
         tested = _tested(case, state, offered)
         names = [one.name for one in offered]
-        p = dict(zip(names, holm([tested.scores[name].p for name in names]), strict=True))
+        p = dict(zip(names, by.holm([tested.scores[one].p for one in names]), strict=True))
         first = first or p
         if len(found) == MOST_TERMS:
             break
@@ -254,41 +247,38 @@ def answer(
         gains = _gains(case, state, tested, sure)
         strongest = strongest or max((gain for gain, _ in gains.values()), default=0.0)
         # The gain of a coupling is that of a straight column, and it bends.
-        gains = {n: one for n, one in gains.items() if one[0] > FURTHER * strongest or n == "cuff"}
-        chosen = _chosen(case, state, tested, [one for one in sure if one.name in gains], gains)
+        sure = [one for one in sure if one.name in gains
+                and (one.name == "cuff" or gains[one.name][0] > FURTHER * strongest)]  # fmt: skip
+        chosen = _chosen(case, state, tested, sure, gains)
         if chosen is None:
             break
         state, size = chosen
-        taken = state.taken[-1]
-        found.append((taken, p.get(taken.term.name, min(p.values())), size))
-        if taken.term.name in FINER:
-            state = settled(case, state.beside(Taken(FINER[taken.term.name], np.zeros(0))))
-        gone = {taken.term.name, *NOT_BESIDE.get(taken.term.name, ())}
+        term = state.taken[-1].term
+        found.append(Found(term, p.get(term.name, min(p.values())), size))
+        if term.name in of.FINER:
+            state = settled(case, state.beside(Taken(of.FINER[term.name])))
+        gone = {term.name, *NOT_BESIDE.get(term.name, ())}
         offered = [one for one in offered if one.name not in gone]
-    return _answered(
-        case, state, tested.model, tested.scores[ANY_LINEAR.name], solution, found, first
-    )
+    return _answered(case, state, tested, solution, found, first)
 
 
 def case_of(problems: Sequence[Problem]) -> Case:
     """Return what is known of epochs, whatever J, B and K."""
     measured = []
     for one in problems:
-        observation, grid = one.observation, one.observation.grid
-        channel = observation.epoch.channels["torque_nm"]
+        seen, grid = one.observation, one.observation.grid
+        channel = seen.epoch.channels["torque_nm"]
         torque = grid.lines(values_at(channel, grid.time_s, SAME_TIME), 2).T
         # Where the torque of an observation was made earlier, its lines alone were turned.
         torque = torque * (one.target / torque[:, 0])[:, None]
         through: Complex | float = 1.0
-        if (through_filter := torque_filter_of(observation.settings)) is not None:
+        if (through_filter := torque_filter_of(seen.settings)) is not None:
             through = lowpass(np.asarray(1j * grid.omega_rad_s), *through_filter)
-        unseen = -observation.changes[0] if len(observation.changes) else 0.0
-        measured.append(
-            Motion(
-                grid, *observation.coarse, one.regressors, torque, np.zeros(3), through, True,
-                None, unseen, velocity_at(observation.epoch, grid.time_s),
-            )
-        )  # fmt: skip
+        velocity, angle = seen.coarse
+        motion = Motion(grid, velocity, angle, one.regressors, torque, np.zeros(3), through)
+        unseen = -seen.changes[0] if len(seen.changes) else 0.0
+        every = velocity_at(seen.epoch, grid.time_s)
+        measured.append(motion._replace(unseen=unseen, every=every))
     observations = [one.observation for one in problems]
     caused = all(one.cause is not None for one in observations)
     return Case(observations, measured, [one.instruments for one in problems], caused)
@@ -299,22 +289,19 @@ def with_phases(case: Case, state: State) -> Case:
 
     That is a motion at one slow frequency in every epoch which the perturbation does not cause.
     """
-    causes = _caused(case, state) if case.caused else case.measured
     found = []
-    for own, cause in zip(case.measured, causes, strict=True):
-        w, T, n = own.grid.coarse_window[0], own.grid.duration_s, own.angle.size
-        rest = own.angle
+    for own, cause in zip(case.measured, _motions(case, state), strict=True):
+        w, n, rest = own.grid.coarse_window[0], own.angle.size, own.angle
         if case.caused:
             x = (cause.angle - cause.angle.mean()) * w
             rest = rest - cause.angle * float((own.angle * w) @ x / (x @ x))
-        power = np.abs(np.fft.rfft((rest - rest.mean()) * w)) ** 2
-        all_of_it = float(np.sum(np.abs(np.fft.rfft((own.angle - own.angle.mean()) * w)) ** 2))
-        first, last = int(np.ceil(FEWEST_CYCLES)), int(min(FASTEST_HZ * T, n // 2 - 3))
-        if last <= first:
+        power, whole = (np.abs(np.fft.rfft((x - x.mean()) * w)) ** 2 for x in (rest, own.angle))
+        last = int(min(FASTEST_HZ * own.grid.duration_s, n // 2 - 3))
+        if last <= FEWEST_CYCLES:
             return case
-        peak = first + int(np.argmax(power[first : last + 1]))
+        peak = FEWEST_CYCLES + int(np.argmax(power[FEWEST_CYCLES : last + 1]))
         near = np.arange(peak - 2, peak + 3)
-        if power[near].sum() < max(PERIODIC * power[1:].sum(), PERIODIC_OF_ALL * all_of_it):
+        if power[near].sum() < max(PERIODIC * power[1:].sum(), PERIODIC_OF_ALL * whole.sum()):
             return case
         line = float(power[near] @ near / power[near].sum())
         # Mirrored at the end, so that no whole number of cycles leaves a step there.
@@ -339,10 +326,17 @@ def _offered(case: Case, term: Term, person: bool) -> bool:
 
 
 class Model(NamedTuple):
-    """Whitened columns of a state, the places of what is fitted, and which are whose.
+    """The columns of a state.
 
-    `of_terms` and `of_slopes` are where those of each term are among the places; `tested` are the
-    places of each further term.
+    Attributes
+    ----------
+    parts : list of Part
+    base : list of Place
+        Of what is fitted.
+    of_terms, of_slopes : list of slice
+        Where those of each term, and of its slopes, are in the base.
+    tested : dict
+        The places of what is tested, by name.
     """
 
     parts: list[Part]
@@ -352,117 +346,93 @@ class Model(NamedTuple):
     tested: dict[str, list[Place]]
 
 
-def _rows(
-    motion: Motion, state: State, tested: Sequence[tuple[Term, Array]]
-) -> tuple[Complex, list[int]]:
-    """Return the lines of J, B, K and all columns at a state, and how many each term has."""
+Tested = Sequence[tuple[Term, Array]]
+
+
+def _rows(motion: Motion, state: State, tested: Tested) -> list[Complex]:
+    """Return the lines of torque, of J, B, K, and the columns of each term."""
     motion = motion._replace(joint=state.joint)
     for one in state.taken:
-        if one.term.bent is not None:
-            motion = one.term.bent(motion, one.inner)
+        motion = one.term.bent(motion, one.inner) if one.term.bent is not None else motion
     own = [one.columns(motion) for one in state.taken]
     own += [term.columns(motion, inner) for term, inner in tested]
-    return np.concatenate([motion.torque[None, :, 0], motion.lines.T, *own]), [
-        len(one) for one in own
-    ]
+    return [motion.torque[None, :, 0], motion.lines.T, *own]
 
 
-def _caused(case: Case, state: State) -> list[Motion]:
+def _motions(case: Case, state: State) -> list[Motion]:
     """Return what the perturbations cause; epochs that share one share the object."""
-    causes = {id(one.cause): one.cause for one in case.observations}
-    by_cause = {key: one.at(state.joint) for key, one in causes.items() if one is not None}
+    if not case.caused:
+        return case.measured
     made: dict[tuple[int, int], Motion] = {}
     found = []
     for one, own in zip(case.observations, case.measured, strict=True):
         key = id(one.cause), id(own.phase)
-        if key not in made:
-            caused, grid = by_cause[id(one.cause)], one.grid
-            lines, s = one.of_lines(caused.lines), 1j * grid.omega_rad_s
-            torque = (lines @ state.joint)[:, None] * np.stack([np.ones_like(s), s, s * s], axis=1)
-            velocity, angle = caused.coarse * (grid.coarse_window[0] > FAINT)
-            made[key] = Motion(
-                grid, velocity, angle, lines, torque, state.joint, own.through, False, own.phase
-            )
+        if key not in made and one.cause is not None:
+            caused, s = one.cause.at(state.joint), 1j * one.grid.omega_rad_s
+            lines = one.of_lines(caused.lines)
+            torque = (lines @ state.joint)[:, None] * np.stack([s**0, s, s * s], axis=1)
+            velocity, angle = caused.coarse * (one.grid.coarse_window[0] > FAINT)
+            made[key] = own._replace(
+                velocity=velocity, angle=angle, lines=lines, torque=torque, measured=False,
+                unseen=0.0, every=NONE,
+            )  # fmt: skip
         found.append(made[key])
     return found
 
 
-def _instruments(
-    case: Case, state: State, tested: Sequence[tuple[Term, Array]], last: int = 0
-) -> list[Complex]:
+def _instruments(case: Case, state: State, tested: Tested, last: int = 0) -> list[Complex]:
     """Return the whitened instruments of each epoch; epochs that share them share the object.
 
-    With `last` only so many rows from the end.
+    With `last` only so many from the end.
     """
     made: dict[int, Complex] = {}
-    found = []
-    motions = _caused(case, state) if case.caused else case.measured
+    motions = _motions(case, state)
     for one, motion, power in zip(case.observations, motions, state.powers, strict=True):
         if id(motion) not in made:
-            weight = one.excited / np.sqrt(power) if one.periods > 1 else 1 / np.sqrt(power)
-            rows = _rows(motion, state, tested)[0][1:] * weight
-            made[id(motion)] = rows[-last:]
-        found.append(made[id(motion)])
-    return found
+            weight = (one.excited if case.caused else 1.0) / np.sqrt(power)
+            made[id(motion)] = np.concatenate(_rows(motion, state, tested)[1:])[-last:] * weight
+    return [made[id(motion)] for motion in motions]
 
 
-def model_of(
-    case: Case, state: State, tested: Sequence[tuple[Term, Array]] = (), free: bool = False
-) -> Model:
+def model_of(case: Case, state: State, tested: Tested = (), free: bool = False) -> Model:
     """Return the model of a state; `free`: beside a free linear filter in place of J, B and K."""
-    every = [_rows(one, state, tested) for one in case.measured]
-    sizes = every[0][1]
-    base, of_terms, of_slopes, by_itself, column = [*JOINT][3 * free :], [], [], [], 3
-    places: list[list[Place]] = []
-    epochs = range(len(case.observations))
-    for i, size in enumerate(sizes):
-        if i < len(state.taken):
-            term, slopes = state.taken[i].term, int(np.sum(state.taken[i].moving))
-        else:
-            term, slopes = tested[i - len(state.taken)][0], 0
-        own = [
-            (c, e)
-            for e in (epochs if term.own else (EVERY,))
-            for c in range(column, column + size - slopes)
-        ]
+    rows = [_rows(one, state, tested) for one in case.measured]
+    base: list[Place] = [] if free else [(j, EVERY) for j in range(3)]
+    epochs, column = range(len(case.observations)), 3
+    model = Model([], base, [], [], {})
+    itself: list[int] = []
+    moving = [int(np.sum(one.moving)) for one in state.taken] + [0] * len(tested)
+    terms = [*(one.term for one in state.taken), *(term for term, _ in tested)]
+    for i, (term, slopes, own) in enumerate(zip(terms, moving, rows[0][2:], strict=True)):
+        stop = column + len(own)
+        places = [(c, e) for e in (epochs if term.own else (EVERY,))
+                  for c in range(column, stop - slopes)]  # fmt: skip
         if term.parameter is not None:
-            own = [(term.parameter, e) for e in epochs[:-1]]
-        moved = [(c, EVERY) for c in range(column + size - slopes, column + size)]
+            places = [(term.parameter, e) for e in epochs[:-1]]
         if i < len(state.taken):
-            of_terms.append(slice(len(base), len(base) + len(own)))
-            of_slopes.append(slice(len(base) + len(own), len(base) + len(own) + slopes))
-            base += [*own, *moved]
-            by_itself += [c for c, _ in moved] if term.itself else []
+            model.of_terms.append(slice(len(base), len(base) + len(places)))
+            base += places
+            model.of_slopes.append(slice(len(base), len(base) + slopes))
+            base += [(c, EVERY) for c in range(stop - slopes, stop)]
+            itself += range(stop - slopes, stop) if term.itself else ()
         else:
-            places.append(own)
-        column += size
-    parts = []
-    instruments = _instruments(case, state, tested) if case.caused else None
-    courses: dict[int, Array] = {}
-    for e, (rows, _) in enumerate(every):
-        grid = case.measured[e].grid
-        if free:
-            filter_ = free_filter(grid, rows[1:4].T)
-            left = filter_.without(rows)
-            left = left / np.sqrt(filter_.power(left[0]))
-            target, C = left[0], left[1:]
-        else:
-            weighted = rows / np.sqrt(state.powers[e])
-            target, C = weighted[0], weighted[1:]
+            model.tested[term.name] = places
+        column = stop
+    causes = _instruments(case, state, tested) if case.caused else case.instruments
+    for e, (lines, power) in enumerate(zip(rows, state.powers, strict=True)):
+        grid, whole = case.measured[e].grid, np.concatenate(lines)
+        whole = by.without_filter(grid, whole) if free else whole / np.sqrt(power)
+        C: Complex = whole[1:]
         D = C
-        if instruments is not None:
-            D = instruments[e]
-            if by_itself:
+        if case.caused:
+            D = causes[e]
+            if itself:
                 D = D.copy()
-                D[by_itself] = C[by_itself]
+                D[itself] = C[itself]
         elif not free:
-            D = C.copy()
-            D[:3] = case.instruments[e].T / np.sqrt(state.powers[e])
-        if id(D) not in courses:
-            courses[id(D)] = grid.in_time(D)
-        parts.append(Part(grid, D, C, target, courses[id(D)]))
-    names = [term.name for term, _ in tested]
-    return Model(parts, base, of_terms, of_slopes, dict(zip(names, places, strict=True)))
+            D = np.concatenate([causes[e].T / np.sqrt(power), C[3:]])
+        model.parts.append(Part(grid, D, C, whole[0]))
+    return model
 
 
 def settled(case: Case, state: State, rounds: int = ROUNDS) -> State:
@@ -475,80 +445,52 @@ def settled(case: Case, state: State, rounds: int = ROUNDS) -> State:
     """
     for _ in range(rounds):
         model = model_of(case, state)
-        values, inverse = solved(sums_of(model.parts, model.base), model.base)
-        left = residuals(model.parts, model.base, values)
+        fit = by.fitted(model.parts, model.base)
+        each = zip(case.measured, fit.left, state.powers, case.observations, strict=True)
+        none = [m.lines[:, :0] for m in case.measured]
         problems = [
-            Problem(m.lines[:, :0], m.lines[:, :0], e * np.sqrt(power), one)
-            for m, e, power, one in zip(
-                case.measured, left, state.powers, case.observations, strict=True
-            )
+            Problem(no, no, left * np.sqrt(power), one)
+            for no, (_, left, power, one) in zip(none, each, strict=True)
         ]
-        taken, moved = [], 0.0
-        for one, own, slopes in zip(state.taken, model.of_terms, model.of_slopes, strict=True):
-            new, change = _moved(one, values[own], values[slopes])
-            taken.append(new)
-            moved = max(moved, change)
-        step = np.abs(values[:3] - state.joint) / np.sqrt(np.abs(np.diag(inverse)[:3]) / 2)
-        powers = noise_powers(problems, np.zeros(0))
-        state = State(values[:3], powers, tuple(taken))
-        if float(np.max(step)) < SETTLED and moved < SETTLED:
+        moved = [
+            one.moved(fit.values[own], fit.values[slopes])
+            for one, own, slopes in zip(state.taken, model.of_terms, model.of_slopes, strict=True)
+        ]
+        scale = np.sqrt(np.abs(np.diag(fit.inverse)[:3]) / 2)
+        step = float(np.max(np.abs(fit.values[:3] - state.joint) / scale))
+        powers = noise_powers(problems, NONE)
+        state = State(fit.values[:3], powers, tuple(one for one, _ in moved))
+        if max([step, *(share for _, share in moved)]) < SETTLED:
             break
     return state
-
-
-def _moved(one: Taken, values: Array, by: Array) -> tuple[Taken, float]:
-    """Return a term at new values, and by what share they moved."""
-    inner, term = one.inner.copy(), one.term
-    if term.bent is not None:
-        inner[: values.size] += values
-        inner = np.clip(inner, term.low, term.high)
-        return Taken(term, inner, values), float(
-            np.max(np.abs(inner - one.inner) / (np.abs(inner) + 1e-12))
-        )
-    if one.values.size:
-        most = MOST_STEPS * term.steps[one.moving]
-        inner[one.moving] += np.clip(by, -most, most)
-        inner = np.clip(inner, term.low, term.high) if inner.size else inner
-        apart = np.max(np.abs(values - one.values), initial=0.0)
-        share = float(apart / np.max(np.abs(values), initial=1e-300))
-        return Taken(term, inner, values), share
-    return Taken(term, inner, values), 1.0
 
 
 # --- Which term
 
 
 class _Tested(NamedTuple):
-    """The scores of terms beside a state; a model in which a free filter takes the place of J, B, K
-    where no perturbation is the instrument."""
+    """What is tested beside a state, and the scores."""
 
+    fit: by.Fitted
     model: Model
-    free: Model | None
     scores: dict[str, Score]
-    left: list[Complex]
 
 
 def _tested(case: Case, state: State, terms: Sequence[Term]) -> _Tested:
-    tested = [*((one, one.first) for one in terms), (ANY_LINEAR, ANY_LINEAR.first)]
+    tested = [(one, one.first) for one in (*terms, of.ANY_LINEAR)]
     model = model_of(case, state, tested)
-    sums, local, left = _solved(model, model.tested)
-    scores = {name: score(sums, local, model.base, own) for name, own in model.tested.items()}
-    free = None
+    fit, scores = _scores(model, model.tested)
     if not case.caused:
         free = model_of(case, state, tested, free=True)
         bent = {one.name: free.tested[one.name] for one in terms if not one.linear}
-        sums, local, left_free = _solved(free, bent)
-        scores |= {name: score(sums, local, free.base, own) for name, own in bent.items()}
-        del left_free
-    return _Tested(model, free, scores, left)
+        scores |= _scores(free, bent)[1]
+    return _Tested(fit, model, scores)
 
 
-def _solved(
-    model: Model, tested: dict[str, list[Place]]
-) -> tuple[Sums, list[Array], list[Complex]]:
-    sums = sums_of(model.parts, [*model.base, *(p for own in tested.values() for p in own)])
-    left = residuals(model.parts, model.base, solved(sums, model.base)[0])
-    return sums, blocks(model.parts, left), left
+def _scores(model: Model, tested: dict[str, list[Place]]) -> tuple[by.Fitted, dict[str, Score]]:
+    fit = by.fitted(model.parts, model.base, [p for own in tested.values() for p in own])
+    blocks = fit.blocks()
+    return fit, {name: fit.score(blocks, own) for name, own in tested.items()}
 
 
 def _gains(
@@ -558,16 +500,13 @@ def _gains(
     found = {}
     for term in sure:
         one = tested.scores[term.name]
-        if term.resists and not one.values[0] > 0:
-            continue
         gain, inner = one.explained - 2 * len(tested.model.tested[term.name]), term.first[0]
-        if len(term.inner) > 1 and term.bent is None:
-            each = explained(
-                _instruments(case, state, [(term, term.inner)], len(term.inner)),
-                tested.model.parts, tested.model.base, tested.left,
-            )  # fmt: skip
+        if len(term.inner) > 1:
+            looked = _instruments(case, state, [(term, term.inner)], len(term.inner))
+            each = by.explained(looked, tested.fit)
             gain, inner = float(np.max(each)) - 4, term.inner[int(np.argmax(each))]
-        found[term.name] = gain, inner
+        if not (term.resists and one.values[0] <= 0):
+            found[term.name] = gain, inner
     return found
 
 
@@ -582,72 +521,57 @@ def _chosen(
     ranked = sorted(sure, key=lambda term: -gains[term.name][0])
     first = gains[ranked[0].name][0] if ranked else 0.0
     rivals = [one for one in ranked[:RIVALS] if gains[one.name][0] >= RIVAL * first]
-    if any(one.linear and not one.own and one.parameter is None for one in rivals):
-        late = [one for one in ranked if one.name in _LATE and one not in rivals]
-        rivals += [*late, FILTER]
+    if any(one.linear and one.parameter is None for one in rivals):
+        rivals += [one for one in ranked if one.name in _LATE and one not in rivals]
+        rivals.append(of.FILTER)
     found: list[tuple[State, float]] = []
     for term in [*rivals, *(one for one in ranked if one not in rivals)]:
         if found and term not in rivals:
             break
-        inner = gains[term.name][1] if term.name in gains else term.first[0]
         try:
-            new = _with(case, state, term, inner)
-            size, least = size_of(case, new)
+            new = _with(case, state, term, gains.get(term.name, (0.0, term.first[0]))[1])
         except ValueError:
             continue
-        if size < least or (not case.caused and term.linear and not _clear(state, new)):
+        size, least = size_of(case, new)
+        clear = state.unlikely - new.unlikely > ALONE * sum(one.size for one in new.powers)
+        if size < least or (term.linear and not (case.caused or clear)):
             continue
         found.append((new, size))
-        late = term.name in (*_LATE, "reflex")
-        if len(found) == 1 and first > CLEAR and case.caused and not late:
+        if len(found) == 1 and first > CLEAR and case.caused and not term.linear:
             remains, dimension = _remains(case, new, tested, new.powers)
             if remains < dimension + 4 * np.sqrt(2 * dimension):
                 break
     if len(found) < 2:
         return found[0] if found else None
-    best = min((new.powers for new, _ in found), key=_unlikely)
+    best = min((new for new, _ in found), key=lambda one: one.unlikely).powers
     if not case.caused:
-        return min(found, key=lambda one: _unlikely(one[0].powers))
+        return min(found, key=lambda one: one[0].unlikely)
     return min(found, key=lambda one: _remains(case, one[0], tested, best)[0])
 
 
-def _clear(state: State, new: State) -> bool:
-    """Return whether the power of the residual falls as far as torque of a subject does not let it."""
-    lines = sum(one.size for one in state.powers)
-    return _unlikely(state.powers) - _unlikely(new.powers) > ALONE * lines
-
-
-def _unlikely(powers: Sequence[Array]) -> float:
-    return sum(float(np.sum(np.log(one))) for one in powers)
-
-
 def _with(case: Case, state: State, term: Term, inner: Array) -> State:
-    """Return the state settled with one more term."""
-    if term.name == "cuff":
-        state, inner = _coupled(case, state)
-    return settled(case, state.beside(Taken(term, inner)))
+    """Return the state settled with one more term.
 
-
-def _coupled(case: Case, state: State) -> tuple[State, Array]:
-    """Return J, B, K, and c and lag of a soft coupling, where the search for them begins.
-
-    With M (1 + lag s) + c (J s² + B s + K) M = (1 + lag s) (J s² + B s + K) θ the torque is linear
-    in θ and three derivatives, and in two of its own; so many of the caused angle are instruments.
+    A coupling bends the model far. With M (1 + λs) + c (J s² + B s + K) M = (1 + λs) (J s² + B s +
+    K) θ the torque is linear in θ and three derivatives, and in two of its own; instruments are so
+    many of the caused angle. There the search begins.
     """
-    gram, moment = np.zeros((6, 6)), np.zeros(6)
-    causes = _caused(case, state) if case.caused else case.measured
-    for own, cause, power in zip(case.measured, causes, state.powers, strict=True):
-        s, moved = 1j * own.grid.omega_rad_s, (own.lines - own.unseen).T
-        columns = np.stack([*moved[::-1], s * moved[0], -own.torque[:, 1], -own.torque[:, 2]])
-        instruments = cause.lines[:, 2] * s ** np.arange(6)[:, None] if case.caused else columns
-        both = np.concatenate([columns, own.torque[None, :, 0]])
-        found = real(instruments / np.sqrt(power), both / np.sqrt(power))
-        gram, moment = gram + found[:, :-1], moment + found[:, -1]
-    rows = np.abs(gram).max(axis=1)
-    stiff, damped, heavy, third, _, second = np.linalg.solve(gram / rows[:, None], moment / rows)
-    c, lag_s = max(second / heavy, 1e-6), float(np.clip(third / heavy, 0.0, 0.01))
-    joint = np.array([heavy - lag_s * damped, damped - lag_s * stiff, stiff])
-    return state._replace(joint=joint / max(1 - c * stiff, 0.1)), np.array([c, lag_s])
+    if term.name == "cuff":
+        gram, moment = np.zeros((6, 6)), np.zeros(6)
+        motions = _motions(case, state)
+        for own, cause, power in zip(case.measured, motions, state.powers, strict=True):
+            s, moved = 1j * own.grid.omega_rad_s, (own.lines - own.unseen).T
+            columns = np.stack([*moved[::-1], s * moved[0], *-own.torque.T[1:]])
+            looked = cause.lines[:, 2] * s ** np.arange(6)[:, None] if case.caused else columns
+            both = np.concatenate([columns, own.torque[None, :, 0]])
+            found = real(looked / np.sqrt(power), both / np.sqrt(power))
+            gram, moment = gram + found[:, :-1], moment + found[:, -1]
+        rows = np.abs(gram).max(axis=1)
+        K, B, J, third, _, second = np.linalg.solve(gram / rows[:, None], moment / rows)
+        c, lag_s = max(second / J, 1e-6), float(np.clip(third / J, 0.0, 0.01))
+        joint = np.array([J - lag_s * B, B - lag_s * K, K]) / max(1 - c * K, 0.1)
+        state, inner = state._replace(joint=joint), np.array([c, lag_s])
+    return settled(case, state.beside(Taken(term, inner)))
 
 
 def _remains(
@@ -655,19 +579,13 @@ def _remains(
 ) -> tuple[float, float]:
     """Return the χ² of the instruments of all terms in what a state leaves, and how many."""
     model = model_of(case, state._replace(powers=powers))
-    values, _ = solved(sums_of(model.parts, model.base), model.base)
-    left = residuals(model.parts, model.base, values)
+    left = by.fitted(model.parts, model.base).left
     g: Array = np.zeros(())
     own: Array = np.zeros(())
-    for one, e in zip(tested.model.parts, left, strict=True):
-        g, own = (
-            g + real(one.instruments, e[None])[:, 0],
-            own + real(one.instruments, one.instruments),
-        )
-    size = np.sqrt(np.diag(own)) + 1e-300
-    scaled = own / np.outer(size, size)
-    precision = np.linalg.pinv(scaled, rcond=1e-8, hermitian=True)
-    return float(2 * (g / size) @ precision @ (g / size)) + len(model.base), float(len(g))
+    for one, e in zip(tested.fit.parts, left, strict=True):
+        D = one.instruments
+        g, own = g + real(D, e[None])[:, 0], own + real(D, D)
+    return by.quadratic(g, own) + len(model.base), float(len(g))
 
 
 # --- How large
@@ -683,13 +601,11 @@ def size_of(case: Case, state: State) -> tuple[float, float]:
     if term.bent is not None:
         return abs(float(taken.inner[0])), LEAST_DELAY_S
     if term.finding.startswith("varying"):
-        return max(
-            float(np.ptp(functions @ values) / np.abs(state.joint[j] + np.mean(functions @ values)))
-            for j, functions, values, _ in courses(case, taken.term, taken.inner, taken.values)
-        ), LEAST_RANGE
+        goes = [(state.joint[j], functions @ values)
+                for j, functions, values, _ in courses(case, *taken)]  # fmt: skip
+        return max(float(np.ptp(one) / np.abs(at + np.mean(one))) for at, one in goes), LEAST_RANGE
     own = whole = 0.0
-    motions = _caused(case, state) if case.caused else case.measured
-    for motion, power in zip(motions, state.powers, strict=True):
+    for motion, power in zip(_motions(case, state), state.powers, strict=True):
         part = taken.values @ term.columns(motion, taken.inner[None])
         whole += float(np.sum(np.abs(motion.lines @ state.joint) ** 2 / power))
         own += float(np.sum(np.abs(part) ** 2 / power))
@@ -706,22 +622,21 @@ def courses(
     labels = [one.epoch.label for one in case.observations]
     if term.parameter is not None:
         return [(term.parameter, np.eye(len(labels))[:, :-1], values, labels)]
+    x, j = np.linspace(-INNER_TIME, INNER_TIME, PLACES), "JBK".find(term.name[0])
     if term.finding == "varying_with_time":
-        x, j = np.linspace(-INNER_TIME, INNER_TIME, PLACES), "JBK".index(term.name[0])
-        found = []
-        for one, own in zip(case.observations, values.reshape(len(labels), -1), strict=True):
-            at_s = float(one.grid.time_s[0]) + (x + 1) / 2 * one.grid.duration_s
-            found.append((j, over_time(x).T, own, [f"{t:.1f} s" for t in at_s]))
-        return found
+        times_s = [one.grid.time_s[0] + (x + 1) / 2 * one.grid.duration_s
+                   for one in case.observations]  # fmt: skip
+        each = zip(values.reshape(len(labels), -1), times_s, strict=True)
+        return [(j, of.over_time(x).T, own, [f"{t:.1f} s" for t in at_s]) for own, at_s in each]
     if term.finding == "varying_with_phase":
-        x, j = np.linspace(0, 2 * np.pi, PLACES), "JBK".index(term.name[0])
-        return [(j, over_phase(x).T, values, [f"{t:.0f}° of the cycle" for t in np.degrees(x)])]
+        x = np.linspace(0, 2 * np.pi, PLACES)
+        return [(j, of.over_phase(x).T, values, [f"{t:.0f}° of the cycle" for t in np.degrees(x)])]
     angle = np.concatenate([m.angle for m in case.measured])
-    x = np.linspace(*np.quantile(angle, INNER_ANGLE), PLACES)
-    slopes = [2 * x, 3 * x**2]
-    if term.name == "stiffness by side":
-        slopes = [np.tanh((x - inner[1]) / inner[0])]
+    low, high = np.quantile(angle, INNER_ANGLE).tolist()
+    x = np.linspace(low, high, PLACES)
     at = [f"{t:+.1f}° from the mean" for t in np.degrees(x)]
+    by_side = term.name == "stiffness by side"
+    slopes = [np.tanh((x - inner[1]) / inner[0])] if by_side else [2 * x, 3 * x**2]
     return [(2, np.stack(slopes, axis=1), values, at)]
 
 
@@ -731,33 +646,28 @@ def courses(
 def _answered(
     case: Case,
     state: State,
-    model: Model,
-    linear: Score,
+    tested: _Tested,
     solution: Solution,
-    found: Sequence[tuple[Taken, float, float]],
+    found: Sequence[Found],
     p: dict[str, float],
 ) -> Answer:
-    values, inverse = solved(sums_of(model.parts, model.base), model.base)
-    fit = fitted(
-        blocks(model.parts, residuals(model.parts, model.base, values)), model.base, values, inverse
-    )
+    model, fit = tested.model, tested.fit
+    covariance, half_of_all = fit.uncertain(fit.blocks())
     mean = np.eye(len(model.base))[:3]
     for one, own in zip(state.taken, model.of_terms, strict=True):
         if one.term.parameter is not None:
             mean[one.term.parameter, own] = 1 / len(case.observations)
-    joint, covariance = mean @ values, mean @ fit.covariance @ mean.T
-    half = fit.half[:3] * np.sqrt(np.diag(covariance) / np.diag(fit.covariance)[:3])
-    half = half + _by_other_drives(case, state, model, values)
+    joint, of_joint = mean @ fit.values, mean @ covariance @ mean.T
+    half = half_of_all[:3] * np.sqrt(np.diag(of_joint) / np.diag(covariance)[:3])
+    half = half + _by_other_drives(case, state, model, fit.values)
     remains, left, change = np.nan, 0.0, np.zeros(3)
     if case.caused:
-        remains = linear.p
-        left = float(np.sqrt(np.mean(linear.values**2) * 2))
-        change = _where_low_counts(model, values)
+        linear = tested.scores[of.ANY_LINEAR.name]
+        remains, left = linear.p, float(np.sqrt(2 * np.mean(linear.values**2)))
+        change = _otherwise(model, fit.values, lambda w: w[0] / w)
     answered = not (remains < REMAINS and np.max(np.abs(change / joint)) > LITTLE)
-    if remains < REMAINS and answered:
-        half = half + np.abs(change)
-    terms = []
-    named = {taken.term.name: (chance, size) for taken, chance, size in found}
+    half = half + np.abs(change) * (remains < REMAINS and answered)
+    told, named = [], {one.term.name: one for one in found}
     for i, (one, own, slopes) in enumerate(
         zip(state.taken, model.of_terms, model.of_slopes, strict=True)
     ):
@@ -765,22 +675,18 @@ def _answered(
             continue
         without = solution.values
         if len(found) > 1:
-            rest = state._replace(taken=(*state.taken[:i], *state.taken[i + 1 :]))
-            without = settled(case, rest, 3).joint
+            rest = (*state.taken[:i], *state.taken[i + 1 :])
+            without = settled(case, state._replace(taken=rest), 3).joint
         inner_half = np.full(one.inner.size, np.nan)
-        inner_half[one.moving] = fit.half[slopes]
-        own_values = one.inner[: own.stop - own.start] if one.term.bent else values[own]
-        terms.append(
-            Found(
-                one.term, named[one.term.name][0], own_values, fit.half[own],
-                fit.covariance[own, own], one.inner, inner_half, named[one.term.name][1],
-                without - joint,
-            )
-        )  # fmt: skip
+        inner_half[one.moving] = half_of_all[slopes]
+        values = one.inner[: own.stop - own.start] if one.term.bent else fit.values[own]
+        told.append(named[one.term.name]._replace(
+            values=values, half=half_of_all[own], covariance=covariance[own, own],
+            inner=one.inner, inner_half=inner_half, effect=without - joint,
+        ))  # fmt: skip
     return Answer(
-        joint, half, fit.degrees[:3], covariance, tuple(terms), p, float(remains), left, change,
-        answered, case, state,
-    )  # fmt: skip
+        joint, half, of_joint, tuple(told), p, remains, left, change, answered, case, state
+    )
 
 
 def _by_other_drives(case: Case, state: State, model: Model, values: Array) -> Array:
@@ -793,26 +699,23 @@ def _by_other_drives(case: Case, state: State, model: Model, values: Array) -> A
             if k < len(one.changes):
                 columns[:3] += one.changes[k].T / np.sqrt(power)
             parts.append(part._replace(columns=columns))
-        other, _ = solved(sums_of(parts, model.base), model.base)
-        most = np.maximum(most, np.abs(other - values)[:3])
+        most = np.maximum(most, np.abs(by.fitted(parts, model.base).values - values)[:3])
     return most
 
 
-def _where_low_counts(model: Model, values: Array) -> Array:
-    """Return how J, B and K change where a line counts by one over its frequency."""
+def _otherwise(model: Model, values: Array, weight: Callable[[Array], Array]) -> Array:
+    """Return how J, B and K change where lines count by another weight of their frequency."""
     parts = [
-        one._replace(instruments=one.instruments * (one.grid.omega_rad_s[0] / one.grid.omega_rad_s))
+        one._replace(instruments=one.instruments * weight(one.grid.omega_rad_s))
         for one in model.parts
     ]
-    return np.asarray((solved(sums_of(parts, model.base), model.base)[0] - values)[:3])
+    return np.asarray((by.fitted(parts, model.base).values - values)[:3])
 
 
 # --- What is told
 
 
-def findings_of(
-    found: Answer, solution: Solution, settings: Settings, method: str = ""
-) -> tuple[Finding, ...]:
+def findings_of(found: Answer, solution: Solution, settings: Settings) -> tuple[Finding, ...]:
     """Return the findings of an answer, one for each kind.
 
     Parameters
@@ -821,75 +724,66 @@ def findings_of(
     solution : Solution
         J, B and K without terms.
     settings : Settings
-    method : str
-        Not shown yet.
     """
-    del method
-    by_kind: dict[str, list[Found]] = {}
-    for one in found.found:
-        by_kind.setdefault(one.term.finding, []).append(one)
-    told = []
-    harmless = "answered" if found.answered else ""
-    for kind, own in by_kind.items():
+    limits, told = settings.diagnostics, []
+    stands: Fact = "beside" if found.answered else "withheld"
+    for kind in dict.fromkeys(one.term.finding for one in found.found):
+        own = [one for one in found.found if one.term.finding == kind]
         if kind == "varying_between_epochs":
             continue  # told with the fits of single epochs
         added = np.sum([one.effect for one in own], axis=0)
-        value, limit, facts, variant = _told(kind, own, added, found, settings.diagnostics)
-        facts |= {"remains": found.remains, "stands": "beside" if found.answered else "withheld"}
+        value, limit, facts, variant = _told(kind, own, added, found, limits)
         told.append(
             said(
-                kind, settings.diagnostics, value, limit, p=max(one.p for one in own),
-                effect=Effect.of(added, found.joint + added, found.half), facts=facts,
-                variant=variant, harmless=harmless,
+                kind, limits, value, limit, p=max(one.p for one in own), variant=variant,
+                effect=Effect.of(added, found.joint + added, found.half),
+                facts={**facts, "remains": found.remains, "stands": stands},
+                harmless="answered" if found.answered else "",
             )
         )  # fmt: skip
-    percent = 100 * found.left
-    if not found.answered and percent > settings.diagnostics.max_lack_of_fit_percent:
+    percent, most = 100 * found.left, limits.max_lack_of_fit_percent
+    if not found.answered and percent > most:
         low_hz, high_hz = found.case.measured[0].grid.band_hz
-        halves = zip("JBK", (100 * found.change / found.joint).tolist(), strict=True)
-        facts = {"low_hz": low_hz, "high_hz": high_hz} | {f"half_{s}": one for s, one in halves}
-        most = settings.diagnostics.max_lack_of_fit_percent
-        told.append(
-            said("lack_of_fit", settings.diagnostics, percent, most, p=found.remains, facts=facts)
-        )
+        change = (100 * found.change / found.joint).tolist()
+        facts = {f"half_{symbol}": one for symbol, one in zip("JBK", change, strict=True)}
+        facts |= {"low_hz": low_hz, "high_hz": high_hz}
+        told.append(said("lack_of_fit", limits, percent, most, p=found.remains, facts=facts))
     return tuple(told)
 
 
 def _told(
-    kind: str, own: Sequence[Found], added: Array, found: Answer, settings: DiagnosticsSettings
+    kind: str, own: Sequence[Found], added: Array, found: Answer, limits: DiagnosticsSettings
 ) -> tuple[float, float, dict[str, Fact], str]:
     """Return value, limit, facts and variant of a kind's finding."""
-    first = own[0]
+    first, facts = own[0], dict[str, Fact]()
     if kind == "torque_delay":
-        late_ms = 1e3 * float(first.values[0]) * (np.sqrt(2) if first.term is FILTER else 1)
-        facts: dict[str, Fact] = {"late_ms": late_ms, "half_ms": 1e3 * float(first.half[0])}
-        return abs(late_ms), 1e3 * LEAST_DELAY_S, facts | {"terms": first.term.label}, ""
+        share = np.sqrt(2) if first.term.name == "filter" else 1.0
+        late_ms, half_ms = (1e3 * share * float(one[0]) for one in (first.values, first.half))
+        facts = {"late_ms": late_ms, "half_ms": half_ms, "terms": first.term.label}
+        return abs(late_ms), 1e3 * LEAST_DELAY_S, facts, ""
     if kind.startswith("varying"):
-        ranges = [_range(one, found) for one in own]
-        ranges.sort(key=lambda one: -one[0])
-        others = [str(one["symbol"]) for _, one in ranges[1:]]
-        text = f"; so does {' and '.join(others)}" if others else ""
-        return ranges[0][0], settings.max_varying_percent, {**ranges[0][1], "others": text}, ""
+        ranges = sorted((_range(one, found) for one in own), key=lambda one: -one[0])
+        others = " and ".join(str(one["symbol"]) for _, one in ranges[1:])
+        facts = {**ranges[0][1], "others": f"; so does {others}" if others else ""}
+        return ranges[0][0], limits.max_varying_percent, facts, ""
     asked = ["inertia", "damping", "stiffness", *(one.term.asked for one in own)]
     if "directional-damping" in asked:
         asked.remove("damping")  # the whole and its two halves are one too many
-    sizes = [_size(one) for one in own]
+    sizes = []
+    for one in own:
+        late = f" {1e3 * one.inner[0]:.0f} ms late" if one.term.muscle else ""
+        size = f"{one.values[0]:.3g} ± {one.half[0]:.2g} {one.term.unit}"
+        sizes.append(f"{one.term.label} of {size}{late}")
     facts = {
-        "terms": " and ".join(one.term.label for one in own), "asked": ",".join(asked),
-        "sizes": " and ".join(sizes), "size": float(first.values[0]), "share": 100 * first.size,
+        "terms": " and ".join(one.term.label for one in own), "sizes": " and ".join(sizes),
+        "asked": ",".join(asked), "size": float(first.values[0]), "share": 100 * first.size,
     }  # fmt: skip
-    variant = "several" if len(own) > 1 else ""
     if first.term.muscle:
         facts["late_ms"] = 1e3 * float(first.inner[0])
+    variant = "several" if len(own) > 1 else ""
     if first.term.name == "cuff" and not variant:
         variant, facts["size"] = "coupling", 1 / float(first.values[0])
     return 100 * float(np.max(np.abs(added) / found.half)), 100.0, facts, variant
-
-
-def _size(one: Found) -> str:
-    late = f" {1e3 * one.inner[0]:.0f} ms late" if one.term.muscle else ""
-    each = [f"{v:.3g} ± {h:.2g}" for v, h in zip(one.values, one.half, strict=True)]
-    return f"{one.term.label} of {each[0]} {one.term.unit}{late}"
 
 
 def _range(one: Found, found: Answer) -> tuple[float, dict[str, Fact]]:
@@ -903,7 +797,7 @@ def _range(one: Found, found: Answer) -> tuple[float, dict[str, Fact]]:
         spread = np.einsum("gi,ij,gj->g", functions, one.covariance[within, within], functions)
         half = 1.96 * np.sqrt(spread + found.covariance[j, j])
         low, high = int(np.argmin(goes)), int(np.argmax(goes))
-        percent = 100 * float(np.ptp(goes) / np.abs(goes[low] + goes[high]) * 2)
+        percent = 200 * float(np.ptp(goes) / np.abs(goes[low] + goes[high]))
         if percent > best[0]:
             best = percent, {
                 "symbol": PARAMETERS[j].symbol, "size_unit": PARAMETERS[j].unit,

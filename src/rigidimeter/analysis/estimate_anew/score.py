@@ -1,4 +1,4 @@
-"""One score test: does the torque follow a column beside those that are fitted?
+"""One score test: whether the torque follows a column beside those that are fitted.
 
 At every line of every epoch, divided by √S (S the power of the noise),
 
@@ -6,7 +6,8 @@ At every line of every epoch, divided by √S (S the power of the noise),
 
 with X, p what is fitted and C, q what is tested. Sums Σ Re go over lines and epochs:
 
-    D* = D − Z (XᴴZ)⁻¹ XᴴD,    g = Σ Re D*ᴴ y,    T = gᵀ (Σ g_b g_bᵀ)⁻¹ g,    χ² = 2 gᵀ (Σ Re D*ᴴD*)⁻¹ g
+    D* = D − Z (XᴴZ)⁻¹ XᴴD,    g = Σ Re D*ᴴ y
+    T = gᵀ (Σ g_b g_bᵀ)⁻¹ g,    χ² = 2 gᵀ (Σ Re D*ᴴD*)⁻¹ g
 
 Whitened noise has no memory, so the parts g_b of g from blocks of half a second are independent,
 whatever their sizes: a subject who pushes now and then is no other case. The probability of so
@@ -27,17 +28,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimate_anew.grid import Array, Complex, Grid
 
 BLOCK_S = 0.5
 PINELIS = 2 * np.exp(3) / 9
 LEAST_DEGREES = 3.0
+TINY = 1e-300
+
 EVERY = -1
 """The epoch of a place that is all epochs'."""
 
@@ -59,15 +62,12 @@ class Part(NamedTuple):
     instruments, columns : complex array, shape (q, m)
         D and C; the first three are those of acceleration, velocity and angle.
     target : complex array, shape (m,)
-    courses : array, shape (q, t)
-        The instruments in time.
     """
 
     grid: Grid
     instruments: Complex
     columns: Complex
     target: Complex
-    courses: Array
 
 
 class Score(NamedTuple):
@@ -78,176 +78,146 @@ class Score(NamedTuple):
     values: Array
 
 
-class Fitted(NamedTuple):
-    """Coefficients, their covariance, degrees of freedom, and G⁻¹."""
-
-    values: Array
-    covariance: Array
-    degrees: Array
-    inverse: Array
-
-    @property
-    def half(self) -> Array:
-        """Half the 95 % intervals."""
-        t: Array = scipy.special.stdtrit(self.degrees, 0.975)
-        return np.asarray(t * np.sqrt(np.diag(self.covariance)))
-
-
-def real(left: Complex, right: Complex) -> Array:
+def real(left: Complex | Array, right: Complex | Array) -> Array:
     """Return Σ Re left* right over lines, shape (l, r), of (l, m) and (r, m)."""
-    return np.asarray(
-        np.ascontiguousarray(left).view(float) @ np.ascontiguousarray(right).view(float).T
-    )
+    first, second = (np.ascontiguousarray(one).view(np.float64) for one in (left, right))
+    return np.asarray(first @ second.T)
 
 
 @dataclass(frozen=True, eq=False)
-class Sums:
-    """Products between places of all epochs.
+class Fitted:
+    """What was fitted at the places of a base, and products with those of what may be tested.
 
     Attributes
     ----------
+    parts : sequence of Part
+    base : sequence of Place
     at : dict
-        Where a place is.
+        Where a place is in the products.
     cross : array, shape (s, s + 1)
         Σ Re Dᴴ (C, y).
     own : array, shape (s, s)
         Σ Re DᴴD.
+    values : array, shape (b,)
+    inverse : array, shape (b, b)
+        G⁻¹.
+    left : list of complex array
+        What each epoch's target has left.
     """
 
+    parts: Sequence[Part]
+    base: Sequence[Place]
     at: dict[Place, int]
     cross: Array
     own: Array
+    values: Array
+    inverse: Array
+    left: list[Complex]
 
-    def rows(self, places: Sequence[Place]) -> NDArray[np.intp]:
-        """Return where places are."""
-        return np.array([self.at[one] for one in places], dtype=np.intp)
+    def blocks(self) -> list[Array]:
+        """Return Σ Re D* r of each block of each epoch, shape (b, q) each."""
+        found, made = [], dict[int, Array]()
+        for part, left in zip(self.parts, self.left, strict=True):
+            key = id(part.instruments)
+            made[key] = made[key] if key in made else part.grid.in_time(part.instruments)
+            course, power = part.grid.in_time(left), part.grid.coarse_window[0] ** 2
+            count = np.arange(max(int(part.grid.duration_s / BLOCK_S), 1))
+            share = np.add.reduceat(power, count * power.size // count.size)
+            at = count * course.size // count.size
+            each = np.add.reduceat(made[key] * course, at, axis=1).T
+            found.append(each[share > EMPTY * share.mean()])
+        return found
 
+    def uncertain(self, blocks: Sequence[Array]) -> tuple[Array, Array]:
+        """Return the covariance of the coefficients, and half their 95 % intervals."""
+        own = _of_places(blocks, self.base) @ self.inverse.T
+        count, p = own.shape
+        covariance = own.T @ own * (count / max(count - p, 1))
+        fourth = np.maximum(np.sum(own**4, axis=0), TINY)
+        degrees = np.maximum(3 * np.sum(own**2, axis=0) ** 2 / fourth - p, LEAST_DEGREES)
+        t = scipy.special.stdtrit(degrees, 0.975)
+        return covariance, np.asarray(t * np.sqrt(np.diag(covariance)))
 
-def sums_of(parts: Sequence[Part], places: Sequence[Place]) -> Sums:
-    """Return the products between places."""
-    unique = list(dict.fromkeys(places))
-    column, epoch = np.array(unique, dtype=np.intp).reshape(-1, 2).T
-    cross, own = np.zeros((len(unique), len(unique) + 1)), np.zeros((len(unique),) * 2)
-    made: dict[int, Array] = {}
-    for e, part in enumerate(parts):
-        on = np.flatnonzero((epoch == EVERY) | (epoch == e))
-        of = column[on]
-        if id(part.instruments) not in made:
-            made[id(part.instruments)] = real(part.instruments, part.instruments)
-        both = np.concatenate([part.columns, part.target[None]])
-        found = real(part.instruments, both)
-        cross[on[:, None], np.append(on, -1)] += found[of[:, None], np.append(of, -1)]
-        own[on[:, None], on] += made[id(part.instruments)][of[:, None], of]
-    return Sums({place: i for i, place in enumerate(unique)}, cross, own)
-
-
-def residuals(parts: Sequence[Part], places: Sequence[Place], values: Array) -> list[Complex]:
-    """Return what coefficients of places leave of each epoch's target."""
-    found = []
-    for e, part in enumerate(parts):
-        on = [i for i, (_, epoch) in enumerate(places) if epoch in (EVERY, e)]
-        found.append(part.target - values[on] @ part.columns[[places[i][0] for i in on]])
-    return found
-
-
-def blocks(parts: Sequence[Part], left: Sequence[Complex]) -> list[Array]:
-    """Return Σ Re D* r of each block of each epoch, shape (b, q) each."""
-    found = []
-    for part, residual in zip(parts, left, strict=True):
-        course = part.grid.in_time(residual)
-        count = max(int(part.grid.duration_s / BLOCK_S), 1)
-        at = np.arange(count) * course.size // count
-        power = part.grid.coarse_window[0] ** 2
-        share = np.add.reduceat(power, np.arange(count) * power.size // count)
-        each = np.add.reduceat(part.courses * course, at, axis=1).T
-        found.append(each[share > EMPTY * share.mean()])
-    return found
-
-
-def of_places(local: Sequence[Array], places: Sequence[Place]) -> Array:
-    """Return the blocks of places, shape (blocks of all epochs, s)."""
-    column, epoch = np.array(places, dtype=np.intp).reshape(-1, 2).T
-    if np.all(epoch == EVERY):
-        return np.concatenate(local)[:, column]
-    return np.concatenate(
-        [one[:, column] * ((epoch == EVERY) | (epoch == e)) for e, one in enumerate(local)]
-    )
+    def score(self, blocks: Sequence[Array], tested: Sequence[Place]) -> Score:
+        """Return the score test of places beside the base."""
+        b, t = ([self.at[one] for one in places] for places in (self.base, tested))
+        cross, own = self.cross[t], _of_places(blocks, tested)
+        through = cross[:, b] @ self.inverse
+        g: Array = cross[:, -1] - through @ self.cross[b, -1]
+        crossed = through @ self.own[np.ix_(b, t)]
+        size = self.own[np.ix_(t, t)] - crossed - crossed.T
+        size = size + through @ self.own[np.ix_(b, b)] @ through.T
+        slope = cross[:, t] - through @ self.cross[np.ix_(b, t)]
+        if b:
+            own = own - _of_places(blocks, self.base) @ through.T
+        scale = np.sqrt(np.abs(np.diag(size))) + TINY
+        one = g / scale
+        if one.size == 1:
+            return Score(chance(own / scale), 2 * float(one[0] ** 2), g / float(slope[0, 0]))
+        values: Array = np.linalg.lstsq(slope / scale[:, None], one, rcond=1e-12)[0]
+        return Score(chance(own / scale), quadratic(g, size), values)
 
 
-def solved(sums: Sums, base: Sequence[Place]) -> tuple[Array, Array]:
-    """Return the coefficients of a base, and G⁻¹.
+def quadratic(g: Array, size: Array) -> float:
+    """Return χ² of a score g, 2 gᵀ size⁻¹ g, where columns may be alike."""
+    scale = np.sqrt(np.abs(np.diag(size))) + TINY
+    precision = np.linalg.pinv(size / np.outer(scale, scale), rcond=1e-8, hermitian=True)
+    return 2 * float((g / scale) @ precision @ (g / scale))
+
+
+def fitted(parts: Sequence[Part], base: Sequence[Place], tested: Sequence[Place] = ()) -> Fitted:
+    """Fit the places of a base; products are made with those that are tested, too.
 
     Raises
     ------
     ValueError
         If the base cannot be told apart.
     """
-    at = sums.rows(base)
-    gram = sums.cross[at[:, None], at]
-    size = np.sqrt(np.abs(np.diag(gram))) + 1e-300
+    places = list(dict.fromkeys([*base, *tested]))
+    column, epoch = np.array(places, dtype=np.intp).reshape(-1, 2).T
+    cross, own = np.zeros((len(places), len(places) + 1)), np.zeros((len(places),) * 2)
+    made: dict[int, Array] = {}
+    for e, part in enumerate(parts):
+        on = np.flatnonzero((epoch == EVERY) | (epoch == e))
+        of, key = column[on], id(part.instruments)
+        made[key] = made[key] if key in made else real(part.instruments, part.instruments)
+        found = real(part.instruments, np.concatenate([part.columns, part.target[None]]))
+        cross[on[:, None], np.append(on, -1)] += found[of[:, None], np.append(of, -1)]
+        own[on[:, None], on] += made[key][of[:, None], of]
+    b = len(base)
+    size = np.sqrt(np.abs(np.diag(cross[:b, :b]))) + TINY
     try:
-        inverse = np.linalg.inv(gram / np.outer(size, size)) / np.outer(size, size)
+        inverse = np.linalg.inv(cross[:b, :b] / np.outer(size, size)) / np.outer(size, size)
     except np.linalg.LinAlgError:
         raise ValueError("the motion does not tell the terms apart") from None
-    return inverse @ sums.cross[at, -1], inverse
+    values, left = inverse @ cross[:b, -1], []
+    for e, part in enumerate(parts):
+        on = np.flatnonzero((epoch[:b] == EVERY) | (epoch[:b] == e))
+        left.append(part.target - values[on] @ part.columns[column[on]])
+    at = {place: i for i, place in enumerate(places)}
+    return Fitted(parts, base, at, cross, own, values, inverse, left)
 
 
-def fitted(local: Sequence[Array], base: Sequence[Place], values: Array, inverse: Array) -> Fitted:
-    """Return coefficients with their uncertainty, from the blocks of what they leave."""
-    own = of_places(local, base) @ inverse.T
-    count, p = own.shape
-    covariance = own.T @ own * (count / max(count - p, 1))
-    fourth = np.maximum(np.sum(own**4, axis=0), 1e-300)
-    degrees = np.maximum(3 * np.sum(own**2, axis=0) ** 2 / fourth - p, LEAST_DEGREES)
-    return Fitted(values, covariance, degrees, inverse)
+def _of_places(blocks: Sequence[Array], places: Sequence[Place]) -> Array:
+    """Return the blocks of places, shape (blocks of all epochs, s)."""
+    column, epoch = np.array(places, dtype=np.intp).reshape(-1, 2).T
+    on = [(epoch == EVERY) | (epoch == e) for e in range(len(blocks))]
+    return np.concatenate([one[:, column] * own for one, own in zip(blocks, on, strict=True)])
 
 
-def score(
-    sums: Sums, local: Sequence[Array], base: Sequence[Place], tested: Sequence[Place]
-) -> Score:
-    """Return the score test of places beside a base, whose residual `local` is made of."""
-    b, t = sums.rows(base), sums.rows(tested)
-    g, size, slope = sums.cross[t, -1], sums.own[t[:, None], t], sums.cross[t[:, None], t]
-    own = of_places(local, tested)
-    if len(base):
-        through = np.linalg.solve(sums.cross[b[:, None], b].T, sums.cross[t[:, None], b].T).T
-        g = g - through @ sums.cross[b, -1]
-        crossed = through @ sums.own[b[:, None], t]
-        size = size - crossed - crossed.T + through @ sums.own[b[:, None], b] @ through.T
-        slope = slope - through @ sums.cross[b[:, None], t]
-        own = own - of_places(local, base) @ through.T
-    scale = np.sqrt(np.abs(np.diag(size))) + 1e-300
-    one = g / scale
-    if one.size == 1:
-        return Score(chance(own / scale), 2 * float(one[0] ** 2), g / slope[0])
-    precision = np.linalg.pinv(size / np.outer(scale, scale), rcond=1e-8, hermitian=True)
-    values = np.linalg.lstsq(slope / scale[:, None], one, rcond=1e-12)[0]
-    return Score(chance(own / scale), 2 * float(one @ precision @ one), values)
-
-
-def explained(
-    instruments: Sequence[Complex],
-    parts: Sequence[Part],
-    base: Sequence[Place],
-    left: Sequence[Complex],
-) -> Array:
-    """Return χ² of each of many single instruments, shape (k, m) an epoch, beside a base."""
-    b = [column for column, epoch in base if epoch == EVERY]
-    names = ("score", "size", "cross", "own", "gram", "within")
-    total: dict[str, Array] = dict.fromkeys(names, np.zeros(()))
-    for D, part, residual in zip(instruments, parts, left, strict=True):
+def explained(instruments: Sequence[Complex], fit: Fitted) -> Array:
+    """Return χ² beside a base of each of many single instruments, shape (k, m) an epoch."""
+    b = [column for column, epoch in fit.base if epoch == EVERY]
+    total = [np.zeros(()) for _ in range(6)]
+    for D, part, left in zip(instruments, fit.parts, fit.left, strict=True):
         Z, X = part.instruments[b], part.columns[b]
-        found = (
-            real(D, residual[None])[:, 0], np.sum(np.abs(D) ** 2, axis=1),
-            real(D, X), real(D, Z), real(Z, X), real(Z, Z),
-        )  # fmt: skip
-        total = {name: total[name] + one for name, one in zip(names, found, strict=True)}
-    size = total["size"]
-    if b:
-        through = np.linalg.solve(total["gram"].T, total["cross"].T).T
-        size = size - 2 * np.sum(through * total["own"], axis=1)
-        size = size + np.sum(through @ total["within"] * through, axis=1)
-    return np.asarray(2 * total["score"] ** 2 / size)
+        pairs = (D, left[None]), (D, X), (D, Z), (Z, X), (Z, Z)
+        found = [*(real(*pair) for pair in pairs), np.sum(np.abs(D) ** 2, axis=1)]
+        total = [np.asarray(one + more) for one, more in zip(total, found, strict=True)]
+    g, cross, own, gram, within, size = total
+    through = cross @ np.linalg.inv(gram)
+    size = size - 2 * np.sum(through * own, axis=1) + np.sum(through @ within * through, axis=1)
+    return np.asarray(2 * g[:, 0] ** 2 / size)
 
 
 def chance(of_blocks: Array) -> float:
@@ -272,41 +242,18 @@ def holm(p: Sequence[float]) -> list[float]:
     return adjusted
 
 
-class FreeFilter(NamedTuple):
-    """All that a free linear filter can make of a motion, in stretches of lines.
+def without_filter(grid: Grid, rows: Complex) -> Complex:
+    """Return rows free of what a linear filter of the motion can make, and whitened.
 
-    Attributes
-    ----------
-    edges : list of (int, int)
-    bases : list of complex array, shape (lines, 3)
-        Orthonormal.
+    The first is the torque, the next three are the motion; what the filter, with a gain of its own
+    in every stretch of lines, leaves of the torque is the noise.
     """
-
-    edges: list[tuple[int, int]]
-    bases: list[Complex]
-
-    def without(self, lines: Complex) -> Complex:
-        """Return what it cannot make of lines, shape (..., m)."""
-        found = lines.copy()
-        for (first, last), basis in zip(self.edges, self.bases, strict=True):
-            part = lines[..., first:last]
-            found[..., first:last] = part - (part @ basis.conj()) @ basis.T
-        return found
-
-    def power(self, left: Complex) -> Array:
-        """Return the noise of a torque of which it left so much, shape (m,)."""
-        found = np.empty(left.size)
-        for first, last in self.edges:
-            free = max(last - first - 3, 1)
-            found[first:last] = np.sum(np.abs(left[first:last]) ** 2) / free
-        return found
-
-
-def free_filter(grid: Grid, motion: Complex) -> FreeFilter:
-    """Return the filter of a motion, shape (m, 3)."""
-    count = grid.line.size
-    each = max(round(STRETCH_HZ * grid.duration_s), FEWEST_LINES)
-    starts = [k * each for k in range(max(count // each, 1))]
-    edges = [*zip(starts, [*starts[1:], count], strict=True)]
-    scaled = motion / np.linalg.norm(motion, axis=0)
-    return FreeFilter(edges, [np.linalg.qr(scaled[a:b])[0] for a, b in edges])
+    found, each = rows.copy(), max(round(STRETCH_HZ * grid.duration_s), FEWEST_LINES)
+    edges = [*(k * each for k in range(max(grid.line.size // each, 1))), grid.line.size]
+    for first, last in pairwise(edges):
+        motion, part = rows[1:4, first:last], rows[:, first:last]
+        basis = np.linalg.qr((motion / np.linalg.norm(motion, axis=1)[:, None]).T)[0]
+        part = part - (part @ basis.conj()) @ basis.T
+        noise = np.sum(np.abs(part[0]) ** 2) / max(last - first - 3, 1)
+        found[:, first:last] = part / np.sqrt(noise)
+    return found

@@ -32,7 +32,8 @@ best instrument of a jump is smooth where the caused velocity is not quite the t
 
 DEGREE, FINER_DEGREE, HARMONICS, MOVEMENT_HARMONICS, PARTS = 3, 9, 2, 6, 10
 """Of polynomials over time, and of those that are fitted beside once a change is known: no other
-term shall be found in what a few leave of it; of a phase; parts of the band for what has no name."""
+term shall be found in what a few leave of it; of a phase; of a movement; parts of the
+band for what has no name."""
 
 
 class Motion(NamedTuple):
@@ -79,6 +80,7 @@ class Motion(NamedTuple):
 
 
 Columns = Callable[[Motion, Array], Complex]
+Bend = Callable[[Motion, Array], Motion]
 
 
 class Term(NamedTuple):
@@ -124,7 +126,7 @@ class Term(NamedTuple):
     steps: Array = np.zeros(0)
     low: Array = np.zeros(0)
     high: Array = np.zeros(0)
-    bent: Callable[[Motion, Array], Motion] | None = None
+    bent: Bend | None = None
     parameter: int | None = None
     own: bool = False
     resists: bool = False
@@ -278,7 +280,7 @@ def _cuff(motion: Motion, inner: Array) -> Complex:
     s, (compliance, lag_s) = 1j * motion.grid.omega_rad_s, inner[0]
     through = motion.torque[:, ::-1] @ motion.joint / (1 + s * lag_s)
     if not compliance:
-        return -through[None]
+        return np.asarray(-through[None])
     return np.stack([-through, compliance * s / (1 + s * lag_s) * through])
 
 
@@ -308,7 +310,7 @@ def hum(frequency_hz: float) -> Term:
     def columns(motion: Motion, inner: Array) -> Complex:
         del inner
         turn = 2 * np.pi * frequency_hz * (motion.grid.time_s - motion.grid.time_s[0])
-        return motion.grid.lines(np.stack([np.cos(turn), np.sin(turn)]))[0]
+        return np.asarray(motion.grid.lines(np.stack([np.cos(turn), np.sin(turn)]))[0])
 
     return Term("hum", "N·m", "hum", columns, own=True, finding="")
 
@@ -337,21 +339,20 @@ def _reflex_of(name: str, asked: str, function: Callable[[Array], Array]) -> Ter
     )  # fmt: skip
 
 
-def _late(name: str, label: str, bent: Callable[[Motion, Array], Motion], **limits: Array) -> Term:
+def _late(name: str, label: str, bent: Bend, low: float, high: float) -> Term:
     slope = np.sqrt(2) if name == "filter" else 1.0
     return Term(
         name, "s", label, lambda m, inner: -slope * m.torque[None, :, 1],
-        inner=np.zeros((1, 1)), first=np.zeros((1, 1)), **limits, bent=bent, linear=True,
-        resists=name == "filter", finding="torque_delay", tested=name == "delay",
+        inner=np.zeros((1, 1)), first=np.zeros((1, 1)), low=np.array([low]), high=np.array([high]),
+        bent=bent, linear=True, resists=name == "filter", finding="torque_delay",
+        tested=name == "delay",
     )  # fmt: skip
 
 
 MOVEMENT = Term("movement", "N·m", "", _movement, own=True, linear=True, finding="")
 ANY_LINEAR = Term("any linear", "1", "anything linear", any_linear, linear=True, finding="")
-FILTER = _late(
-    "filter", "a filter of the torque", _before_filter, low=np.zeros(1), high=np.array([0.03])
-)
-DELAY = _late("delay", "a late torque", _at_delay, low=np.array([-0.05]), high=np.array([0.05]))
+FILTER = _late("filter", "a filter of the torque", _before_filter, 0.0, 0.03)
+DELAY = _late("delay", "a late torque", _at_delay, -0.05, 0.05)
 CUFF = Term(
     "cuff", "rad/(N·m)", "soft coupling", _cuff,
     inner=np.array([(0.0, lag) for lag in (0.0, 1e-3, 4e-3)]), first=np.zeros((1, 2)),
