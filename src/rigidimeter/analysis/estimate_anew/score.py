@@ -154,7 +154,7 @@ class Fitted:
         one = g / scale
         if one.size == 1:
             return Score(chance(own / scale), 2 * float(one[0] ** 2), g / float(slope[0, 0]))
-        values: Array = np.linalg.lstsq(slope / scale[:, None], one, rcond=1e-12)[0]
+        values = np.asarray(np.linalg.lstsq(slope / scale[:, None], one, rcond=1e-12)[0], float)
         return Score(chance(own / scale), quadratic(g, size), values)
 
 
