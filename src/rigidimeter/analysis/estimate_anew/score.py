@@ -39,7 +39,7 @@ from rigidimeter.analysis.estimate_anew.grid import Array, Complex, Grid
 BLOCK_S = 0.5
 PINELIS = 2 * np.exp(3) / 9
 LEAST_DEGREES = 3.0
-TINY = 1e-300
+TINY, ALIKE = 1e-300, 1e-9
 
 EVERY = -1
 """The epoch of a place that is all epochs'."""
@@ -216,8 +216,8 @@ def explained(instruments: Sequence[Complex], fit: Fitted) -> Array:
         total = [np.asarray(one + more) for one, more in zip(total, found, strict=True)]
     g, cross, own, gram, within, size = total
     through = cross @ np.linalg.inv(gram)
-    size = size - 2 * np.sum(through * own, axis=1) + np.sum(through @ within * through, axis=1)
-    return np.asarray(2 * g[:, 0] ** 2 / size)
+    beside = size - 2 * np.sum(through * own, axis=1) + np.sum(through @ within * through, axis=1)
+    return np.asarray(2 * g[:, 0] ** 2 / np.maximum(beside, ALIKE * size + TINY))
 
 
 def chance(of_blocks: Array) -> float:
