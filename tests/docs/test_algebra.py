@@ -1,10 +1,14 @@
-"""What the pages on the algebra say of the bias by the loop, by calculation from drawn lines."""
+"""What the pages on the algebra say, by calculation: lines by parts, the loop's bias, chance."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
+from rigidimeter.analysis.estimate_anew.grid import grid_of
+from rigidimeter.analysis.estimate_anew.score import chance
+from rigidimeter.core.records import Channel
 from rigidimeter.core.settings import parse_settings
 from rigidimeter.model import Loop
 
@@ -41,3 +45,36 @@ def test_the_loop_pulls_weighted_least_squares_by_twice_the_covariance_times_the
     chance = np.sqrt(np.diag(covariance) / DRAWS)
     assert np.all(np.abs(error - pull) < 4 * chance + 0.1 * np.abs(pull))
     assert np.abs(error[0]) > 10 * chance[0]
+
+
+def test_lines_of_derivatives_are_those_of_the_derivatives() -> None:
+    time_s = np.arange(8000) / 500
+    turn = 2 * np.pi * 3.21
+    sine = np.sin(turn * time_s)
+    grid = grid_of([Channel("angle_rad", time_s, sine)], (0.15, 30.0), 1.0)
+    x, rate, bend = grid.lines(sine, 2)
+    of_rate = grid.lines(turn * np.cos(turn * time_s))[0]
+    assert np.max(np.abs(rate - of_rate)) < 1e-6 * np.max(np.abs(of_rate))
+    assert np.max(np.abs(bend + turn**2 * x)) < 1e-6 * np.max(np.abs(bend))
+
+
+@pytest.mark.parametrize("burst", [1.0, 30.0])
+def test_p_of_a_term_is_that_of_the_page_and_holds_whatever_the_sizes_of_blocks(
+    burst: float,
+) -> None:
+    rng = np.random.default_rng(5)
+    N, m = 38, 3
+    sizes = np.where(np.arange(N) < 4, burst, 1.0)[:, None]
+    p = []
+    for _ in range(DRAWS):
+        blocks = sizes * rng.standard_normal((N, m))
+        g = blocks.sum(axis=0)
+        T = g @ np.linalg.solve(blocks.T @ blocks, g)
+        both = stats.chi2.sf(T, m), stats.beta.sf(T / N, m / 2, (N - m) / 2)
+        p.append(min(max(2.0 ** (1 - N), 2 * np.exp(3) / 9 * min(both)), 1.0))
+        assert chance(blocks) == pytest.approx(p[-1])
+    assert all(np.mean(np.array(p) < level) <= level for level in (0.2, 0.05, 0.01, 0.001))
+
+
+def test_no_term_is_surer_than_the_signs_of_its_blocks() -> None:
+    assert chance(np.ones((12, 1))) == pytest.approx(2.0**-11)
