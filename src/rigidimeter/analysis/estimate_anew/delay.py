@@ -172,10 +172,10 @@ def with_clock_error(
         _of_drive(one, fit) if delay.corrected else np.zeros(3)
         for one, fit, delay in zip(epochs, fits, own, strict=True)
     ]
-    alone = [_widened(fit, both) for fit, *both in zip(fits, by_error, by_drive, strict=True)]
+    alone = [widened(fit, both) for fit, *both in zip(fits, by_error, by_drive, strict=True)]
     changes = [(fits, by_error, sources), (fits, by_drive, sources)]
     together = [
-        _widened(one, [change for each in changes for change in _of_sources(one, *each)])
+        widened(one, [change for each in changes for change in _of_sources(one, *each)])
         for one in pooled
     ]
     return alone, together
@@ -257,7 +257,7 @@ def _of_sources(
     return [np.linalg.pinv(total) @ one for one in weighted.values()]
 
 
-def _widened(fit: Fit, changes: Sequence[Array]) -> Fit:
+def widened(fit: Fit, changes: Sequence[Array]) -> Fit:
     """Return a fit with changes of one standard error each, which are independent, added."""
     if not changes or not np.all(np.isfinite(changes)):
         return fit

@@ -22,11 +22,8 @@ import numpy as np
 import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 
-from rigidimeter.analysis.estimate_anew import answer as _a
 from rigidimeter.analysis.estimate_anew.activity import activities
-from rigidimeter.analysis.estimate_anew.answer import answer
-
-findings_of = getattr(_a, "findings_of", lambda *_: ())
+from rigidimeter.analysis.estimate_anew.answer import Answer, answer, beside, findings_of
 from rigidimeter.analysis.estimate_anew.between import band_estimates, band_finding, between_epochs
 from rigidimeter.analysis.estimate_anew.checks import (
     Pull,
@@ -40,6 +37,7 @@ from rigidimeter.analysis.estimate_anew.delay import (
     corrected_s,
     delay_of,
     late_torque,
+    widened,
     with_clock_error,
 )
 from rigidimeter.analysis.estimate_anew.drive import Drive, find_drive
@@ -52,6 +50,7 @@ from rigidimeter.analysis.estimate_anew.methods import (
     Method,
     Ready,
     fit_epochs,
+    fit_of,
 )
 from rigidimeter.analysis.estimate_anew.observation import (
     Cause,
@@ -62,7 +61,7 @@ from rigidimeter.analysis.estimate_anew.observation import (
 )
 from rigidimeter.analysis.estimate_anew.published import fit_published
 from rigidimeter.analysis.estimate_anew.scores import line_shares, score_epoch
-from rigidimeter.analysis.estimate_anew.solve import Solution
+from rigidimeter.analysis.estimate_anew.solve import Problem, Solution, solve_once
 from rigidimeter.analysis.estimate_anew.stretches import longest_part, obstacle, screened
 from rigidimeter.core.findings import Fact, Finding, found_between
 from rigidimeter.core.records import Analysis, Axis, BandEstimate, Delay, Epoch, Fit, Outcome, Task
@@ -482,10 +481,14 @@ def estimate_recorded(
     if not fits_alone and any(a is not b for a, b in zip(counted, epochs, strict=True)):
         # What a check excludes must not be in the pool either.
         fitted = _fitted(estimator, counted, observed, None, delays, pooled=True)
-    pooled: list[Fit] = fitted.pooled
+    told: list[Told] = []
     bands: list[BandEstimate] = []
     if not fits_alone:
-        fits, pooled, bands = _together(estimator, counted, observed, fits, fitted, pulls, delays)
+        told = _told(estimator, epochs, observed, fits, fitted)
+    pooled = [_beside(estimator, one, told) for one in fitted.pooled]
+    fits = [_beside(estimator, one, told) for one in fits]
+    if not fits_alone:
+        fits, pooled, bands = _together(estimator, counted, fits, pooled, told, pulls, delays)
     progress(0.3)
     included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
     inertia_kg_m2 = float(np.median(included)) if included else float("nan")
@@ -494,7 +497,9 @@ def estimate_recorded(
         second = _fitted(estimator, epochs, observed, inertia_kg_m2, delays, pooled=False).fits
         # What did not count in the first stage does not in the second.
         fixed = [
-            two if one.outcome.included else replace(two, outcome=one.outcome)
+            _beside(estimator, two, told, inertia_kg_m2)
+            if one.outcome.included
+            else replace(two, outcome=one.outcome)
             for one, two in zip(fits, second, strict=True)
         ]
     scores = [
@@ -621,7 +626,7 @@ def _checked(
 def _findings(
     method: Method, ready: Ready, seen: Observation, fit: Fit, pull: Pull, delay: Delay | None
 ) -> Iterator[Finding]:
-    # What follows the samples as they are does not know what the drive does with a command it holds.
+    # What fits the samples as they are does not know what the drive does with a held command.
     checked = replace(seen, drive_known=False) if method.as_recorded else seen
     for check in CHECKS:
         yield from check(checked, fit, pull)
@@ -640,37 +645,155 @@ def _with_active(method: Method, ready: Ready) -> Fit | None:
     return fit if fit.n_samples else None
 
 
-def _together(
+class Told(NamedTuple):
+    """What the epochs of a condition that count say together.
+
+    Attributes
+    ----------
+    condition : str
+    labels : tuple of str
+        Of the epochs.
+    answer : Answer
+    problems : list of Problem
+        Of J, B and K with the torque of the terms taken from their targets; empty where the fits
+        are not those of the answer.
+    solution : Solution
+        Without terms.
+    values : list of array, shape (3,)
+        J, B and K of each epoch without terms.
+    """
+
+    condition: str
+    labels: tuple[str, ...]
+    answer: Answer
+    problems: list[Problem]
+    solution: Solution
+    values: list[Array]
+
+
+def _told(
     method: Method,
     epochs: Sequence[Ready],
     observed: Sequence[Observation | str],
     fits: Sequence[Fit],
     fitted: Fitted,
+) -> list[Told]:
+    """Return what the torque of each condition holds beside J, B and K.
+
+    By the perturbation where it was recorded, whatever the method: at J, B and K of least squares
+    the subject's own torque would show in the residual as well.
+    """
+    counting = [i for i, fit in enumerate(fits) if fit.outcome.included]
+    known = [i for i in counting if not no_instrument(epochs[i].epoch)]
+    own, shared = method, fitted.shared
+    if method is not IV or len(known) < len(counting):
+        own, used = (IV, known) if known else (BANDLIMITED, counting)
+        if own is not method or used != counting:
+            some = [epochs[i] for i in used]
+            fitted = fit_epochs(own, some, observed_for(own, some), pooled=False)
+            shared, fits = fitted.shared, fitted.fits
+    values = {(f.condition, f.source, f.epoch): f.value for f in fits if f.outcome.included}
+    told = []
+    for condition in dict.fromkeys(fit.condition for fit in fits):
+        if condition not in shared:
+            continue
+        solution = shared[condition]
+        seen = [one.observation for one in solution.problems]
+        found = answer(solution, person=seen[0].settings.diagnostics.subject_present)
+        stands = own is method and found.answered and bool(found.found)
+        told.append(
+            Told(
+                condition,
+                tuple(one.epoch.label for one in seen),
+                found,
+                beside(found) if stands else [],
+                solution,
+                [
+                    values.get((condition, one.epoch.source, one.epoch.label), solution.values)
+                    for one in seen
+                ],
+            )
+        )
+    return told
+
+
+def _beside(
+    method: Method, fit: Fit, told: Sequence[Told], inertia_kg_m2: float | None = None
+) -> Fit:
+    """Return a fit with J, B and K beside the terms that its condition holds.
+
+    Its intervals hold the error of the terms too.
+    """
+    one = next((one for one in told if one.condition == fit.condition), None)
+    if one is None or not one.problems or not fit.outcome.included:
+        return fit
+    powers = one.answer.state.powers
+    held = () if inertia_kg_m2 is None else (inertia_kg_m2,)
+    problems = [
+        p._replace(
+            instruments=p.instruments[:, len(held) :],
+            regressors=p.regressors[:, len(held) :],
+            target=p.target - p.regressors[:, : len(held)] @ np.array(held),
+            held=held,
+        )
+        for p in one.problems
+    ]
+    places = [
+        i
+        for i, p in enumerate(problems)
+        if fit.epoch == "pooled"
+        or (p.observation.epoch.label, p.observation.epoch.source) == (fit.epoch, fit.source)
+    ]
+    if not places:
+        return fit
+    whole = solve_once(problems, powers)
+    own = solve_once([problems[i] for i in places], [powers[i] for i in places])
+    made = fit_of(method, own, inertia_kg_m2, beside=True)
+    # What the terms' own error adds to that of J, B and K with the terms given.
+    more = np.maximum(np.diag(one.answer.covariance)[len(held) :] - np.diag(whole.covariance), 0.0)
+    wider = np.append(np.zeros(len(held)), np.sqrt(more))
+    numbers = widened(made, list(np.diag(wider)))
+    return replace(
+        numbers,
+        source=fit.source,
+        epoch=fit.epoch,
+        condition=fit.condition,
+        outcome=fit.outcome,
+        findings=fit.findings,
+        activity=fit.activity,
+    )
+
+
+def _together(
+    method: Method,
+    epochs: Sequence[Ready],
+    fits: Sequence[Fit],
+    pooled: Sequence[Fit],
+    told: Sequence[Told],
     pulls: Sequence[Pull],
     delays: Sequence[Delay],
 ) -> tuple[list[Fit], list[Fit], list[BandEstimate]]:
     """Return fits and pooled fits with what epochs of a condition show together, and bands."""
-    told: dict[str, list[Finding]] = {}
+    found_in: dict[str, list[Finding]] = {}
     bands: list[BandEstimate] = []
-    for condition, (solution, values) in _shared(method, epochs, observed, fits, fitted).items():
-        seen = [one.observation for one in solution.problems]
-        pool = next((one for one in fitted.pooled if one.condition == condition), None)
+    for one in told:
+        seen = [p.observation for p in one.solution.problems]
+        pool = next((fit for fit in pooled if fit.condition == one.condition), None)
         if seen[0].cause is not None:
-            bands += band_estimates(seen, values, pool if method.uses_perturbation else None)
-        labels = tuple(f.epoch for f in fits if f.outcome.included and f.condition == condition)
-        told[condition] = [
-            replace(one, condition=condition, epochs=labels)
-            for one in findings_of(answer(solution), solution, seen[0].settings)
+            bands += band_estimates(seen, one.values, pool if method.uses_perturbation else None)
+        found_in[one.condition] = [
+            replace(finding, condition=one.condition, epochs=one.labels)
+            for finding in findings_of(one.answer, one.solution, seen[0].settings)
         ]
 
     def with_shared(fit: Fit, more: Sequence[Finding], settings: Settings) -> Fit:
-        shared = told.get(fit.condition, [])
-        own = [one for one in bands if one.condition == fit.condition]
+        shared = found_in.get(fit.condition, [])
+        own = [band for band in bands if band.condition == fit.condition]
         if not shared and own:  # what has no other name
-            labels = tuple(f.epoch for f in fits if f.outcome.included)
+            labels = next(one.labels for one in told if one.condition == fit.condition)
             shared = [
-                replace(one, condition=fit.condition, epochs=labels)
-                for one in band_finding(fit, own, settings.diagnostics)
+                replace(finding, condition=fit.condition, epochs=labels)
+                for finding in band_finding(fit, own, settings.diagnostics)
             ]
         return in_half_intervals(replace(fit, findings=(*fit.findings, *shared, *more)))
 
@@ -680,12 +803,12 @@ def _together(
             alone.append(fit)
             continue
         delay = next((one for one in delays if one.source == fit.source), None)
-        missing, more = told.get(fit.condition, []), []
+        missing, more = found_in.get(fit.condition, []), []
         if ready.drive is None:
             more = of_fit.between_samples(ready.epoch, fit, pull, ready.settings, delay, missing)
         alone.append(with_shared(fit, more, ready.settings))
-    pooled = []
-    for pool in fitted.pooled:
+    together = []
+    for pool in pooled:
         own = [f for f in alone if f.outcome.included and pool.condition in ("", f.condition)]
         settings = epochs[0].settings
         biases = [
@@ -700,43 +823,9 @@ def _together(
         differing = between_epochs(own, method.uses_perturbation, settings.diagnostics)
         if pool.condition and differing is not None:
             more = [*more, differing]
-        pool = with_shared(pool, more, settings)
-        pooled.append(replace(pool, findings=(*pool.findings, *_of_every(pool, own))))
-    return alone, pooled, bands
-
-
-def _shared(
-    method: Method,
-    epochs: Sequence[Ready],
-    observed: Sequence[Observation | str],
-    fits: Sequence[Fit],
-    fitted: Fitted,
-) -> dict[str, tuple[Solution, list[Array]]]:
-    """Return what the epochs of each condition that count share, and J, B and K of each.
-
-    By the perturbation where it was recorded, whatever the method: at J, B and K of least squares
-    the subject's own torque would show in the residual as well.
-    """
-    counting = [i for i, fit in enumerate(fits) if fit.outcome.included]
-    known = [i for i in counting if not no_instrument(epochs[i].epoch)]
-    if method is not IV or len(known) < len(counting):
-        method, used = (IV, known) if known else (BANDLIMITED, counting)
-        epochs = [epochs[i] for i in used]
-        fitted = fit_epochs(method, epochs, observed_for(method, epochs), pooled=False)
-        fits = fitted.fits
-        counting = [i for i, fit in enumerate(fits) if fit.outcome.included]
-    values = {(fits[i].condition, fits[i].source, fits[i].epoch): fits[i].value for i in counting}
-    return {
-        condition: (
-            solution,
-            [
-                values.get((condition, e.source, e.label), solution.values)
-                for e in (one.observation.epoch for one in solution.problems)
-            ],
-        )
-        for condition, solution in fitted.shared.items()
-        if condition or len({fit.condition for fit in fits}) == 1
-    }
+        whole = with_shared(pool, more, settings)
+        together.append(replace(whole, findings=(*whole.findings, *_of_every(whole, own))))
+    return alone, together, bands
 
 
 def _of_every(pool: Fit, own: Sequence[Fit]) -> list[Finding]:

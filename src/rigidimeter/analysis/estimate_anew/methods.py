@@ -366,7 +366,7 @@ def fit_epochs(
                         powers = [on_lines(seen[i].grid, first, known.powers[0])]
                     start = begin if whole is None else whole.values
                     solution = solve([seen[i]], pose, start, powers)
-                fits[i] = _of_solution(method, [seen[i]], solution, inertia_kg_m2)
+                fits[i] = fit_of(method, solution, inertia_kg_m2)
             except ValueError as error:
                 fits[i] = _failed(epochs[i].epoch, method, str(error))
     together: list[Fit] = []
@@ -386,7 +386,7 @@ def fit_epochs(
                 if condition not in shared:
                     begin = _begin(observations, inertia_kg_m2)
                     shared[condition] = solve(observations, pose, begin)
-                fit = _of_solution(method, observations, shared[condition], inertia_kg_m2)
+                fit = fit_of(method, shared[condition], inertia_kg_m2)
         if fit is not None and fit.n_samples:
             findings = fit.findings if condition else ()
             together.append(replace(fit, epoch="pooled", condition=condition, findings=findings))
@@ -420,13 +420,14 @@ def _failed(epoch: Epoch, method: Method, reason: str) -> Fit:
     return Fit(epoch.source, epoch.label, epoch.condition, method.name, unusable(epoch, reason))
 
 
-def _of_solution(
-    method: Method,
-    observations: Sequence[Observation],
-    solution: Solution,
-    inertia_kg_m2: float | None,
+def fit_of(
+    method: Method, solution: Solution, inertia_kg_m2: float | None = None, *, beside: bool = False
 ) -> Fit:
-    """Return a solution as it is recorded, named after the first of its epochs."""
+    """Return a solution as it is recorded, named after the first of its epochs.
+
+    `beside` says that the targets are torque less that of terms, which then counts as explained.
+    """
+    observations = [one.observation for one in solution.problems]
     epoch = observations[0].epoch
     elsewhere = by_other_drives(solution)
     pulled = loop_pull(solution.problems, solution.powers, solution.values, solution.inverse)
@@ -440,10 +441,11 @@ def _of_solution(
     )
     left = total = moved = 0.0
     samples = sum(one.grid.samples for one in observations)
-    for one in observations:
+    for one, problem in zip(observations, solution.problems, strict=True):
         # Parseval: the window's energy is spread over all samples.
         per_line = 2 * one.grid.samples / (one.grid.time_s.size * one.grid.energy)
-        left += per_line * _power(one.torque_nm - one.motion @ numbers["value"])
+        unexplained = one.torque_nm - one.motion @ numbers["value"]
+        left += per_line * _power(problem.residual(solution.values) if beside else unexplained)
         total += per_line * _power(one.torque_nm)
         moved += per_line * _power(one.motion[:, 2])
     r_squared = 1.0 - left / total
