@@ -100,7 +100,7 @@ def main() -> None:
             loop_against_real_time(folder, repeats),
             reading_against_numpy(folder, repeats),
             *(batch.rows(1, 1, (1, 2)) if quick else batch.rows()),
-            *(estimation.rows(2, 1) if quick else estimation.rows()),
+            *(estimation.rows(1) if quick else estimation.rows()),
             *(checks_cost.rows(1, 1) if quick else checks_cost.rows()),
             *online.rows(),
         ]

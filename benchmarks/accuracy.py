@@ -25,11 +25,7 @@ from tests.docs.measured import folded
 
 from benchmarks import hard_epochs, two_rigs
 from benchmarks.known_joint import TRUTH, array, sessions, settings_with
-from rigidimeter.analysis.estimation import estimate_delays, fit_epochs
-from rigidimeter.analysis.estimation.closedloop.line_methods import LINE_METHODS
-from rigidimeter.analysis.estimation.closedloop.linear_problems import least_squares_start
-from rigidimeter.analysis.estimation.closedloop.refine import fit_lines
-from rigidimeter.analysis.estimation.prepared import PreparedEpoch, Source, prepare
+from rigidimeter.analysis.estimate_anew import estimate_recorded, fit_epoch, prepare
 from rigidimeter.core.records import Channel, Epoch, Fit
 from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE, Settings
 from rigidimeter.planning import prbs_nm, predicted_precision
@@ -53,35 +49,36 @@ def percent(values: Iterable[float], digits: int = 2) -> list[str]:
     return [f"{100 * value:+.{digits}f}" for value in values]
 
 
+def fitted(epochs: Sequence[Epoch], method: str, settings: Settings) -> Sequence[Fit]:
+    """Return the fits of the epochs of one recording."""
+    recorded = prepare(epochs, settings, clocks=False)
+    return estimate_recorded(recorded, method, fits_alone=True).fits
+
+
 def pooled_bias(n: int) -> list[str]:
-    """Pooled estimates over n epochs of a subject who pushes, and the mean of least squares."""
+    """Pooled estimates of a subject who pushes, and the mean of least squares, over n epochs."""
     rows = []
     for sd in (0.2, 0.5):
         settings = settings_with(sd)
-        kept: dict[str, list[Any]] = {method: [] for method in ("iv", "spectral")}
-        squares, excluded, first = [], 0, None
-        source: Source | None = None
+        pooled: dict[str, list[Fit]] = {method: [] for method in ("iv", "spectral")}
+        squares: list[Fit] = []
+        excluded = 0
         for epochs in sessions(settings, n, 11):
-            good = [epoch for epoch in epochs if epoch.closed.included]
-            excluded += len(epochs) - len(good)
-            source = source or Source(good, settings)
-            for epoch in good:
-                first = first or epoch.channels["perturbation_nm"]
-                shared = replace(
-                    epoch, channels={**epoch.channels, "perturbation_nm": first}
-                )  # one copy of the sequence is enough
-                prepared = PreparedEpoch(shared, settings, source)
-                for method, members in kept.items():
-                    members.append(LINE_METHODS[method].observe(prepared))
-            squares += fit_epochs(good[:3], "bandlimited", settings)[0]
-        for method, observations in kept.items():
-            start = least_squares_start(observations)
-            fit = fit_lines(observations, LINE_METHODS[method].linearise, start)
-            error, se = fit.values / TRUTH - 1, fit.standard_errors / TRUTH
+            recorded = prepare(epochs, settings, clocks=False)
+            excluded += sum(not epoch.closed.included for epoch in epochs)
+            for method, found in pooled.items():
+                found += estimate_recorded(recorded, method).pooled[:1]
+            squares += fitted(epochs[:3], "bandlimited", settings)
+        for method, found in pooled.items():
+            error = array(found) / TRUTH - 1
+            se = error.std(0, ddof=min(1, len(found) - 1)) / np.sqrt(len(found))
             rows.append(
                 [
-                    f"{sd} N·m, {method}, pooled over {len(observations)}",
-                    *(f"{100 * e:+.2f} ± {100 * s:.2f}" for e, s in zip(error, se, strict=True)),
+                    f"{sd} N·m, {method}, mean of {len(found)} recordings",
+                    *(
+                        f"{100 * e:+.2f} ± {100 * s:.2f}"
+                        for e, s in zip(error.mean(0), se, strict=True)
+                    ),
                 ]
             )
         rows.append(
@@ -95,8 +92,8 @@ def pooled_bias(n: int) -> list[str]:
     return [
         "## Voluntary torque",
         "",
-        "Voluntary torque of the given SD, 0.3 to 4 Hz. Errors of J, B and K in %, ± one standard "
-        "error.",
+        f"Voluntary torque of the given SD, 0.3 to 4 Hz; {n} epochs, pooled by recording. Errors "
+        "of J, B and K in %, ± one standard error of the mean.",
         "",
         *table(["voluntary torque, method", "J", "B", "K"], rows),
     ]
@@ -127,8 +124,8 @@ def efficiency(title: str, voluntary_sd_nm: float, methods: Sequence[str], n: in
     alone: list[Fit] = []
     for epochs in sessions(settings, n, 12):
         for method in methods:
-            fits[method] += fit_epochs(epochs, method, settings)[0]
-        alone += [fit_epochs([epoch], "iv", settings)[0][0] for epoch in epochs]
+            fits[method] += fitted(epochs, method, settings)
+        alone += [fit_epoch(epoch, "iv", settings) for epoch in epochs]
     bound = np.median(array(fits["iv"], "_bound"), 0)
     everywhere, cost = bounds(settings)
     rows = []
@@ -176,7 +173,7 @@ def delay(n: int) -> list[str]:
                 for epochs in sessions(settings, n, 13):
                     for i in range(0, len(epochs), 5):
                         moved = [_late(epoch, late_s) for epoch in epochs[i : i + 5]]
-                        (found,) = estimate_delays({"batch": prepare(moved, settings)})
+                        (found,) = prepare(moved, settings).delays
                         errors.append(found.delay_s - late_s)
                         claimed.append(found.delay_s_se)
                 worst = 1e3 * np.max(np.abs(errors))
@@ -214,7 +211,7 @@ def paper_rates(n: int) -> list[str]:
     kept: dict[str, list[Fit]] = {}
     for epochs in sessions(settings, n, 14):
         for method in ("iv", "spectral", "bandlimited"):
-            kept.setdefault(method, []).extend(fit_epochs(epochs, method, settings)[0])
+            kept.setdefault(method, []).extend(fitted(epochs, method, settings))
     for method, fits in kept.items():
         error = array(fits) / TRUTH - 1
         rows.append(
@@ -238,9 +235,7 @@ def paper_rates(n: int) -> list[str]:
 def section_3_4(n: int) -> list[str]:
     """Sec. 3.4: closed loop with sensor noise, 100 runs."""
     settings = settings_with()
-    fits = [
-        fit for epochs in sessions(settings, n, 34) for fit in fit_epochs(epochs, "iv", settings)[0]
-    ]
+    fits = [fit for epochs in sessions(settings, n, 34) for fit in fitted(epochs, "iv", settings)]
     error = array(fits) - TRUTH
     bound = np.median(array(fits, "_bound"), 0)
     printed_mean, printed_sd = (-1.9e-7, -2.6e-7, -1.9e-7), (9.6e-7, 1.05e-6, 1.4e-6)
@@ -298,8 +293,7 @@ def lost(n: int) -> list[str]:
         "## A stretch that is lost",
         "",
         f"`iv`, {n} epochs of 20 s with 0.1 N·m of voluntary torque, each fitted alone; what was "
-        f"measured from {start_s:g} to {stop_s:g} s is lost. In % for J, B, K. The interval of two "
-        "segments is the wider of their lines and their scatter, which two do not tell well.",
+        f"measured from {start_s:g} to {stop_s:g} s is lost. In % for J, B, K.",
         "",
         *table(hard_epochs.LOST_HEADER, hard_epochs.lost_rows(n)),
     ]
@@ -311,8 +305,7 @@ def pushed(n: int) -> list[str]:
         "## Torque of the subject over all of the band",
         "",
         f"`bandlimited` on torque and motion alone, {n} epochs of 20 s a row, single epochs. In % "
-        "for J, B, K. The share of information is Σ |X|²/S of the lines where S is more than "
-        f"{100 * hard_epochs.DOMINATED:g} % of the torque's power, of that of all lines.",
+        "for J, B, K.",
         "",
         *table(hard_epochs.PUSHED_HEADER, hard_epochs.pushed_rows(n)),
     ]

@@ -20,8 +20,7 @@ from tests.pushes import JOINT, Pushed, epochs_with_emg, with_reflex_emg
 from tests.scenarios.recordings import measured_alone
 from tests.scenarios.scenario import scenario
 
-from rigidimeter.analysis.estimation import method_named
-from rigidimeter.analysis.estimation.prepared import prepare
+from rigidimeter.analysis.estimate_anew import estimate_recorded, prepare
 from rigidimeter.core.records import Activity, Epoch
 from rigidimeter.core.settings import Settings
 
@@ -89,7 +88,8 @@ def found_rows(n: int) -> Iterator[Sequence[object]]:
         for settings, epochs in recordings(n, **subject):
             recorded = [one.epoch for one in epochs]
             for known, seen in enumerate((recorded, list(map(without_causes, recorded)))):
-                activities = [one.activity for one in prepare(seen, settings)]
+                ready = prepare(seen, settings, clocks=False).perturbed
+                activities = [one.activity for one in ready]
                 for one, activity in zip(epochs, activities, strict=True):
                     assert activity is not None
                     locked[known] += _locked(activity)
@@ -155,9 +155,8 @@ def fitted_rows(n: int) -> Iterator[Sequence[object]]:
             seen = {"iv": recorded, "bandlimited": list(map(without_causes, recorded))}
             for method, own in seen.items():
                 for way, each in (("left out", own), ("fitted", list(map(without_emg, own)))):
-                    fits, _ = method_named(method).fit(
-                        prepare(each, settings), None, lambda _: None, False
-                    )
+                    prepared = prepare(each, settings, clocks=False)
+                    fits = estimate_recorded(prepared, method, fits_alone=True).fits
                     found.setdefault((method, way), []).extend(fits)
         for (method, way), fits in sorted(found.items(), reverse=True):
             values = np.array([fit.value for fit in fits]) / TRUTH - 1
@@ -181,7 +180,7 @@ def reflex_rows(n: int) -> Iterator[Sequence[object]]:
             epochs = joint.simulated(start, min(SESSION, n - start)).epochs
             own = [with_reflex_emg(one, gain, REFLEX_LATE_S, rng) for one in epochs]
             for known, seen in enumerate((own, list(map(without_causes, own)))):
-                for one in prepare(seen, settings):
+                for one in prepare(seen, settings, clocks=False).perturbed:
                     assert one.activity is not None
                     kept[known] += _locked(one.activity)
         share = [f"{100 * np.mean(one):.1f}" if one else "–" for one in kept]

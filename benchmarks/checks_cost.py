@@ -1,33 +1,26 @@
-"""What the checks of an epoch cost beside the estimate, in CPU time, in one run.
+"""What checks, terms and the pooled fit cost beside the fits of the epochs, in CPU time.
 
-`estimate` runs by turns with every check and with none, on epochs of 20 s: of a virtual session
-with the perturbation recorded (`iv`), of the same without it (`bandlimited`), and of a measured
-ankle where `RIGIDIMETER_SHARED` names the folder of the recordings. With `--parts` each check is
-timed too; what several checks share is with the first of them.
+`estimate` runs by turns as it is and with the fits of the epochs alone, on epochs of 20 s: of a
+virtual session with the perturbation recorded (`iv`), of the same without it (`bandlimited`), and
+of a measured ankle where `RIGIDIMETER_SHARED` names the folder of the recordings.
 
-    OPENBLAS_NUM_THREADS=1 python -m benchmarks.checks_cost
-    python -m benchmarks.checks_cost --epochs 12 --parts
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.checks_cost --epochs 12
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import os
 import time
-from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from unittest import mock
 
 from benchmarks.paired import REPEATS, Row, in_ms, paired
-from rigidimeter.analysis.estimation.diagnostics import CHECKS, Check
-from rigidimeter.analysis.estimation.diagnostics.together import Together
+from rigidimeter.analysis.estimate_anew import CHECKS, estimate, estimate_recorded, prepare
 from rigidimeter.analysis.reading import ReadOptions, read_recording
-from rigidimeter.analysis.study import analysis
-from rigidimeter.core.records import Epoch, Fit
-from rigidimeter.core.settings import parse_settings
+from rigidimeter.core.records import Epoch
+from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.virtual.batch import simulate_epochs
 
 VOLUNTARY = {"subject": {"OFF": {"voluntary_sd_nm": 0.1}}}
@@ -36,8 +29,6 @@ ANKLE = ReadOptions(
     reaction=True,
     epoch_length_s=20.0,
 )
-OUTSIDE = ("checked", "checked_together", "between_epochs")
-"""What `analysis.study.analysis` calls beside the estimate."""
 
 
 def inputs(count: int) -> dict[str, list[Epoch]]:
@@ -58,68 +49,32 @@ def inputs(count: int) -> dict[str, list[Epoch]]:
     return found
 
 
-@contextlib.contextmanager
-def no_checks() -> Iterator[None]:
-    """Let an analysis pass over every check."""
-
-    def fit_alone(_: object, fit: object, *_other: object, **__: object) -> object:
-        return fit
-
-    def fits_alone(_: object, fits: list[Fit], pooled: list[Fit], *__: object) -> Together:
-        return Together(fits, pooled, [])
-
-    with contextlib.ExitStack() as stack:
-        for name, stub in zip(OUTSIDE, (fit_alone, fits_alone, lambda *_: None), strict=True):
-            stack.enter_context(mock.patch.object(analysis, name, stub))
-        yield
+def fits_alone(epochs: Sequence[Epoch]) -> None:
+    """Estimate without checks of epochs, pooled fits and terms."""
+    every = CHECKS[:]
+    CHECKS.clear()
+    try:
+        estimate_recorded(prepare(epochs, Settings()), fits_alone=True)
+    finally:
+        CHECKS[:] = every
 
 
 def rows(count: int = 6, repeats: int = REPEATS) -> list[Row]:
-    """Return what an epoch costs with every check and with none."""
+    """Return what an epoch costs with everything, and with its fits alone."""
     return [
-        _row(f"estimate of an epoch of 20 s with every check, {name} / without", epochs, repeats)
+        _row(f"estimate of an epoch of 20 s, {name} / its fits alone", epochs, repeats)
         for name, epochs in inputs(count).items()
     ]
 
 
 def _row(name: str, epochs: Sequence[Epoch], repeats: int) -> Row:
-    def alone() -> None:
-        with no_checks():
-            analysis.estimate(epochs)
-
-    times_s = paired(lambda: analysis.estimate(epochs), alone, repeats, clock=time.process_time)
+    times_s = paired(
+        lambda: estimate(epochs, Settings()),
+        lambda: fits_alone(epochs),
+        repeats,
+        clock=time.process_time,
+    )
     return in_ms(name, (times_s[0] / len(epochs), times_s[1] / len(epochs)))
-
-
-def parts_ms(epochs: Sequence[Epoch]) -> Mapping[str, float]:
-    """Return the CPU time of each check in one estimate, in ms an epoch."""
-    spent: dict[str, float] = defaultdict(float)
-
-    def timed(check: Check) -> Check:
-        def function(case: object) -> object:
-            start_s = time.process_time()
-            try:
-                return check.function(case)  # type: ignore[arg-type]
-            finally:
-                spent[check.name] += 1e3 * (time.process_time() - start_s) / len(epochs)
-
-        return replace(check, function=function)  # type: ignore[arg-type]
-
-    def timed_together(*found: object) -> object:
-        start_s = time.process_time()
-        try:
-            return together(*found)
-        finally:
-            spent["checked_together"] += 1e3 * (time.process_time() - start_s) / len(epochs)
-
-    original, together = list(CHECKS), analysis.checked_together
-    CHECKS[:] = [timed(check) for check in original]
-    try:
-        with mock.patch.object(analysis, "checked_together", timed_together):
-            analysis.estimate(epochs)
-    finally:
-        CHECKS[:] = original
-    return spent
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -129,18 +84,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     parser.add_argument("--epochs", type=int, default=6)
     parser.add_argument("--repeats", type=int, default=REPEATS)
-    parser.add_argument("--parts", action="store_true", help="time each check too")
     options = parser.parse_args(arguments)
     print("| what / reference | ours | reference | ratio |")
     print("| --- | ---: | ---: | ---: |")
     for row in rows(options.epochs, options.repeats):
         print(row)
-    if options.parts:
-        tables = {name: parts_ms(epochs) for name, epochs in inputs(options.epochs).items()}
-        print(f"\n| check, ms an epoch | {' | '.join(tables)} |")
-        print(f"| --- | {' | '.join('---:' for _ in tables)} |")
-        for check in dict.fromkeys(part for table in tables.values() for part in table):
-            print(f"| {check} | {' | '.join(f'{t.get(check, 0):.1f}' for t in tables.values())} |")
 
 
 if __name__ == "__main__":

@@ -12,17 +12,8 @@ from tests.scenarios.recordings import measured_alone
 from tests.scenarios.scenario import scenario
 
 from benchmarks.known_joint import TRUTH, sessions, settings_with
-from rigidimeter.analysis.estimation.closedloop.linear_problems import (
-    direct,
-    instrumental,
-    least_squares_start,
-)
-from rigidimeter.analysis.estimation.closedloop.observe import observe, observe_motion
-from rigidimeter.analysis.estimation.closedloop.refine import fit_lines, shared_powers
-from rigidimeter.analysis.estimation.prepared import prepare
-from rigidimeter.analysis.estimation.uncertainty import of_fit
-from rigidimeter.analysis.study import estimate
-from rigidimeter.core.records import Channel, Epoch, Fit, LeftOut
+from rigidimeter.analysis.estimate_anew import estimate, fit_epoch
+from rigidimeter.core.records import Channel, Epoch
 from rigidimeter.core.settings import Settings
 
 Array = NDArray[np.float64]
@@ -36,7 +27,6 @@ PUSHED_HEADER = [
     "controller of the settings",
     "mean error of J, B, K",
     "held by 95 % intervals",
-    "share of information",
     "cautions (% of epochs, from 5)",
 ]
 
@@ -52,39 +42,28 @@ EPOCHS = 4
 SEEN = 0.05
 """Cautions of fewer epochs are not shown."""
 
-DOMINATED = 0.1
-"""A line belongs to the subject where the noise is more than this share of the torque's power."""
-
 
 def lost_rows(n: int) -> Iterator[Sequence[object]]:
-    """Yield how `iv` takes an epoch whole, with a hole in its window, and as two segments."""
+    """Yield what `iv` gives of an epoch that is whole, and of one of which a stretch is lost."""
     settings = settings_with(0.1)
     found: dict[str, list[tuple[Array, Array]]] = {}
     for epochs in sessions(settings, n, 17):
         for epoch in epochs:
-            hole = LeftOut(*LOST_S, "samples are lost", "lost")
-            ways = {
-                "nothing lost": [epoch],
-                "one window with a hole": [replace(epoch, left_out=(hole,))],
-                "two segments": [_part(epoch, -np.inf, LOST_S[0]), _part(epoch, LOST_S[1], np.inf)],
-            }
-            for way, parts in ways.items():
-                seen = [one.once(observe) for one in prepare(parts, settings)]
-                fit = fit_lines(seen, instrumental, least_squares_start(seen))
-                ends = of_fit(fit.values, fit.covariance, fit.degrees, np.diag(fit.bound))
-                held = (ends["low"] <= TRUTH) & (ends["high"] >= TRUTH)
-                found.setdefault(way, []).append((fit.values, held))
+            for way, recorded in (("nothing lost", epoch), ("lost", _lost(epoch))):
+                fit = fit_epoch(recorded, "iv", settings)
+                held = (fit.low <= TRUTH) & (fit.high >= TRUTH)
+                found.setdefault(way, []).append((fit.value, held))
     for way, both in found.items():
         values, held = map(np.array, zip(*both, strict=True))
         yield way, _three(values.std(axis=0) / TRUTH, ".2f"), _three(held.mean(axis=0), ".0f")
 
 
-def _part(epoch: Epoch, start_s: float, stop_s: float) -> Epoch:
-    """Return what was measured between two times; command and perturbation stay whole."""
+def _lost(epoch: Epoch) -> Epoch:
+    """Return the epoch without what was measured in a stretch; the command stays whole."""
     channels = dict(epoch.channels)
     for name in ("torque_nm", "angle_rad", "velocity_rad_s"):
         one = epoch.channels[name]
-        rows = (one.time_s > start_s) & (one.time_s < stop_s)
+        rows = (one.time_s <= LOST_S[0]) | (one.time_s >= LOST_S[1])
         channels[name] = Channel(name, one.time_s[rows], one.values[rows])
     return replace(epoch, channels=channels)
 
@@ -95,15 +74,14 @@ def pushed_rows(n: int) -> Iterator[Sequence[object]]:
         for factor in (1.0, 2.0):
             case = scenario(name, subject=subject)
             settings = _controller(case.analysed_with(), factor)
-            errors, held, shares, cautions = [], [], [], Counter[str]()
+            errors, held, cautions = [], [], Counter[str]()
             for number in range(max(n // EPOCHS, 1)):
                 epochs, (truth, *_) = case.simulated(number, EPOCHS)
                 alone = list(map(measured_alone, epochs))
-                fits = estimate(alone, "bandlimited", settings=settings).fits
-                for epoch, fit in zip(alone, fits, strict=True):
+                fits = estimate(alone, settings, "bandlimited").fits
+                for fit in fits:
                     errors.append(fit.value / truth - 1)
                     held.append((fit.low <= truth) & (truth <= fit.high))
-                    shares.append(_share_dominated(epoch, settings, fit))
                     cautions.update({one.name for one in fit.findings if one.level != "note"})
             told = (
                 f"{one} {100 * count / len(errors):.0f}"
@@ -115,7 +93,6 @@ def pushed_rows(n: int) -> Iterator[Sequence[object]]:
                 "its own" if factor == 1.0 else f"{factor:g} times its own",
                 _three(np.mean(errors, axis=0), "+.1f"),
                 _three(np.mean(held, axis=0), ".0f"),
-                _three(np.mean(shares, axis=0), ".0f"),
                 ", ".join(told) or "–",
             )
 
@@ -127,16 +104,6 @@ def _controller(settings: Settings, factor: float) -> Settings:
         "damping_nm_s_rad": factor * known.damping_nm_s_rad,
     }
     return settings.model_copy(update={"controller": known.model_copy(update=values)})
-
-
-def _share_dominated(epoch: Epoch, settings: Settings, fit: Fit) -> Array:
-    """Return the share of Σ |X|²/S of each parameter that comes from lines of the subject."""
-    (prepared,) = prepare([epoch], settings)
-    (problem,) = direct([prepared.once(observe_motion)], fit.value)
-    (power,) = shared_powers([problem], fit.value)
-    information = np.abs(problem.regressors) ** 2 / power[:, None]
-    dominated = power > DOMINATED * np.abs(problem.target) ** 2
-    return np.asarray(information[dominated].sum(axis=0) / information.sum(axis=0))
 
 
 def _three(shares: Array, digits: str) -> str:

@@ -21,9 +21,7 @@ from numpy.typing import NDArray
 from tests.docs.measured import between_the_marks, folded
 from tests.scenarios.late_drive_rig import LateRig, simulate
 
-from rigidimeter.analysis.estimation.diagnostics import CHECKS
-from rigidimeter.analysis.study import Preparation
-from rigidimeter.analysis.study.analysis import analyse_prepared
+from rigidimeter.analysis.estimate_anew import estimate_recorded, prepare
 from rigidimeter.core.settings import parse_settings
 
 Array = NDArray[np.float64]
@@ -63,8 +61,8 @@ def row(rig: LateRig, names: Sequence[str], recordings: int) -> Row:
             replace(epoch, channels={name: epoch.channels[name] for name in names})
             for epoch in simulate(rig, recording, EPOCHS)
         ]
-        preparation = Preparation(epochs, parse_settings(rig.settings()))
-        fits += analyse_prepared(preparation, "iv").fits
+        recorded = prepare(epochs, parse_settings(rig.settings()))
+        fits += estimate_recorded(recorded, "iv", fits_alone=True).fits
     value, low, high = (np.array([getattr(fit, part) for fit in fits])
                         for part in ("value", "low", "high"))  # fmt: skip
     truth = rig.truth
@@ -117,12 +115,7 @@ def table(recordings: int) -> list[str]:
 def main() -> None:
     """Measure the table and write it; fewer recordings are only printed."""
     recordings = int(sys.argv[1]) if len(sys.argv) > 1 else RECORDINGS
-    every = CHECKS[:]
-    CHECKS[:] = [check for check in CHECKS if check.name == "between_samples"]  # saves half
-    try:
-        lines = table(recordings)
-    finally:
-        CHECKS[:] = every
+    lines = table(recordings)
     if recordings == RECORDINGS:
         between_the_marks(TABLE, "\n".join(lines))
 

@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 from tests.scenarios.recordings import measured_alone
 from tests.scenarios.scenario import Scenario, scenario
 
-from rigidimeter.analysis.estimation.epoch_models import model_epoch
-from rigidimeter.analysis.estimation.prepared import prepare
-from rigidimeter.analysis.estimation.terms import candidates
+from rigidimeter.analysis.reading import Recording
+from rigidimeter.analysis.study import fit_terms
 from rigidimeter.core.records import Channel, Epoch
 
 Array = NDArray[np.float64]
@@ -104,7 +103,6 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", default=[""], help="rows whose name holds a word")
     parser.add_argument("--perturbation", action="store_true", help="with its column")
     options = parser.parse_args()
-    models = candidates(TERMS.split(","))
     print("| joint | none | J, B, K alone | " + " | ".join(KINDS.values()) + " | why none |")
     print("| --- |" + " ---: |" * (2 + len(KINDS)) + " --- |")
     for name, epoch_of, one in rows():
@@ -115,14 +113,16 @@ def main() -> None:
         for number in range(options.epochs):
             epoch = epoch_of(number)
             epoch = epoch if options.perturbation else measured_alone(epoch)
-            (prepared,) = prepare([epoch], one.analysed_with())
-            compared = model_epoch(prepared, models, compare=True, grow=True).compared
-            if compared.recommended is None:
+            recording = Recording((epoch,), (), one.analysed_with(), ())
+            (found,) = fit_terms(recording, TERMS, compare=True).epochs
+            chosen = found.models and found.models.compared.recommended
+            if chosen is None:
+                reason = found.models.compared.reason if found.models else found.problem
                 counts["none"] += 1
-                why[compared.reason.split(": ", 1)[1][:60]] += 1
+                why[reason.split(": ", 1)[-1][:60]] += 1
                 continue
-            bases = {term.split("-")[0].rstrip("+") for term in compared.recommended.terms}
-            kinds = {kind for kind in KINDS if kind in compared.recommended.terms or kind in bases}
+            bases = {term.split("-")[0].rstrip("+") for term in chosen.terms}
+            kinds = {kind for kind in KINDS if kind in chosen.terms or kind in bases}
             counts.update(kinds or {"alone"})
         shown = [100 * counts[key] / options.epochs for key in ("none", "alone", *KINDS)]
         reason = why.most_common(1)[0][0] if why else ""

@@ -42,11 +42,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimation import score_epoch
-from rigidimeter.analysis.estimation.closedloop.closed_loop_fit import fit_closed_loop
-from rigidimeter.analysis.estimation.closedloop.line_methods import LINE_METHODS
-from rigidimeter.analysis.estimation.prepared import prepare
-from rigidimeter.analysis.estimation.scores import angular_impulse_nm_s, loop_area_j, scoring_cycles
+from rigidimeter.analysis.estimate_anew import (
+    estimate_recorded,
+    loop_area_j,
+    prepare,
+    score_epoch,
+    scoring_cycles,
+)
 from rigidimeter.analysis.statistics import (
     day_difference,
     difference,
@@ -157,7 +159,7 @@ class Scorer:
             + noise
         )
         return (
-            angular_impulse_nm_s(torque[:-1], self.interval_s) / self.n,
+            float(np.sum(np.abs(torque[:-1]))) * self.interval_s / self.n,
             loop_area_j(torque, self.angle) / self.n,
         )
 
@@ -190,11 +192,10 @@ def simulate_study(seed: int) -> dict[str, Array]:
     if not _SCORER:
         _SCORER.append(Scorer(settings, null[0].settings.subject["OFF"], 1))
     parts = [("OFF", _of(null, "OFF")), ("DBS", _of(null, "DBS"))]
-    found = _estimates(settings, parts, seed, math.nan)
+    found = _estimates(settings, parts, seed)
     if seed % EFFECT_EVERY == 0:
-        inertia = float(np.median(np.concatenate([found["OFF J"], found["DBS J"]])))
-        effect = [("effect", _of(plan_study(PAPER, seed), "DBS"))]
-        found |= _estimates(settings, effect, seed, inertia)
+        effect = [parts[0], ("effect", _of(plan_study(PAPER, seed), "DBS"))]
+        found = _estimates(settings, effect, seed) | found
     return found
 
 
@@ -202,12 +203,8 @@ def _estimates(
     settings: Settings,
     parts: Sequence[tuple[str, list[DayPlan]]],
     seed: int,
-    inertia_kg_m2: float,
 ) -> dict[str, Array]:
-    """Simulate the epochs of conditions together, and estimate them as `estimate` does.
-
-    J is held at its median over these epochs if it is not given.
-    """
+    """Simulate the epochs of conditions together, and estimate them as `estimate` does."""
     key = sum(map(ord, parts[0][0]))
     names, subjects = [], []
     for name, plans in parts:
@@ -222,11 +219,9 @@ def _estimates(
         seed=int(np.random.SeedSequence(seed, spawn_key=(PRBS, key)).generate_state(1)[0]),
     )
     epochs = [batch.epoch(i) for i in range(len(batch))]
-    prepared = prepare(epochs, settings)
-    first, _ = fit_closed_loop(LINE_METHODS["iv"], prepared, pooled=False)
-    if math.isnan(inertia_kg_m2):
-        inertia_kg_m2 = float(np.median([fit.inertia_kg_m2 for fit in first]))
-    second, _ = fit_closed_loop(LINE_METHODS["iv"], prepared, inertia_kg_m2, pooled=False)
+    recorded = prepare(epochs, settings, clocks=False)
+    analysis = estimate_recorded(recorded, "iv", fits_alone=True)
+    first, second = analysis.fits, analysis.fixed_inertia
     assert all(fit.outcome.included for fit in (*first, *second))
     found = {}
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(SINUSOID, key)))

@@ -13,8 +13,7 @@ import numpy as np
 from tests.scenarios.independent_rig import Rig, simulate
 
 from benchmarks.known_joint import JOINT, TRUTH, array
-from rigidimeter.analysis.study import Preparation
-from rigidimeter.analysis.study.analysis import analyse_prepared
+from rigidimeter.analysis.estimate_anew import estimate_recorded, prepare
 from rigidimeter.core.records import Channel, Epoch, Fit
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.virtual.batch import simulate_chunks
@@ -55,7 +54,7 @@ def measured_alone(epoch: Epoch) -> Epoch:
 
 
 def _fits(epochs: list[Epoch], method: str, settings: Settings) -> list[Fit]:
-    analysis = analyse_prepared(Preparation(epochs, settings), method, fits_alone=True)
+    analysis = estimate_recorded(prepare(epochs, settings), method, fits_alone=True)
     return [fit for fit in analysis.fits if fit.n_samples]
 
 

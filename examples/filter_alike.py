@@ -15,15 +15,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfilt, sosfiltfilt
 
-from rigidimeter.analysis.estimation import Signals, fit_inertia_damping_stiffness
-from rigidimeter.analysis.estimation.signals import (
-    kinematics,
-    motion_channels,
-    spline,
-    uniform_grid,
-)
+from rigidimeter.analysis.estimate_anew import Signals, fit_inertia_damping_stiffness
 from rigidimeter.core.records import Epoch
 from rigidimeter.core.session import read_session, session_settings
 
@@ -38,12 +33,13 @@ HIGHPASS_HZ = 0.2
 
 def measured(epoch: Epoch) -> Signals:
     """Return the measured signals on one grid, unfiltered."""
-    torque = epoch.channels["torque_nm"]
-    rate_hz = torque.rate_hz
-    time_s = uniform_grid([torque, *motion_channels(epoch)], rate_hz)
-    angle, velocity, acceleration = kinematics(epoch, time_s)
-    band = (0.0, rate_hz / 2)
-    return Signals(time_s, spline(torque)(time_s), acceleration, velocity, angle, rate_hz, band)
+    channels = [epoch.channels[name] for name in ("torque_nm", "velocity_rad_s", "angle_rad")]
+    rate_hz = channels[0].rate_hz
+    start_s = max(one.time_s[0] for one in channels)
+    time_s = np.arange(start_s, min(one.time_s[-1] for one in channels), 1 / rate_hz)
+    torque, velocity, angle = (CubicSpline(one.time_s, one.values) for one in channels)
+    motion = velocity.derivative()(time_s), velocity(time_s), angle(time_s)
+    return Signals(time_s, torque(time_s), *motion, rate_hz, (0.0, rate_hz / 2))
 
 
 def position_only(raw: Signals, high_pass: Filter) -> Signals:

@@ -11,7 +11,7 @@ import numpy as np
 from tests.scenarios.catalogue import SCENARIOS
 from tests.scenarios.recordings import measured_alone
 
-from rigidimeter.analysis.study.analysis import Preparation, analyse_prepared
+from rigidimeter.analysis.estimate_anew import estimate_recorded, prepare
 from rigidimeter.core.executor import each
 from rigidimeter.core.records import Analysis, Epoch, Fit
 
@@ -49,12 +49,12 @@ def _one(task: tuple[str, int, tuple[str, ...]]) -> dict[str, Kept]:
     scenario = SCENARIOS[name]
     epochs, truth = scenario.simulated(number, EPOCHS)
     settings = scenario.analysed_with()
-    known = Preparation(epochs, settings)
+    known = prepare(epochs, settings)
     found = {}
     for method in methods:
-        own = known if method != "blind" else Preparation(seen_by(method, epochs), settings)
+        own = known if method != "blind" else prepare(seen_by(method, epochs), settings)
         with np.errstate(all="ignore"):
-            found[method] = kept(truth.tolist(), analyse_prepared(own, METHODS[method]))
+            found[method] = kept(truth.tolist(), estimate_recorded(own, METHODS[method]))
     return found
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from rigidimeter.analysis.estimation import epoch_signals, fit_inertia_damping_stiffness
+from rigidimeter.analysis.estimate_anew import epoch_signals, fit_inertia_damping_stiffness
 from rigidimeter.core.session import read_session
-from rigidimeter.core.settings import EstimationSettings, parse_settings
+from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.virtual import PAPER_RATES
 from rigidimeter.virtual.batch import simulate_epochs
 
@@ -19,7 +19,7 @@ def run(rig, method="bandlimited"):
     """
     batch = simulate_epochs(parse_settings({"rig": rig}), EPOCHS, conditions="OFF", seed=1)
     epochs = [batch.epoch(i) for i in range(EPOCHS)]
-    signals = [epoch_signals(epoch, method, EstimationSettings()) for epoch in epochs]
+    signals = [epoch_signals(epoch, Settings(), method) for epoch in epochs]
     fits = [fit_inertia_damping_stiffness(one).value for one in signals]
     spread = [np.rad2deg(epoch.channels["angle_rad"].values.std()) for epoch in epochs]
     return 100 * (np.mean(fits, axis=0) / TRUTH - 1), np.array(spread)

@@ -1,17 +1,18 @@
 """What the design predicts against the product's own estimates on the virtual rig."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimation import (
+from rigidimeter.analysis.estimate_anew import (
     epoch_signals,
-    fit_epochs,
+    estimate_recorded,
     fit_inertia_damping_stiffness,
+    prepare,
 )
 from rigidimeter.analysis.statistics import day_difference
-from rigidimeter.core.records import Epoch, Fit
+from rigidimeter.core.records import Analysis, Epoch, Fit
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.planning import (
     PARAMETER_NAMES,
@@ -45,7 +46,12 @@ def sessions(settings: Settings, epochs: int, seed: int) -> Iterator[list[Epoch]
         yield [batch.epoch(i) for i in range(len(batch))]
 
 
-def table(fits: list[Fit], ending: str = "") -> np.ndarray:
+def analysed(epochs: list[Epoch], settings: Settings) -> Analysis:
+    recorded = prepare(epochs, settings, clocks=False)
+    return estimate_recorded(recorded, "iv", fits_alone=True)
+
+
+def table(fits: Sequence[Fit], ending: str = "") -> np.ndarray:
     return np.array([[getattr(fit, name + ending) for name in PARAMETER_NAMES] for fit in fits])
 
 
@@ -57,7 +63,7 @@ def test_the_estimation_lays_out_the_same_lines_and_finds_the_same_bound(
     many epochs tell to 20 % or so."""
     settings, found = plan(voluntary_sd_nm, rig)
     (epochs,) = sessions(settings, SESSION, seed=5)
-    fits, _ = fit_epochs(epochs, "iv", settings)
+    fits = analysed(epochs, settings).fits
     assert fits[0].band_hz == pytest.approx(found.iv_band_hz, rel=1e-9)
     J, B, K = np.median(table(fits, "_bound"), axis=0) / found.iv.free
     assert pytest.approx(1.0, abs=0.1) == J
@@ -73,8 +79,9 @@ def test_iv_scatters_as_predicted(voluntary_sd_nm: float, rig: dict) -> None:
     settings, found = plan(voluntary_sd_nm, rig)
     free, fixed = [], []
     for epochs in sessions(settings, 500, seed=19):
-        free += fit_epochs(epochs, "iv", settings)[0]
-        fixed += fit_epochs(epochs, "iv", settings, found.joint.inertia_kg_m2)[0]
+        analysis = analysed(epochs, settings)
+        free += analysis.fits
+        fixed += analysis.fixed_inertia
     assert all(fit.outcome.included for fit in free)
     ratio = np.std(table(free), axis=0, ddof=1) / found.iv.free
     fixed_ratio = np.std(table(fixed)[:, 1:], axis=0, ddof=1) / found.iv.fixed_inertia
@@ -87,7 +94,7 @@ def test_iv_scatters_as_predicted(voluntary_sd_nm: float, rig: dict) -> None:
 def test_least_squares_is_off_as_predicted() -> None:
     settings, found = plan(0.2, {})
     fits = [
-        fit_inertia_damping_stiffness(epoch_signals(epoch, "bandlimited", settings.estimation))
+        fit_inertia_damping_stiffness(epoch_signals(epoch, settings, "bandlimited"))
         for epochs in sessions(settings, 100, seed=20)
         for epoch in epochs
     ]
@@ -130,7 +137,7 @@ def test_studies_see_the_difference_as_often_as_predicted() -> None:
         seed=21,
     ):
         epochs = [batch.epoch(i) for i in range(len(batch))]
-        B = [fit.damping_nm_s_rad for fit in fit_epochs(epochs, "iv", settings)[0]]
+        B = [fit.damping_nm_s_rad for fit in analysed(epochs, settings).fits]
         significant += day_difference(B[: n * days], B[n * days :], labels, labels).p < 0.05
     power = significant / studies
     print(f"\n{days} days: power {power:.3f}, predicted {predicted:.3f}")

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import scipy.io
 
-from rigidimeter.analysis.estimation import epoch_signals, fit_inertia_damping_stiffness
+from rigidimeter.analysis.estimate_anew import epoch_signals, fit_inertia_damping_stiffness
 from rigidimeter.analysis.reading import ReadOptions, read_recording
 from rigidimeter.cli.main import main
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.settings import EstimationSettings
+from rigidimeter.core.settings import Settings
 
 PUBLISHED = {"inertia_kg_m2": 0.0175, "damping_nm_s_rad": 1.25, "stiffness_nm_rad": 103.0}
 """Least squares on the whole recording, at 100 samples/s (shared data, README)."""
@@ -43,7 +43,7 @@ def test_without_weights_each_epoch_is_within_a_tenth_of_the_known_fit(ankle):
     named = dict(name.split("=") for name in NAMES[1::2])
     options = ReadOptions(named, epoch_length_s=20.0, rate_hz=1000.0, reaction=True)
     epochs, _ = read_recording(path, options)
-    signals = [epoch_signals(one, "bandlimited", EstimationSettings()) for one in epochs]
+    signals = [epoch_signals(one, Settings(), "bandlimited") for one in epochs]
     fits = [fit_inertia_damping_stiffness(one) for one in signals]
     for fit in fits:
         np.testing.assert_allclose(fit.value, list(PUBLISHED.values()), rtol=0.1)

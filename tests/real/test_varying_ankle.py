@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimation import fit_epochs
-from rigidimeter.analysis.estimation.diagnostics import checked
-from rigidimeter.analysis.estimation.prepared import prepare
+from rigidimeter.analysis.estimate_anew import estimate
 from rigidimeter.analysis.reading.formats.read_options import ReadOptions
 from rigidimeter.analysis.reading.formats.readers import read_recording
 from rigidimeter.core.records import Channel
@@ -21,11 +19,9 @@ OPTIONS = ReadOptions(
 
 
 def varying(epochs):
-    settings = Settings()
-    fits, _ = fit_epochs(epochs, "bandlimited", settings)
     return [
-        {f.name: f.details for f in checked(prepared, fit).findings if f.name.startswith("varying")}
-        for prepared, fit in zip(prepare(epochs, settings), fits, strict=True)
+        {f.name: f.details for f in fit.findings if f.name.startswith("varying")}
+        for fit in estimate(epochs, Settings(), "bandlimited").fits
     ]
 
 
@@ -42,9 +38,8 @@ def moved(epoch, share):
         "angle_rad": angle.values + np.radians(8.0) * np.cos(phase),
         "torque_nm": torque.values + more,
     }
-    return replace(
-        epoch, channels={name: Channel(name, angle.time_s, v) for name, v in channels.items()}
-    )
+    channels = {name: Channel(name, angle.time_s, v) for name, v in channels.items()}
+    return replace(epoch, channels=channels, task="prbs")
 
 
 @pytest.mark.parametrize("name", ["z_df", "z_df2", "z_pf"])

@@ -9,8 +9,8 @@ import pytest
 from tests.scenarios.catalogue import SCENARIOS
 from tests.scenarios.drive_rig import TRUTH, DriveRig, run
 
-from rigidimeter.analysis.study import Preparation, estimate
-from rigidimeter.analysis.study.analysis import analyse_prepared
+from rigidimeter.analysis.estimate_anew import estimate_recorded, prepare
+from rigidimeter.analysis.study import estimate
 from rigidimeter.core.records import Epoch
 from rigidimeter.core.settings import parse_settings
 
@@ -126,12 +126,12 @@ def test_without_the_command_the_interval_holds_what_the_drive_of_the_settings_t
 def scattered():
     scenario = SCENARIOS["5 % lost, stamps ±0.3 ms"]
     epochs, truth = scenario.simulated(0, 2)
-    return Preparation(epochs, scenario.analysed_with()), truth
+    return prepare(epochs, scenario.analysed_with()), truth
 
 
 @pytest.mark.parametrize("method", ["iv", "bandlimited"])
 def test_stamps_that_scatter_about_the_ticks_leave_it_open_when_samples_came(scattered, method):
-    preparation, truth = scattered
-    for fit in analyse_prepared(preparation, method).fits:
+    recorded, truth = scattered
+    for fit in estimate_recorded(recorded, method).fits:
         assert fit.low[0] <= truth[0, 0] <= fit.high[0]
         assert fit.high[0] - fit.low[0] < 0.04 * truth[0, 0]

@@ -13,8 +13,7 @@ import pytest
 from tests.small_study import record
 
 import rigidimeter as rm
-from rigidimeter.analysis.study import Preparation
-from rigidimeter.analysis.study.analysis import analyse_prepared
+from rigidimeter.analysis.estimate_anew import estimate_recorded, prepare
 from rigidimeter.core.files import plain_values
 from rigidimeter.core.records import Channel
 
@@ -150,8 +149,8 @@ def test_every_output_of_a_study_says_the_same(pushed, rigidimeter, no_figures, 
     assert cautions[0].headline in terminal
 
 
-def names_and_levels(preparation, method):
-    fits = analyse_prepared(preparation, method).fits
+def names_and_levels(recorded, method):
+    fits = estimate_recorded(recorded, method).fits
     return [sorted((f.name, f.level) for f in fit.findings) for fit in fits]
 
 
@@ -165,7 +164,7 @@ def test_a_tenth_of_a_millisecond_of_jitter_changes_no_finding(simulate):
             stamps = c.time_s + rng.uniform(-5e-5, 5e-5, len(c))
             channels[name] = Channel(name, stamps, c.values)
         moved.append(replace(epoch, channels=channels))
-    one, two = (Preparation(each, recording.settings) for each in (recording.epochs, moved))
+    one, two = (prepare(each, recording.settings) for each in (recording.epochs, moved))
     for method in ("auto", "bandlimited"):
         before = names_and_levels(one, method)
         assert before == names_and_levels(two, method)

@@ -11,15 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimation import METHODS
-from rigidimeter.analysis.estimation.diagnostics import CHECKS
-from rigidimeter.analysis.estimation.terms import TERMS
+from rigidimeter.analysis.estimate_anew import CHECKS, METHODS, TERMS
 from rigidimeter.core.findings import KINDS
 
 ROOT = Path(__file__).parents[3]
 HOW_TO = ROOT / "docs" / "development" / "add-an-estimator.md"
 EXAMPLES = re.findall(r"```python\n(.*?)```", HOW_TO.read_text("utf-8"), re.S)
-ESTIMATOR, CHECK, HARMLESS, TERM = EXAMPLES
+ESTIMATOR, CHECK, TERM = EXAMPLES
 
 
 @pytest.fixture(autouse=True)
@@ -105,13 +103,13 @@ def test_a_check_is_one_entry(rigidimeter, recording, tmp_path):
     assert "Use a smaller perturbation." in ran.out
 
 
-@pytest.mark.parametrize(("where", "level"), [("if case", "caution"), ("if not case", "note")])
+@pytest.mark.parametrize(("where", "level"), [("if pull", "caution"), ("if not pull", "note")])
 def test_a_check_may_say_where_its_failure_is_harmless(
     rigidimeter, recording, tmp_path, where, level
 ):
     """The recording has no perturbation, so that only the second of the two says a reason."""
-    check = CHECK.replace("9.0", "0.001").replace("near_range))", "near_range, harmless=harmless))")
-    (tmp_path / "near_range.py").write_text(HARMLESS.replace("if case", where) + check)
+    check = CHECK.replace("9.0", "0.001").replace("if pull", where)
+    (tmp_path / "near_range.py").write_text(check)
     out = tmp_path / "e.json"
     ran = rigidimeter("--load", tmp_path / "near_range.py", "estimate", recording, "--json", out)
     assert ran.status == 0, ran.err

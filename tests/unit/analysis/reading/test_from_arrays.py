@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimation import METHODS, fit_epoch, methods
+from rigidimeter.analysis.estimate_anew import METHODS, fit_epoch
 from rigidimeter.analysis.reading import from_arrays, identify
 from rigidimeter.core.records import Channel, Epoch
 from rigidimeter.core.settings import Settings, parse_settings
@@ -106,10 +106,13 @@ def test_what_cannot_be_used_is_refused(arrays, change, words):
         identify(**{**arrays, "rate_hz": RATE_HZ, **change})
 
 
-def test_two_methods_of_one_name_are_refused(arrays, monkeypatch):
-    monkeypatch.setattr(methods, "METHODS", [*METHODS, replace(METHODS[0], name="iv")])
-    with pytest.raises(ValueError, match="two methods have the name iv"):
-        identify(**arrays, rate_hz=RATE_HZ)
+def test_two_methods_of_one_name_are_refused(arrays):
+    METHODS.append(replace(METHODS[0], name="iv"))
+    try:
+        with pytest.raises(ValueError, match="two methods have the name iv"):
+            identify(**arrays, rate_hz=RATE_HZ)
+    finally:
+        METHODS.pop()
 
 
 def test_the_example_of_the_docstring_runs():

@@ -11,7 +11,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rigidimeter.analysis.estimation import epoch_signals, scoring_cycles
+from rigidimeter.analysis.estimate_anew import epoch_signals, scoring_cycles
 from rigidimeter.analysis.report.curves import (
     changes,
     draw_loops,
@@ -137,7 +137,7 @@ def test_spectrum_of_a_line_peaks_at_the_line() -> None:
 def test_parts_of_the_model_add_up_to_it(study: StudyResult) -> None:
     fit = study.analysis.fixed_inertia[1]
     epoch = study.epochs[1]
-    signals = epoch_signals(epoch, fit.method, study.settings.estimation)
+    signals = epoch_signals(epoch, study.settings, fit.method)
     limit_nm = torque_limit_nm(signals, fit)
     figure = drawn(SIZE, draw_torque, signals, fit, "black", 100.0, limit_nm, rows=5)
     torque, left, *parts = figure.axes

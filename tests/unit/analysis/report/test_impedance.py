@@ -5,9 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimation.closedloop.observe import observe_periods
-from rigidimeter.analysis.estimation.closedloop.periodic_response import impedance as without_model
-from rigidimeter.analysis.estimation.prepared import prepare
+from rigidimeter.analysis.estimate_anew import impedance as without_model
+from rigidimeter.analysis.estimate_anew import prepare
 from rigidimeter.analysis.report import SECTIONS, Figure
 from rigidimeter.analysis.report.curves import (
     COHERENT,
@@ -19,7 +18,6 @@ from rigidimeter.analysis.report.style import condition_colours, drawn, svg_text
 from rigidimeter.analysis.study import StudyResult
 from rigidimeter.analysis.study.drawn_signals import Response, Spectrum
 from rigidimeter.analysis.study.examples import analysed_epoch
-from rigidimeter.analysis.study.over_frequency import same_lines
 from rigidimeter.core.records import Channel, Delay, Outcome
 from rigidimeter.core.settings import Settings
 from rigidimeter.model import JointDynamics
@@ -40,12 +38,14 @@ def voluntary_figures(result: StudyResult) -> list[Figure]:
     return figures(result, "voluntary")
 
 
-@pytest.fixture(scope="module")
-def observations():
+def begun_elsewhere():
     """Return epochs without noise that begin at three places of the sequence."""
     rng = np.random.default_rng(2)
-    epochs = [periodic_epoch(OFF, str(i), "OFF", rng, 21 * i, noise_nm=0.0) for i in range(3)]
-    return [observe_periods(epoch) for epoch in prepare(epochs, Settings())]
+    return [periodic_epoch(OFF, str(i), "OFF", rng, 21 * i, noise_nm=0.0) for i in range(3)]
+
+
+def measured(epochs):
+    return without_model(prepare(epochs, Settings(), clocks=False).perturbed)
 
 
 def test_the_model_is_eq_3_over_frequency() -> None:
@@ -58,8 +58,10 @@ def test_the_model_is_eq_3_over_frequency() -> None:
     assert there.imag == pytest.approx(0.1368 * np.sqrt(1.751 / 0.0045))
 
 
-def test_lines_of_epochs_that_began_elsewhere_add_up_to_the_joint(observations) -> None:
-    found = without_model(observations)
+def test_lines_of_epochs_that_began_elsewhere_add_up_to_the_joint() -> None:
+    found = measured(begun_elsewhere())
+    assert found is not None
+    assert found.observed == 3
     low = found.frequency_hz < 5.0
     expected = model_nm_rad(OFF, found.frequency_hz)
     error = np.abs(found.impedance_nm_rad / expected - 1)[low]
@@ -70,26 +72,26 @@ def test_lines_of_epochs_that_began_elsewhere_add_up_to_the_joint(observations) 
     assert np.min(found.coherence[low]) > 0.95
 
 
-def test_lines_as_they_are_would_cancel(observations) -> None:
-    """The sum of three lines a third of a period apart is nearly nothing."""
-    first = [each.torque_nm[each.excited][0] for each in observations]
-    assert np.abs(np.sum(first)) < 0.05 * np.sum(np.abs(first))
-
-
-def test_only_epochs_with_the_same_lines_are_added(observations) -> None:
+def test_only_epochs_with_the_same_lines_are_added() -> None:
     shorter = periodic_epoch(OFF, "s", "OFF", np.random.default_rng(0))
-    cut = {
-        name: Channel(name, channel.time_s[:4000], channel.values[:4000])
-        for name, channel in shorter.channels.items()
-    }
-    (prepared,) = prepare([dataclasses.replace(shorter, channels=cut)], Settings())
-    two = observe_periods(prepared)
-    assert len(same_lines([two, *observations])) == 4  # two periods have the lines of three
-    grid = two.grid
-    other = dataclasses.replace(grid, omega_rad_s=1.01 * grid.omega_rad_s)
-    moved = dataclasses.replace(two, grid=other)
-    assert same_lines([moved, *observations]) == observations
-    assert same_lines([]) == []
+    two, one = (
+        dataclasses.replace(
+            shorter,
+            channels={
+                name: Channel(name, channel.time_s[:n], channel.values[:n])
+                for name, channel in shorter.channels.items()
+            },
+        )
+        for n in (4000, 2000)
+    )
+    whole = begun_elsewhere()
+    together = measured([two, *whole])
+    assert together is not None
+    assert together.observed == 4  # two periods have the lines of three
+    left = measured([one, *whole])
+    assert left is not None
+    assert left.observed == 3
+    assert measured([one]) is None
 
 
 def responses() -> dict[str, Response]:
