@@ -35,7 +35,7 @@ from rigidimeter.analysis.estimate_anew.grid import SAME_TIME, Array, Complex, G
 from rigidimeter.analysis.estimate_anew.methods import all_caused, direct, start_of
 from rigidimeter.analysis.estimate_anew.observation import Observation, torque_filter_of
 from rigidimeter.analysis.estimate_anew.published import least_squares
-from rigidimeter.analysis.estimate_anew.score import free_filter
+from rigidimeter.analysis.estimate_anew.score import without_filter
 from rigidimeter.analysis.estimate_anew.signals import angle_at, values_at
 from rigidimeter.analysis.estimate_anew.solve import Problem, Solution, shortest, solve, sums
 from rigidimeter.analysis.estimate_anew.terms import SMOOTH, TERMS, Motion, Term
@@ -71,7 +71,7 @@ FINER, MEMORY_S, FAINT, NEAR_BOUND = 4, 2.0, 0.01, 1e-3
 """Samples for a coarse one; of a reflex; of the window, where what was simulated rings; of the range of a parameter."""
 
 BLOCK_S, FEWEST_BLOCKS, MOST_BLOCKS = 1.0, 8, 24
-LAGS, BARTLETT, MOST_TRIED = 20, 200, 40
+LAGS, BARTLETT, MOST_TRIED = 20, 200, 150
 NOTHING, ALIKE = 1e-12, 1e-8
 
 
@@ -115,7 +115,9 @@ def _reflex(kind: str, side: str) -> Term:
     )  # fmt: skip
 
 
-def _plain(name: str, unit: str, columns: Callable[[Motion], Complex], linear: bool = False) -> Term:
+def _plain(
+    name: str, unit: str, columns: Callable[[Motion], Complex], linear: bool = False
+) -> Term:
     return Term(name, unit, name, lambda m, inner: columns(m)[None], linear=linear, asked=name)
 
 
@@ -148,8 +150,8 @@ def _rubs(sign: int) -> Term:
 
     name, low, high = "coulomb" + ["", "+", "-"][sign], np.array([1e-3]), np.array([0.2])
     return Term(
-        name, "N·m", "friction", columns, np.geomspace(1e-3, 0.1, 5)[:, None], steps=low, low=low,
-        high=high, resists=True, itself=True, asked=name,
+        name, "N·m", "friction", columns, np.geomspace(1e-3, 0.1, 5)[:, None], steps=low / 2, low=low,
+        high=high, resists=True, asked=name,
     )  # fmt: skip
 
 
@@ -492,7 +494,10 @@ class _Model(NamedTuple):
 
     def limit(self, inner: Array, within: float = 0.0) -> Array:
         """Return inner parameters inside their bounds, by so much of the range."""
-        low, high = (np.concatenate([t.low for t in self.terms]), np.concatenate([t.high for t in self.terms]))
+        low, high = (
+            np.concatenate([t.low for t in self.terms]),
+            np.concatenate([t.high for t in self.terms]),
+        )
         return np.clip(inner, low + within * (high - low), high - within * (high - low))
 
     def problems(
@@ -506,13 +511,17 @@ class _Model(NamedTuple):
         for one, both in zip(seen, motions, strict=True):
             columns: list[list[Complex]] = [[], []]
             slopes: list[list[Complex]] = [[], []]
-            for term, own, free in zip(self.terms, self.parts(inner), self.parts(self.free), strict=True):
+            for term, own, free in zip(
+                self.terms, self.parts(inner), self.parts(self.free), strict=True
+            ):
                 first = sum(len(part) for part in columns[1])
                 for i, motion in enumerate(both):
                     rows = term.with_slopes(motion, own, free)
                     last = len(rows) - int(free.sum())
                     columns[i].append(rows[:last])
-                    slopes[i].append(values[first] * rows[last:] if last < len(rows) else rows[last:])
+                    slopes[i].append(
+                        values[first] * rows[last:] if last < len(rows) else rows[last:]
+                    )
                 if term.itself:
                     slopes[0][-1] = slopes[1][-1]
             Z, X = (np.concatenate([*c, *s]).T for c, s in zip(columns, slopes, strict=True))
@@ -593,14 +602,14 @@ def _fitted(seen: Sequence[Observation], names: tuple[str, ...]) -> ModelRow:
         several = [f"response {lag_s:.3f} s" for lag_s in FIR_LAGS_S]
         own = several if count > 1 and term.muscle else ["gain" if term.muscle else ""] * count
         labels += [(term.asked, one) for one in own]
-    model = _searched(model, seen, motions, powers, labels)
-    problems = model.problems(seen, motions, np.zeros(len(labels)))
-    target = _real([one.torque_nm for one in seen])
+    target, words = _real([one.torque_nm for one in seen]), [" ".join(one).strip() for one in labels]
     if not np.any(target):
         raise ValueError("the torque is constant in the band")
-    words = [" ".join(one).strip() for one in labels]
-    least_squares(_real([one.instruments for one in problems]), target, words)
-    begin = least_squares(_real([one.regressors for one in problems]), target, words).values
+    # From coarse samples all: to as many digits as columns that are alike agree then.
+    rough = [tuple(_roughly(motion) for motion in both) for both in motions]
+    for one in zip(*((p.instruments, p.regressors) for p in model.problems(seen, rough, np.zeros(len(words)))), strict=True):
+        begin = least_squares(_real(one), target, words).values
+    model = _searched(model, seen, motions, powers, labels)
     model, solution = _settled(model, seen, begin)
     return _row(names, model, labels, solution)
 
@@ -619,21 +628,35 @@ def _searched(
         place = [one for one, _ in labels].index(term.asked)
         problems = model.problems(seen, motions, np.zeros(len(labels)))
 
-        def left(tried: Array, term=term, place=place, problems=problems) -> float:  # noqa: ANN001
-            for one, both in zip(problems, motions, strict=True):
-                for lines, motion in zip((one.instruments, one.regressors), both, strict=True):
-                    lines[:, place] = term.columns(motion, tried[None])[0]
+        def left(rows: Sequence[Sequence[Complex]], place=place, problems=problems) -> float:  # noqa: ANN001
+            """Return what is left with these lines for its column."""
+            for one, own in zip(problems, rows, strict=True):
+                one.instruments[:, place], one.regressors[:, place] = own
             values = shortest(*sums(problems, powers))
             each = zip(problems, powers, strict=True)
             return sum(float(np.sum(np.abs(p.residual(values)) ** 2 / s)) for p, s in each)
 
-        limits = list(zip(term.low, term.high, strict=True))
-        parts[i] = scipy.optimize.minimize(
-            left, min(term.inner, key=left), method="Nelder-Mead", bounds=limits,
-            options={"maxfev": MOST_TRIED * len(limits), "xatol": 1e-5},
-        ).x  # fmt: skip
+        def columns(inner: Array, term=term) -> Array:  # noqa: ANN001
+            return [[term.columns(motion, inner) for motion in both] for both in motions]
+
+        grid = columns(term.inner)
+        each = [left([[own[k] for own in both] for both in grid]) for k in range(len(term.inner))]
+        parts[i] = term.inner[int(np.argmin(each))]
+        if term.steps.size > 1:  # a valley that steps of the solution do not find
+            parts[i] = scipy.optimize.minimize(
+                lambda inner: left([[own[0] for own in both] for both in columns(inner[None])]),
+                parts[i], method="Nelder-Mead", bounds=list(zip(term.low, term.high, strict=True)),
+                options={"maxfev": MOST_TRIED},
+            ).x  # fmt: skip
         model = model._replace(inner=np.concatenate(parts))
     return model
+
+
+def _roughly(motion: Motion) -> Motion:
+    lines = motion.grid.coarse_motion(motion.velocity, motion.angle)
+    if motion.grid.line[0] == 0:
+        lines[0] = motion.lines[0]
+    return motion._replace(lines=lines)
 
 
 def _real(lines: Sequence[Complex]) -> Array:
@@ -764,12 +787,12 @@ def _freed(row: ModelRow) -> list[Problem]:
     bent = [term in row.bent for term, _ in row.fit.columns]
     found = []
     for one in row.fit.solution.problems:
-        seen, slopes = one.observation, one.regressors.shape[1] - len(bent)
-        free = free_filter(seen.grid, seen.motion)
-        scale = np.sqrt(free.power(free.without(seen.torque_nm)))
-        own = one.regressors[:, np.append(bent, np.ones(slopes, dtype=bool))]
-        columns = (free.without(own.T) / scale).T
-        found.append(Problem(columns, columns, free.without(one.target) / scale, seen))
+        slopes = one.regressors.shape[1] - len(bent)
+        own, seen = one.regressors[:, np.append(bent, np.ones(slopes, bool))], one.observation
+        rows = np.vstack([seen.torque_nm, seen.motion.T, one.target, own.T])
+        _, _, _, _, target, *left = without_filter(seen.grid, rows)
+        columns = np.array(left).reshape(-1, target.size).T
+        found.append(Problem(columns, columns, target, seen))
     return found
 
 
