@@ -17,11 +17,25 @@ from rigidimeter.analysis.estimate_anew.estimate import (
     method_named,
     method_names,
     no_such_method,
+    observations_of,
     prepare,
     task_of,
 )
 from rigidimeter.analysis.estimate_anew.grid import Array
 from rigidimeter.analysis.estimate_anew.methods import Method, Ready
+from rigidimeter.analysis.estimate_anew.models import (
+    Comparison,
+    ModelRow,
+    TermsFit,
+    better_clock,
+    candidates,
+    compare_models,
+    fit_models,
+    from_zero,
+    parse_terms,
+    refusal,
+    term_names,
+)
 from rigidimeter.analysis.estimate_anew.published import (
     epoch_signals,
     fit_inertia_damping_stiffness,
@@ -35,3 +49,4 @@ from rigidimeter.analysis.estimate_anew.scores import (
 )
 from rigidimeter.analysis.estimate_anew.signals import Signals, band_hz, zero_phase_band
 from rigidimeter.analysis.estimate_anew.stretches import longest_part
+from rigidimeter.analysis.estimate_anew.terms import TERMS, Term

@@ -391,6 +391,19 @@ def _follows(ready: Ready) -> bool:
     return bool(np.min(p) * p.size < FOLLOWS_CHANCE)
 
 
+def observations_of(epochs: Sequence[Ready]) -> list[Observation]:
+    """Return epochs at their lines, with what the perturbation causes where all recorded it.
+
+    Raises
+    ------
+    ValueError
+        If one cannot be observed; the text says why.
+    """
+    known = not any(no_instrument(one.epoch) for one in epochs)
+    causes: list[tuple[Array, Cause]] | None = [] if known else None
+    return [_observation(one, causes) for one in epochs]
+
+
 class Impedance(NamedTuple):
     """Torque over angle at the excited lines, without a model.
 

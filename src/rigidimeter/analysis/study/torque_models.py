@@ -5,21 +5,36 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from rigidimeter.analysis.estimate_anew import (
-    EpochModels,
+    Comparison,
     ModelRow,
     Progress,
     TermsFit,
-    model_epochs,
+    better_clock,
+    compare_models,
+    estimate_recorded,
+    fit_models,
+    from_zero,
+    observations_of,
     prepare,
+    refusal,
 )
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Epoch
 
 MODEL_SCHEMA = "rigidimeter.model/2"
+
+
+class EpochModels(NamedTuple):
+    """The models of one epoch, the band they were fitted in, and what the checks found."""
+
+    band_hz: tuple[float, float]
+    compared: Comparison
+    findings: tuple[Finding, ...]
 
 
 @dataclass(frozen=True)
@@ -75,8 +90,12 @@ def model_recording(
     recording : Recording
     models : sequence of sequences of str
         The terms of each.
-    compare, grow, high_hz
-        As for `model_epochs`.
+    compare : bool
+        Let each model predict what it has not seen, and recommend one.
+    grow : bool
+        As for `compare_models`.
+    high_hz : float, optional
+        The upper edge of a band that begins at 0 Hz, instead of the band of the settings.
     progress : callable
         Called with the share of the epochs that was done since, 1 in all.
 
@@ -85,13 +104,30 @@ def model_recording(
     UserError
         If every epoch is an imposed sinusoid.
     """
+    settings = recording.settings
+    if high_hz is not None:
+        settings = from_zero(settings, high_hz)
     recorded = prepare(recording.epochs, recording.settings)
+    fits = estimate_recorded(recorded).fits
+    moved = recorded.analysed(as_recorded=False)
     found = []
-    for ready, models_of, problem, clock in model_epochs(
-        recorded, models, compare=compare, grow=grow, high_hz=high_hz
-    ):
-        found.append(ModelledEpoch(ready.epoch, models_of, problem, compare, clock))
-        progress(1.0 / len(recorded.perturbed))
+    for own, ready, fit in zip(recorded.perturbed, moved, fits, strict=False):
+        progress(1.0 / len(fits))
+        try:
+            seen = observations_of([ready._replace(settings=settings)])
+            clock = ""
+            if ready is not own:
+                plain = observations_of([own._replace(settings=settings)])
+                seen, clock = better_clock(seen, plain, models)
+            if compare:
+                compared = compare_models(seen, models, grow=grow, refused=refusal(fit))
+            else:
+                compared = fit_models(seen, models)
+        except ValueError as error:
+            found.append(ModelledEpoch(ready.epoch, None, str(error), compare))
+            continue
+        of_epoch = EpochModels(seen[0].grid.band_hz, compared, fit.findings)
+        found.append(ModelledEpoch(ready.epoch, of_epoch, "", compare, clock))
     if not found:
         raise UserError("every epoch is an imposed sinusoid; a model needs a perturbed one")
     return tuple(found)
