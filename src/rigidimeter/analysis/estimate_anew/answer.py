@@ -21,7 +21,7 @@ by the power of the residual.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -190,7 +190,8 @@ class Answer(NamedTuple):
     p : dict
         Of every term beside J, B and K alone, by Holm's method.
     remains, left : float
-        p of what is linear and remains, NaN without a perturbation, and its share of the torque.
+        p of what is linear and remains, NaN without a perturbation; its share of the torque, or
+        without terms if they are not told.
     change : array, shape (3,)
         How J, B and K change where low lines count more.
     answered : bool
@@ -238,12 +239,16 @@ def answer(
         tested = _tested(case, state, offered)
         names = [one.name for one in offered]
         p = dict(zip(names, by.holm([tested.scores[one].p for one in names]), strict=True))
-        first = first or p
+        if not first:
+            first, nameless = p, tested.scores[of.ANY_LINEAR.name]
         if len(found) == MOST_TERMS:
             break
         sure = [one for one in offered if p[one.name] < chance]
         if not case.caused and any(not one.linear for one in sure):
             sure = [one for one in sure if not one.linear]
+        named = {one.name: tested.model.tested[one.name] for one in sure}
+        for _, other in _other_drives(case, state, tested.model, named) if sure else ():
+            sure = [one for one in sure if len(names) * other[one.name] < chance]
         gains = _gains(case, state, tested, sure)
         strongest = strongest or max((gain for gain, _ in gains.values()), default=0.0)
         # The gain of a coupling is that of a straight column, and it bends.
@@ -259,7 +264,7 @@ def answer(
             state = settled(case, state.beside(Taken(of.FINER[term.name])))
         gone = {term.name, *NOT_BESIDE.get(term.name, ())}
         offered = [one for one in offered if one.name not in gone]
-    return _answered(case, state, tested, solution, found, first)
+    return _answered(case, state, tested, solution, found, first, nameless)
 
 
 def case_of(problems: Sequence[Problem]) -> Case:
@@ -521,7 +526,7 @@ def _chosen(
     ranked = sorted(sure, key=lambda term: -gains[term.name][0])
     first = gains[ranked[0].name][0] if ranked else 0.0
     rivals = [one for one in ranked[:RIVALS] if gains[one.name][0] >= RIVAL * first]
-    if any(one.linear and one.parameter is None for one in rivals):
+    if any(_linear(one) for one in rivals):
         rivals += [one for one in ranked if one.name in _LATE and one not in rivals]
         rivals.append(of.FILTER)
     found: list[tuple[State, float]] = []
@@ -597,7 +602,8 @@ def size_of(case: Case, state: State) -> tuple[float, float]:
     term = taken.term
     if term.name == "cuff":
         size = float(taken.inner[0] * state.joint[2])
-        return (size if size < MOST_CUFF else 0.0), LEAST_CUFF
+        likely = size < MOST_CUFF and taken.inner[1] < term.high[1]
+        return (size if likely else 0.0), LEAST_CUFF
     if term.bent is not None:
         return abs(float(taken.inner[0])), LEAST_DELAY_S
     if term.finding.startswith("varying"):
@@ -610,6 +616,12 @@ def size_of(case: Case, state: State) -> tuple[float, float]:
         whole += float(np.sum(np.abs(motion.lines @ state.joint) ** 2 / power))
         own += float(np.sum(np.abs(part) ** 2 / power))
     return float(np.sqrt(own / whole)), LEAST_SHARE
+
+
+def unsure_s(case: Case) -> float:
+    """Return how late the motion itself may be where the drive is not known: half a tick."""
+    known = all(one.drive_known for one in case.observations)
+    return 0.0 if known else 0.5 / case.observations[0].settings.rig.tick_rate_hz
 
 
 def courses(
@@ -650,6 +662,7 @@ def _answered(
     solution: Solution,
     found: Sequence[Found],
     p: dict[str, float],
+    nameless: Score,
 ) -> Answer:
     model, fit = tested.model, tested.fit
     covariance, half_of_all = fit.uncertain(fit.blocks())
@@ -659,15 +672,26 @@ def _answered(
             mean[one.term.parameter, own] = 1 / len(case.observations)
     joint, of_joint = mean @ fit.values, mean @ covariance @ mean.T
     half = half_of_all[:3] * np.sqrt(np.diag(of_joint) / np.diag(covariance)[:3])
-    half = half + _by_other_drives(case, state, model, fit.values)
+    lines = {name: model.tested[name] for name in (of.ANY_LINEAR.name,) if case.caused}
+    others = [*_other_drives(case, state, model, lines)]
+    moved = [np.abs(one.values - fit.values)[:3] for one, _ in others]
+    half = half + np.max([np.zeros(3), *moved], axis=0)
     remains, left, change = np.nan, 0.0, np.zeros(3)
     if case.caused:
         linear = tested.scores[of.ANY_LINEAR.name]
-        remains, left = linear.p, float(np.sqrt(2 * np.mean(linear.values**2)))
+        # What another drive explains is not of the joint.
+        remains = max(linear.p, *(p for _, one in others for p in one.values()))
+        plain = linear if remains >= REMAINS else nameless
+        left = float(np.sqrt(2 * np.mean(plain.values**2)))
         change = _otherwise(model, fit.values, lambda w: w[0] / w)
-    answered = not (remains < REMAINS and np.max(np.abs(change / joint)) > LITTLE)
-    half = half + np.abs(change) * (remains < REMAINS and answered)
-    told, named = [], {one.term.name: one for one in found}
+    # A linear term beside which something linear remains has not its name.
+    named = {one.term.name: one for one in found if not remains < REMAINS or not _linear(one.term)}
+    little = np.max(np.abs(change / joint)) < LITTLE and len(named) == len(found)
+    answered = bool(remains >= REMAINS or not case.caused or little)
+    half = half + np.abs(change) * (remains < REMAINS)
+    if any(one.term.name in _LATE for one in found):
+        half = half + unsure_s(case) * np.append(np.abs(joint[1:]), 0.0)
+    told = []
     for i, (one, own, slopes) in enumerate(
         zip(state.taken, model.of_terms, model.of_slopes, strict=True)
     ):
@@ -689,9 +713,15 @@ def _answered(
     )
 
 
-def _by_other_drives(case: Case, state: State, model: Model, values: Array) -> Array:
-    """Return how far J, B and K move with the drives that may be the one."""
-    most = np.zeros(3)
+def _linear(term: Term) -> bool:
+    """Return whether it is one answer of the torque to the motion, the same at any time."""
+    return term.linear and term.parameter is None
+
+
+def _other_drives(
+    case: Case, state: State, model: Model, tested: dict[str, list[Place]]
+) -> Iterator[tuple[by.Fitted, dict[str, float]]]:
+    """Return what is fitted, and p of what is tested, with each drive that may be the one."""
     for k in range(1, max(len(one.changes) for one in case.observations)):
         parts = []
         for one, part, power in zip(case.observations, model.parts, state.powers, strict=True):
@@ -699,8 +729,8 @@ def _by_other_drives(case: Case, state: State, model: Model, values: Array) -> A
             if k < len(one.changes):
                 columns[:3] += one.changes[k].T / np.sqrt(power)
             parts.append(part._replace(columns=columns))
-        most = np.maximum(most, np.abs(by.fitted(parts, model.base).values - values)[:3])
-    return most
+        fit, scores = _scores(model._replace(parts=parts), tested)
+        yield fit, {name: one.p for name, one in scores.items()}
 
 
 def _otherwise(model: Model, values: Array, weight: Callable[[Array], Array]) -> Array:
@@ -713,6 +743,29 @@ def _otherwise(model: Model, values: Array, weight: Callable[[Array], Array]) ->
 
 
 # --- What is told
+
+
+def beside(found: Answer) -> list[Problem]:
+    """Return the problems of J, B and K with the torque of the terms taken from their targets."""
+    model = model_of(found.case, found.state)
+    values = by.fitted(model.parts, model.base).values
+    problems = []
+    for e, (observation, part) in enumerate(zip(found.case.observations, model.parts, strict=True)):
+        of_terms = [
+            value * part.columns[column]
+            for (column, epoch), value in zip(model.base, values, strict=True)
+            if column > 2 and epoch in (EVERY, e)
+        ]
+        scale = np.sqrt(found.state.powers[e])
+        problems.append(
+            Problem(
+                (part.instruments[:3] * scale).T,
+                (part.columns[:3] * scale).T,
+                (part.target - np.sum(of_terms, axis=0)) * scale,
+                observation,
+            )
+        )
+    return problems
 
 
 def findings_of(found: Answer, solution: Solution, settings: Settings) -> tuple[Finding, ...]:
@@ -741,8 +794,8 @@ def findings_of(found: Answer, solution: Solution, settings: Settings) -> tuple[
                 harmless="answered" if found.answered else "",
             )
         )  # fmt: skip
-    percent, most = 100 * found.left, limits.max_lack_of_fit_percent
-    if not found.answered and percent > most:
+    if not found.answered:
+        percent, most = 100 * found.left, limits.max_lack_of_fit_percent
         low_hz, high_hz = found.case.measured[0].grid.band_hz
         change = (100 * found.change / found.joint).tolist()
         facts = {f"half_{symbol}": one for symbol, one in zip("JBK", change, strict=True)}
