@@ -65,6 +65,9 @@ FEWEST_CYCLES, FASTEST_HZ, PERIODIC, PERIODIC_OF_ALL = 3, 2.0, 0.6, 0.25
 the power of the angle that the perturbation does not cause, and of all of it. A perturbation in the
 loop reaches 0.5 of the first at its slowest line."""
 
+STEADY = 0.3
+"""In rad: a movement whose phase is so even is taken to be of one frequency."""
+
 FAINT = 0.01
 """Of the window: what was simulated rings at its end."""
 
@@ -312,7 +315,10 @@ def with_phases(case: Case, state: State) -> Case:
         # Mirrored at the end, so that no whole number of cycles leaves a step there.
         spectrum = np.fft.fft(np.concatenate([rest, rest[::-1]]))
         spectrum *= np.exp(-4.5 * ((np.arange(2 * n) / 2 - line) / line) ** 2)
-        found.append(own._replace(phase=np.angle(np.fft.ifft(spectrum)[:n])))
+        phase, at = np.unwrap(np.angle(np.fft.ifft(spectrum)[:n])), np.arange(n)
+        steady = np.polyval(np.polyfit(at, phase, 1, w=w), at)
+        even = np.sqrt((phase - steady) ** 2 @ w / w.sum()) < STEADY
+        found.append(own._replace(phase=steady if even else phase))
     return case._replace(measured=found)
 
 
