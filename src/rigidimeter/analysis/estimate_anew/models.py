@@ -9,10 +9,10 @@ parameters φ, as the delay of a reflex, are scanned, then solved as the coeffic
 errors hold that both are not known (Golub and Pereyra 2003; Young and Jakeman 1979).
 
 Models are compared by what they predict of blocks of about 1 s that they were not fitted to, each
-line by its noise. Two of them by the ratio R of their squared errors, each block with its pair; ln R
-has an interval by the jackknife over the blocks (Diebold and Mariano 1995). Without a perturbation
-any linear term may follow the subject round the loop: terms that are not linear are then compared by
-what no free linear filter of the motion explains.
+line by its noise. Two of them by the ratio R of their squared errors, each block with its pair;
+ln R has an interval by the jackknife over the blocks (Diebold and Mariano 1995). Without a
+perturbation any linear term may follow the subject round the loop: terms that are not linear are
+then compared by what no free linear filter of the motion explains.
 
 A band from 0 Hz has one more line, that of the means: offset and friction of one side need it.
 
@@ -25,7 +25,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise, product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -45,7 +45,17 @@ from rigidimeter.core.settings import Settings
 from rigidimeter.model import lowpass
 
 JOINT = ("inertia", "damping", "stiffness")
-REFLEX_KINDS = ("reflex", "reflex-fir", "reflex-second-order")
+REFLEX_INNER: dict[str, tuple[list[Sequence[float]], list[float], list[float]]] = {
+    "reflex": ([np.arange(0.02, 0.301, 0.005).tolist()], [0.015], [0.31]),
+    "reflex-fir": ([], [], []),
+    "reflex-second-order": (
+        [(0.03, 0.045, 0.06, 0.08, 0.1, 0.13), (1.0, 2.0, 4.0, 8.0), (0.5, 1.0)],
+        [0.015, 0.3, 0.2], [0.2, 20.0, 4.0],
+    ),
+}  # fmt: skip
+"""Where delay, frequency and damping are looked for, and their bounds."""
+
+REFLEX_KINDS = tuple(REFLEX_INNER)
 REFLEXES = tuple(kind + side for kind in REFLEX_KINDS for side in ("", "+", "-"))
 """`+` has the muscle stretched by motion toward positive angle, `-` the other; without a sign both
 are tried, and the data decide."""
@@ -68,7 +78,8 @@ FIR_LAGS_S, FIR_SPACING_S = np.arange(0.04, 0.441, 0.02), 0.02
 """Of triangles that overlap. Before 40 ms no stretch reflex can act."""
 
 FINER, MEMORY_S, FAINT, NEAR_BOUND = 4, 2.0, 0.01, 1e-3
-"""Samples for a coarse one; of a reflex; of the window, where what was simulated rings; of the range of a parameter."""
+"""Samples for a coarse one; of a reflex; of the window, where what was simulated rings; of the
+range of a parameter."""
 
 BLOCK_S, FEWEST_BLOCKS, MOST_BLOCKS = 1.0, 8, 24
 LAGS, BARTLETT, MOST_TRIED = 20, 200, 150
@@ -79,38 +90,27 @@ def _reflex(kind: str, side: str) -> Term:
     """Return the stretch velocity after h: a delay, with a muscle of second order, or free."""
     rectified: Callable[[Array, float], Array] = np.maximum if side == "+" else np.minimum
 
-    def transfer(frequency_hz: Array, inner: Array) -> Complex:
-        if kind == "reflex-fir":
-            triangle = FIR_SPACING_S * np.sinc(frequency_hz * FIR_SPACING_S) ** 2
-            return triangle * np.exp(-2j * np.pi * np.outer(FIR_LAGS_S, frequency_hz))
-        found = np.exp(-2j * np.pi * frequency_hz * inner[:, :1])
-        if kind == "reflex":
-            return found
-        ratio = frequency_hz / inner[:, 1:2]
-        return np.asarray(found / (1 - ratio**2 + 2j * inner[:, 2:] * ratio))
-
     def columns(motion: Motion, inner: Array) -> Complex:
         stretch, rate_hz = rectified(motion.velocity, 0.0), motion.grid.rate_hz / motion.grid.step
         past = min(stretch.size - 1, round(MEMORY_S * rate_hz))
         # The past is the mirror image; as many zeros keep the end from coming round to it.
         whole = np.concatenate([stretch[past:0:-1], stretch, np.zeros(past)])
         size = scipy.fft.next_fast_len(whole.size, real=True)
-        gains = transfer(scipy.fft.rfftfreq(size, 1 / rate_hz), inner)
+        frequency_hz = scipy.fft.rfftfreq(size, 1 / rate_hz)
+        lags_s = FIR_LAGS_S[:, None] if kind == "reflex-fir" else inner[:, :1]
+        gains = np.exp(-2j * np.pi * frequency_hz * lags_s)
+        if kind == "reflex-fir":
+            gains = gains * FIR_SPACING_S * np.sinc(frequency_hz * FIR_SPACING_S) ** 2
+        if kind == "reflex-second-order":
+            ratio = frequency_hz / inner[:, 1:2]
+            gains = gains / (1 - ratio**2 + 2j * inner[:, 2:] * ratio)
         passed = scipy.fft.irfft(scipy.fft.rfft(whole, size) * gains, size)
         return motion.of(passed[:, past : past + stretch.size])
 
-    tried, low, high = {
-        "reflex": ([np.arange(0.02, 0.301, 0.005)], [0.015], [0.31]),
-        "reflex-second-order": (
-            [[0.03, 0.045, 0.06, 0.08, 0.1, 0.13], [1.0, 2.0, 4.0, 8.0], [0.5, 1.0]],
-            [0.015, 0.3, 0.2], [0.2, 20.0, 4.0],
-        ),
-        "reflex-fir": ([], [], []),
-    }[kind]  # fmt: skip
-    grid = np.array(list(product(*tried)))
+    tried, low, high = REFLEX_INNER[kind]
     return Term(
         kind + side, "N·m/rad" if kind == "reflex-fir" else "N·m·s/rad", "reflex", columns,
-        grid, steps=1e-3 * (np.array(high) - low), low=np.array(low),
+        np.array([*product(*tried)]), steps=1e-3 * (np.array(high) - low), low=np.array(low),
         high=np.array(high), resists=True, muscle=True, asked=kind + side,
     )  # fmt: skip
 
@@ -133,10 +133,6 @@ def _finely(motion: Motion, function: Callable[[Array, Array], Array]) -> Comple
     return motion.of(scipy.signal.resample(function(*fine), 2 * n, axis=-1)[..., :n])
 
 
-def _half(name: str, unit: str, function: Callable[[Array, Array], Array]) -> Term:
-    return _plain(name, unit, lambda m: _finely(m, function))
-
-
 def _rubs(sign: int) -> Term:
     """Return dry friction while the joint moves toward one side; of sign 0 toward both."""
 
@@ -150,8 +146,8 @@ def _rubs(sign: int) -> Term:
 
     name, low, high = "coulomb" + ["", "+", "-"][sign], np.array([1e-3]), np.array([0.2])
     return Term(
-        name, "N·m", "friction", columns, np.geomspace(1e-3, 0.1, 5)[:, None], steps=low / 2, low=low,
-        high=high, resists=True, asked=name,
+        name, "N·m", "friction", columns, np.geomspace(1e-3, 0.1, 5)[:, None], steps=low / 2,
+        low=low, high=high, resists=True, asked=name,
     )  # fmt: skip
 
 
@@ -163,10 +159,10 @@ ASKED: list[Term] = [
     *(_rubs(sign) for sign in (0, 1, -1)),
     _plain("quadratic", "N·m/rad²", lambda m: m.of(m.angle**2)),
     _plain("cubic", "N·m/rad³", lambda m: m.of(m.angle**3)),
-    _half("damping+", "N·m·s/rad", lambda v, x: np.maximum(v, 0)),
-    _half("damping-", "N·m·s/rad", lambda v, x: np.minimum(v, 0)),
-    _half("stiffness+", "N·m/rad", lambda v, x: x * (v > 0)),
-    _half("stiffness-", "N·m/rad", lambda v, x: x * (v < 0)),
+    _plain("damping+", "N·m·s/rad", lambda m: _finely(m, lambda v, x: np.maximum(v, 0))),
+    _plain("damping-", "N·m·s/rad", lambda m: _finely(m, lambda v, x: np.minimum(v, 0))),
+    _plain("stiffness+", "N·m/rad", lambda m: _finely(m, lambda v, x: x * (v > 0))),
+    _plain("stiffness-", "N·m/rad", lambda m: _finely(m, lambda v, x: x * (v < 0))),
     *(_reflex(kind, side) for kind in REFLEX_KINDS for side in "+-"),
 ]
 """Terms that are fitted if they are asked for. Code from outside the package may append its own."""
@@ -449,7 +445,7 @@ def _measured(one: Observation, lines: Complex) -> Motion:
     return Motion(one.grid, one.coarse[0], angle, lines, lines, np.ones(3), through)
 
 
-def _motions(seen: Sequence[Observation], joint: Array) -> list[tuple[Motion, Motion]]:
+def _motions(seen: Sequence[Observation], joint: Array) -> Motions:
     """Return the motion that is the instrument, and the measured one, of each."""
     if seen[0].cause is None:
         both = zip(seen, direct(seen, joint), strict=True)
@@ -467,6 +463,11 @@ def _motions(seen: Sequence[Observation], joint: Array) -> list[tuple[Motion, Mo
         cause = own._replace(velocity=velocity, angle=angle, lines=lines, measured=False)
         found.append((cause, own))
     return found
+
+
+Seen = Sequence[Observation]
+Motions = Sequence[tuple[Motion, Motion]]
+"""What is the instrument, and what was measured, of each epoch."""
 
 
 class _Model(NamedTuple):
@@ -488,48 +489,37 @@ class _Model(NamedTuple):
     inner: Array
     free: NDArray[np.bool_]
 
-    def parts(self, values: Array) -> list[Array]:
+    def parts(self, values: NDArray[Any]) -> list[NDArray[Any]]:
         """Return what belongs to each term of something with a number for each inner parameter."""
         return np.split(values, np.cumsum([one.steps.size for one in self.terms])[:-1])
 
     def limit(self, inner: Array, within: float = 0.0) -> Array:
         """Return inner parameters inside their bounds, by so much of the range."""
-        low, high = (
-            np.concatenate([t.low for t in self.terms]),
-            np.concatenate([t.high for t in self.terms]),
-        )
+        low, high = np.concatenate([[one.low, one.high] for one in self.terms], axis=1)
         return np.clip(inner, low + within * (high - low), high - within * (high - low))
 
-    def problems(
-        self, seen: Sequence[Observation], motions: Sequence[tuple[Motion, Motion]], values: Array
-    ) -> list[Problem]:
+    def rows(self, motion: Motion, inner: Array, values: Array) -> Complex:
+        """Return the columns, then their slopes by inner parameters that are free."""
+        columns, slopes = [], []
+        for term, own, free in zip(self.terms, *map(self.parts, (inner, self.free)), strict=True):
+            found = term.with_slopes(motion, own, free)
+            last = len(found) - int(free.sum())
+            columns.append(found[:last])
+            slopes.append(values[sum(map(len, columns)) - 1] * found[last:])
+        return np.concatenate([*columns, *slopes])
+
+    def problems(self, seen: Seen, motions: Motions, values: Array) -> list[Problem]:
         """Return the problems at parameters, linearised where they are inner ones."""
-        inner, count = self.inner.copy(), values.size - int(self.free.sum())
+        count, inner = values.size - int(self.free.sum()), self.inner.copy()
         inner[self.free] = values[count:]
-        inner = self.limit(inner)
-        problems = []
+        inner, problems = self.limit(inner), []
         for one, both in zip(seen, motions, strict=True):
-            columns: list[list[Complex]] = [[], []]
-            slopes: list[list[Complex]] = [[], []]
-            for term, own, free in zip(
-                self.terms, self.parts(inner), self.parts(self.free), strict=True
-            ):
-                first = sum(len(part) for part in columns[1])
-                for i, motion in enumerate(both):
-                    rows = term.with_slopes(motion, own, free)
-                    last = len(rows) - int(free.sum())
-                    columns[i].append(rows[:last])
-                    slopes[i].append(
-                        values[first] * rows[last:] if last < len(rows) else rows[last:]
-                    )
-                if term.itself:
-                    slopes[0][-1] = slopes[1][-1]
-            Z, X = (np.concatenate([*c, *s]).T for c, s in zip(columns, slopes, strict=True))
-            moved = X[:, X.shape[1] - int(self.free.sum()) :] @ inner[self.free]
-            problems.append(Problem(Z, X, one.torque_nm + moved, one))
+            Z, X = (self.rows(motion, inner, values).T for motion in both)
+            target = one.torque_nm + X[:, count:] @ inner[self.free]
+            problems.append(Problem(Z, X, target, one))
         return problems
 
-    def __call__(self, seen: Sequence[Observation], values: Array) -> list[Problem]:
+    def pose(self, seen: Seen, values: Array) -> list[Problem]:
         """Return the problems, with what the perturbation causes in a loop with their J, B, K."""
         at = [one.name for one in self.terms]
         both = zip(JOINT, self.joint, strict=True)
@@ -572,7 +562,9 @@ def fit_model(observations: Sequence[Observation], names: str | Sequence[str]) -
     except ValueError as error:
         return ModelRow(terms, None, problem=str(error))
     # Of max(v, 0) and min(v, 0) the linear half is the same: what is left tells them apart.
-    better, worse = sorted(both, key=lambda row: row.fit.misfit if row.fit else np.inf)
+    pushes = [next(one.value < 0 for one in _gains(row) if one.term[:-1] == free) for row in both]
+    misfit = [row.fit.misfit if row.fit else np.inf for row in both]
+    better, worse = both if (pushes[0], misfit[0]) < (pushes[1], misfit[1]) else both[::-1]
     vaf = [row.fit.vaf_percent if row.fit else np.nan for row in (better, worse)]
     remark = (
         f"{free}: the data decided for stretch by motion toward "
@@ -590,7 +582,7 @@ def _fitted(seen: Sequence[Observation], names: tuple[str, ...]) -> ModelRow:
     powers: Sequence[Array] = [np.ones(one.grid.line.size) for one in seen]
     try:
         alone = _Model(tuple(known[one] for one in JOINT), joint, np.zeros(0), np.zeros(0, bool))
-        solution = solve(seen, alone, joint)
+        solution = solve(seen, alone.pose, joint)
         joint, powers = solution.values, solution.powers
     except ValueError:
         pass  # the terms may do without one of J, B and K
@@ -602,54 +594,66 @@ def _fitted(seen: Sequence[Observation], names: tuple[str, ...]) -> ModelRow:
         several = [f"response {lag_s:.3f} s" for lag_s in FIR_LAGS_S]
         own = several if count > 1 and term.muscle else ["gain" if term.muscle else ""] * count
         labels += [(term.asked, one) for one in own]
-    target, words = _real([one.torque_nm for one in seen]), [" ".join(one).strip() for one in labels]
+    target, words = (
+        _real([one.torque_nm for one in seen]),
+        [" ".join(one).strip() for one in labels],
+    )
     if not np.any(target):
         raise ValueError("the torque is constant in the band")
     # From coarse samples all: to as many digits as columns that are alike agree then.
-    rough = [tuple(_roughly(motion) for motion in both) for both in motions]
-    for one in zip(*((p.instruments, p.regressors) for p in model.problems(seen, rough, np.zeros(len(words)))), strict=True):
-        begin = least_squares(_real(one), target, words).values
-    model = _searched(model, seen, motions, powers, labels)
+    rough = [(_roughly(cause), _roughly(own)) for cause, own in motions]
+    problems = model.problems(seen, rough, np.zeros(len(words)))
+    least_squares(_real([one.instruments for one in problems]), target, words)
+    begin = least_squares(_real([one.regressors for one in problems]), target, words).values
+    model = _searched(model, seen, motions, powers, [one for one, _ in labels])
     model, solution = _settled(model, seen, begin)
     return _row(names, model, labels, solution)
 
 
 def _searched(
-    model: _Model,
-    seen: Sequence[Observation],
-    motions: Sequence[tuple[Motion, Motion]],
-    powers: Sequence[Array],
-    labels: Sequence[tuple[str, str]],
+    model: _Model, seen: Seen, motions: Motions, powers: Sequence[Array], terms: Sequence[str]
 ) -> _Model:
-    """Return the model with the inner parameters that leave least: the best of a grid, refined."""
+    """Return the model with the inner parameters that leave least; `terms` are of the columns."""
     inner = [i for i, one in enumerate(model.terms) if one.steps.size]
     for i in inner * min(len(inner), 2):
         term, parts = model.terms[i], model.parts(model.inner)
-        place = [one for one, _ in labels].index(term.asked)
-        problems = model.problems(seen, motions, np.zeros(len(labels)))
-
-        def left(rows: Sequence[Sequence[Complex]], place=place, problems=problems) -> float:  # noqa: ANN001
-            """Return what is left with these lines for its column."""
-            for one, own in zip(problems, rows, strict=True):
-                one.instruments[:, place], one.regressors[:, place] = own
-            values = shortest(*sums(problems, powers))
-            each = zip(problems, powers, strict=True)
-            return sum(float(np.sum(np.abs(p.residual(values)) ** 2 / s)) for p, s in each)
-
-        def columns(inner: Array, term=term) -> Array:  # noqa: ANN001
-            return [[term.columns(motion, inner) for motion in both] for both in motions]
-
-        grid = columns(term.inner)
-        each = [left([[own[k] for own in both] for both in grid]) for k in range(len(term.inner))]
-        parts[i] = term.inner[int(np.argmin(each))]
-        if term.steps.size > 1:  # a valley that steps of the solution do not find
+        problems = model.problems(seen, motions, np.zeros(len(terms)))
+        search = _Search(term, terms.index(term.asked), motions, problems, powers)
+        parts[i] = best = term.inner[int(np.argmin(search.left(term.inner)))]
+        if best.size > 1:  # a valley that steps of the solution do not find
             parts[i] = scipy.optimize.minimize(
-                lambda inner: left([[own[0] for own in both] for both in columns(inner[None])]),
-                parts[i], method="Nelder-Mead", bounds=list(zip(term.low, term.high, strict=True)),
-                options={"maxfev": MOST_TRIED},
+                search.at, best, method="Nelder-Mead", options={"maxfev": MOST_TRIED},
+                bounds=scipy.optimize.Bounds(term.low, term.high),
             ).x  # fmt: skip
         model = model._replace(inner=np.concatenate(parts))
     return model
+
+
+class _Search(NamedTuple):
+    """What is left of the torque where a column of problems has other inner parameters."""
+
+    term: Term
+    place: int
+    motions: Motions
+    problems: list[Problem]
+    powers: Sequence[Array]
+
+    def at(self, inner: Array) -> float:
+        """Return it, for inner parameters of shape (d,)."""
+        return self.left(inner[None])[0]
+
+    def left(self, inner: Array) -> list[float]:
+        """Return it for each; more where the term would push."""
+        rows = [[self.term.columns(motion, inner) for motion in both] for both in self.motions]
+        found = []
+        for k in range(len(inner)):
+            for one, (Z, X) in zip(self.problems, rows, strict=True):
+                one.instruments[:, self.place], one.regressors[:, self.place] = Z[k], X[k]
+            values = shortest(*sums(self.problems, self.powers))
+            each = zip(self.problems, self.powers, strict=True)
+            remains = sum(float(np.sum(np.abs(p.residual(values)) ** 2 / s)) for p, s in each)
+            found.append(remains * (1 + (values[self.place] < 0)))
+        return found
 
 
 def _roughly(motion: Motion) -> Motion:
@@ -670,7 +674,7 @@ def _settled(model: _Model, seen: Sequence[Observation], begin: Array) -> tuple[
     while True:
         model = model._replace(free=free)
         try:
-            solution = solve(seen, model, np.append(begin, model.inner[free]))
+            solution = solve(seen, model.pose, np.append(begin, model.inner[free]))
         except ValueError:
             if not np.any(free):
                 raise
@@ -813,6 +817,8 @@ def _beyond(row: ModelRow) -> tuple[TermGain, ...]:
 
 def _inverse(gram: Array) -> Array:
     """Return the inverse; columns that are alike share what they explain."""
+    if not gram.size:
+        return gram
     size = np.sqrt(np.maximum(np.abs(np.diag(gram)), np.finfo(np.float64).tiny))
     return np.asarray(np.linalg.pinv(gram / np.outer(size, size), ALIKE) / np.outer(size, size))
 
@@ -900,33 +906,22 @@ def better_clock(
 def _predicted(rows: Sequence[ModelRow]) -> list[ModelRow]:
     """Return the rows with the errors of their predictions; lines count alike in all."""
     fits = [row.fit for row in rows if row.fit is not None]
-    if not fits:
-        return list(rows)
-    powers = min(fits, key=lambda one: one.misfit).solution.powers
-    seen = [one.observation for one in fits[0].solution.problems]
-    none = [np.zeros((one.grid.line.size, 0)) for one in seen]
-    bare = [Problem(zero, zero, one.torque_nm / np.sqrt(power), one) for zero, one, power in zip(none, seen, powers, strict=True)]  # fmt: skip
-    offset = _block_errors(bare)
-    found = []
-    for row in rows:
+    found = list(rows)
+    for i, row in enumerate(rows):
         if row.fit is None:
-            found.append(row)
             continue
-        white = [
-            Problem(
-                one.instruments / (scale := np.sqrt(power)[:, None]), one.regressors / scale,
-                one.target / scale[:, 0], one.observation,
-            )
-            for one, power in zip(row.fit.solution.problems, powers, strict=True)
-        ]  # fmt: skip
-        errors = _block_errors(white)
-        caused = seen[0].cause is not None
-        problem = "; ".join(filter(None, map(_pushes, _gains(row))))
-        found.append(
-            replace(
-                row, held_out=gain(offset, errors), problem=problem, errors=errors,
-                beyond_errors=errors if caused else _block_errors(_freed(row)),
-            )
+        powers = min(fits, key=lambda one: one.misfit).solution.powers
+        problems = row.fit.solution.problems
+        errors, offset = _block_errors(problems, powers), _block_errors(problems, powers, none=True)
+        caused = problems[0].observation.cause is not None
+        beyond = (
+            errors
+            if caused
+            else _block_errors(freed := _freed(row), [np.ones(one.target.size) for one in freed])
+        )
+        found[i] = replace(
+            row, held_out=gain(offset, errors), errors=errors, beyond_errors=beyond,
+            problem="; ".join(filter(None, map(_pushes, _gains(row)))),
         )  # fmt: skip
     return found
 
@@ -942,18 +937,19 @@ def _pushes(one: TermGain) -> str:
     )
 
 
-def _block_errors(problems: Sequence[Problem]) -> Array:
-    """Return the squared errors of the prediction of each block, shape (b,).
+def _block_errors(
+    problems: Sequence[Problem], powers: Sequence[Array], *, none: bool = False
+) -> Array:
+    """Return the squared errors of the prediction of each block, shape (b,); `none`: by a mean.
 
     Each is predicted by a fit to the others, without `trim_s` at each side of it, at most a block.
     """
-    p = problems[0].regressors.shape[1]
-    parts = []
-    for one in problems:
-        lines = np.vstack([one.instruments.T, one.regressors.T, one.target])
-        parts.append(one.observation.grid.in_time(lines * (one.observation.grid.line > 0)))
+    p, parts, found = 0 if none else problems[0].regressors.shape[1], [], []
+    for one, power in zip(problems, powers, strict=True):
+        grid, target = one.observation.grid, one.observation.torque_nm if none else one.target
+        lines = np.vstack([one.instruments.T[:p], one.regressors.T[:p], target])
+        parts.append(grid.in_time(lines * (grid.line > 0) / np.sqrt(power)))
     whole = sum(part[:p] @ part[p:].T for part in parts)
-    found = []
     for part, one in zip(parts, problems, strict=True):
         t, duration_s = part.shape[1], one.observation.grid.duration_s
         blocks = min(max(round(duration_s / BLOCK_S), FEWEST_BLOCKS), MOST_BLOCKS)
