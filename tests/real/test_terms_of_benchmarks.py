@@ -14,12 +14,13 @@ HIGH_HZ = 40.0
 
 
 def recorded(torque_nm, angle_rad, rate_hz, trim_s=1.0):
+    """Return a recording on one clock, as those who published its parameters took it."""
     time_s = np.arange(torque_nm.size) / rate_hz
     channels = {
         name: Channel(name, time_s, np.ascontiguousarray(values, dtype=float))
         for name, values in (("torque_nm", torque_nm), ("angle_rad", angle_rad))
     }
-    settings = parse_settings({"estimation": {"trim_s": trim_s}})
+    settings = parse_settings({"estimation": {"trim_s": trim_s, "correct_delay": False}})
     return Recording((Epoch("r", "1", channels, task="prbs"),), (), settings, ())
 
 
@@ -73,15 +74,14 @@ def test_the_axis_has_its_published_friction_in_each_direction(emps):
         assert abs(fit.of(term).value - value) < 2 * sd, term
 
 
-@pytest.mark.parametrize(("name", "least"), [("z_df", 91.0), ("z_df2", 93.5), ("z_pf", 86.5)])
+@pytest.mark.parametrize("name", ["z_df", "z_df2", "z_pf"])
 @pytest.mark.parametrize("reflex", ["reflex-fir+", "reflex-second-order+"])
-def test_a_reflex_predicts_blocks_that_it_has_not_seen(shared_data, name, least, reflex):
+def test_a_reflex_predicts_blocks_that_it_has_not_seen(shared_data, name, reflex):
     found = compared(ankle(shared_data, name), [JBK, f"{JBK},{reflex}"])
     plain, with_reflex = found.rows
     print(name, reflex, plain.held_out_vaf_percent, with_reflex.held_out_vaf_percent)
     assert with_reflex.fit is not None
-    assert with_reflex.held_out_vaf_percent > least
-    assert with_reflex.held_out_vaf_percent > plain.held_out_vaf_percent + 1.0
+    assert with_reflex.held_out_vaf_percent > max(plain.held_out_vaf_percent, 97.0)
     assert found.recommended is with_reflex
 
 
@@ -91,8 +91,9 @@ def test_the_wrong_direction_and_no_reflex_show_themselves(shared_data):
     print([row.held_out_vaf_percent for row in rows])
     assert plain.fit is not None
     assert right.fit is not None
-    assert wrong.held_out_vaf_percent < 70.0
-    assert right.held_out_vaf_percent > wrong.held_out_vaf_percent + 13.0
+    # Of what the right one leaves, the wrong one leaves more than twice as much.
+    assert 100 - wrong.held_out_vaf_percent > 2 * (100 - right.held_out_vaf_percent)
+    assert "it pushes" in wrong.problem
     ratio = plain.fit.of("stiffness").value / right.fit.of("stiffness").value
     print("K without / with", ratio)
     assert ratio > 1.6
