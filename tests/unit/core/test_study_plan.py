@@ -200,8 +200,7 @@ def test_a_plan_that_was_not_written_to_its_end_is_written_again(
     for name in {*protocols, PLAN_TABLE, PLAN_FILE} - {*left}:
         (plan.folder / name).unlink()
     if PLAN_TABLE in left:
-        with pytest.raises(UserError, match="was not written to its end; draw it again"):
-            read_plan(plan.folder)
+        assert read_plan(plan.folder) is None
     blocks = draw_days(SPEC, 1)
     with pytest.raises(UserError, match="is there already"):
         write_plan(plan.folder, ABOUT, blocks, {"protocols/OFF.toml": "seed = 2"})

@@ -47,6 +47,7 @@ EXAMPLES = {
     "rests_s": "as in the settings (10; 20: drawn)",
     "raters": "A,B",
     "given": "OFF,DBS",
+    "seed": "2023; drawn if blinded",
 }
 """What an empty field shows."""
 
@@ -80,11 +81,9 @@ class EnteredPlan:
 def empty_plan_form() -> dict[str, str]:
     """Return the form that `study plan` without options is."""
     usual = PlanValues(("",))
-    numbers = {key: f"{getattr(usual, key):g}" for key in (*_WHOLE, *_NUMBERS)}
-    return dict.fromkeys(
-        ("subjects", "stimulated", "days_of", "rests_s", "raters", "given"), ""
-    ) | {
-        **numbers,
+    numbers = {key: getattr(usual, key) for key in (*_WHOLE, *_NUMBERS)}
+    return dict.fromkeys(EXAMPLES, "") | {
+        **{key: f"{value:g}" for key, value in numbers.items() if value is not None},
         "conditions": ",".join(usual.conditions),
         "order": usual.order,
         "blinded": "",
@@ -104,7 +103,7 @@ def read_plan_form(form: Mapping[str, str], base: Settings) -> EnteredPlan:
     found: dict[str, Any] = {"order": form["order"], "blinded": form["blinded"] == YES}
     for key in (*_WHOLE, *_NUMBERS, *_NAMES, "days_of", "rests_s"):
         text = form[key].strip()
-        if not text and key in (*_NAMES, "days_of", "rests_s") and key not in _NEEDED:
+        if not text and key in EXAMPLES and key not in _NEEDED:
             continue
         try:
             found[key] = _read(key, text)
