@@ -32,6 +32,7 @@ SMALLEST = {
     "checks_cost": "--epochs 1 --repeats 1 --parts",
     "cpu_commands": "--command estimate --repeats 1 --study {study}",
     "day_tests": "2 1 3 days each\nplan 1",
+    "estimation_cost": "--repeats 1 --only one memory --memory 1",
     "false_alarms": "--hours 1e-5",
     "drive_torque": "--hours 1e-5",
     "file_faults": "--files 8",
@@ -66,6 +67,12 @@ def smaller(name: str, module: ModuleType, folder: Path) -> Mapping[str, Any]:
         return {"TABLE": page, "FIRST_HZ": (100.0,), "FILTERS_HZ": (0.0,)}
     if name == "joint_impedance.__main__":
         return {"PAGE": folder / "page.md"}
+    if name == "estimation_cost":
+        return {
+            "RECORDINGS": dict([*module.RECORDINGS.items()][:1]),
+            "kept_apart_mb": module.kept_mb,
+            "FIRST": 1,
+        }
     if name == "late_drive":
         some = {key: module.RECORDED[key] for key in list(module.RECORDED)[:1]}
         return {"EPOCHS": 2, "LIMBS": {"human": (*module.RIGS,)[1:]}, "RECORDED": some}
