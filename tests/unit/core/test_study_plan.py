@@ -240,4 +240,4 @@ def test_no_wait_runs_from_a_change_that_has_not_come(plan: StudyPlan) -> None:
     assert due is not None
     assert due.left_min(NOW, 100.0) is None
     assert due.since_min(NOW, 100.0) is None
-    assert "2027-01-05 11:00 UTC, which has not come; correct it" in wait_words(due, NOW)
+    assert "2027-01-05 11:00 UTC, which is still to come" in wait_words(due, NOW)

@@ -52,7 +52,7 @@ class ContinuedSession:
         if not self.waits(now):
             return ""
         what = (
-            "Nobody wrote down what was done to the stimulation since this session began"
+            "Whether the stimulation was switched since this session began is not known"
             if self.due.change is None
             else "The stimulation was switched since this session began"
         )
