@@ -18,7 +18,7 @@ from rigidimeter.analysis.reading.formats import (
     ReadOptions,
     read_recording,
     read_table,
-    recorded_settings,
+    settings_in_file,
 )
 from rigidimeter.analysis.reading.formats.table_epochs import epochs_from_table
 from rigidimeter.analysis.reading.leave_out import with_left_out
@@ -318,7 +318,7 @@ def read_as(
         begun = sizes[path]
         try:
             with noted_digests() as noted:
-                recorded = recorded_settings(path)
+                recorded = settings_in_file(path)
                 found, remarks = read_recording(path, replace(options, condition=name))
         except UserError as error:
             notices += [Notice("error", line) for line in error.lines]
