@@ -150,7 +150,14 @@ def test_a_machine_is_quiet_by_others_load_and_cyclictest():
     assert "cyclictest woke up 3 times more than half" in quiet_words([quiet, late])
     assert "was not quiet" in quiet_words([quiet, late])
     assert "cyclictest is not installed" in quiet_words([Beside(1.0)])
-    assert 0.0 <= Others().percent() <= 100.0
+
+
+def test_others_take_what_is_busy_and_not_ours(monkeypatch):
+    """Of 10 s of each processor, 4 s were busy in all, and 1 s of these ours."""
+    times = iter([(0.0, 100.0, 5.0), (10.0, 104.0, 6.0)])
+    monkeypatch.setattr(Others, "_now", staticmethod(lambda: next(times)))
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    assert Others().percent() == pytest.approx(15.0)
 
 
 def test_a_ratio_has_the_interval_of_its_runs():
