@@ -15,6 +15,8 @@ from rigidimeter.analysis.estimation import (
     choose_method,
     estimate_delays,
     method_named,
+    method_names,
+    no_such_method,
 )
 from rigidimeter.analysis.estimation.alignment import MOST_EPOCHS, aligned_prepared
 from rigidimeter.analysis.estimation.between_epochs import between_epochs
@@ -322,6 +324,8 @@ def estimate(
         raise UserError(
             "estimate takes a Recording or a list of its epochs; read a path with rigidimeter.read"
         )
+    if method not in method_names():
+        raise ValueError(f"method {method!r}: {no_such_method(method)}")
     preparation = Preparation(epochs, settings_from(settings))
     work = preparation.work([method]) or 1.0
     return analyse_prepared(preparation, method, progress=lambda done: progress(done / work))
