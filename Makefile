@@ -63,7 +63,7 @@ gallery: install
 	@echo "the gallery: build/gallery/gallery/index.html"
 
 bench: install
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[all,dev,bench]'
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[all,dev,bench,gallery]'
 	$(BIN)/python -m pytest -m slow
 	$(BIN)/python -m benchmarks
 	$(BIN)/python -m benchmarks.joint_impedance --packages --jobs 2

@@ -20,26 +20,24 @@ import argparse
 import json
 import pkgutil
 import statistics
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.stats import binomtest, fisher_exact
 from tests.scenarios.catalogue import SCENARIOS
 from tests.scenarios.scenario import Scenario
 
+from benchmarks.paired import cpu_in_regressions
 from benchmarks.scenarios.__main__ import chosen
 from benchmarks.scenarios.measure import EPOCHS, METHODS, Kept, kept, seen_by
 from benchmarks.scenarios.page import HEADER, cells, summary
 from benchmarks.scenarios.rule import Row, row
-from rigidimeter.analysis.study import estimate
+from benchmarks.shipped import NAME, Estimation, named
 from rigidimeter.core.executor import each
-from rigidimeter.core.records import Analysis, Epoch
+from rigidimeter.core.records import Epoch
 from rigidimeter.core.settings import Settings
 
 CHANCE = 1e-3
@@ -48,30 +46,7 @@ CHANCE = 1e-3
 LEAST_BIAS = 1e-3
 """Of the truth: an error that grew by less is none."""
 
-Estimation = Callable[[Sequence[Epoch], Settings, str], Analysis]
 Task = tuple[str, int, tuple[str, ...], tuple[str, ...]]
-
-
-def shipped(epochs: Sequence[Epoch], settings: Settings, method: str) -> Analysis:
-    """Return the analysis of the package as it is."""
-    return estimate(epochs, method, settings=settings)
-
-
-@cache
-def regression() -> tuple[Any, Any]:
-    """Return the problem whose time is the unit: 20,000 × 3."""
-    columns = np.random.default_rng(0).standard_normal((20_000, 3))
-    return columns, columns @ np.array([0.0045, 0.137, 1.75])
-
-
-def regression_s(repeats: int = 9) -> float:
-    """Return the median CPU time of numpy.linalg.lstsq on it."""
-    times_s = []
-    for _ in range(repeats):
-        begun_s = time.process_time()
-        np.linalg.lstsq(*regression())
-        times_s.append(time.process_time() - begun_s)
-    return statistics.median(times_s)
 
 
 def of_recording(task: Task) -> dict[str, dict[str, Kept]]:
@@ -95,19 +70,19 @@ def _timed(
 ) -> Kept:
     """Return what one function found, and the CPU time of an epoch in regressions."""
     function: Estimation = pkgutil.resolve_name(name)
-    unit_s, begun_s = regression_s(), time.process_time()
-    try:
-        with np.errstate(all="ignore"):
-            analysis = function(epochs, settings, method)
-        took_s = time.process_time() - begun_s
-        found = kept(truth, analysis)
-    except Exception as error:  # a function that is being written
-        took_s = time.process_time() - begun_s
-        nothing = dict.fromkeys(("value", "low", "high"), [None] * 3)
-        fit = nothing | {"doubts": [f"{type(error).__name__}: {error}"[:80].replace("|", "/")]}
-        found = {"truth": truth, "fits": [fit] * len(truth), "pooled": []}
-    unit_s = (unit_s + regression_s()) / 2
-    return found | {"cost": float(f"{took_s / len(truth) / unit_s:.4g}")}
+    found: Kept = {}
+
+    def work() -> None:
+        try:
+            with np.errstate(all="ignore"):
+                found.update(kept(truth, function(epochs, settings, method)))
+        except Exception as error:  # a function that is being written
+            doubt = f"{type(error).__name__}: {error}"[:80].replace("|", "/")
+            fit = {**dict.fromkeys(("value", "low", "high"), [None] * 3), "doubts": [doubt]}
+            found.update({"truth": truth, "fits": [fit] * len(truth), "pooled": []})
+
+    cost = cpu_in_regressions(work) / len(truth)
+    return found | {"cost": float(f"{cost:.4g}")}
 
 
 def rated(scenario: str, recordings: Sequence[Kept]) -> Row:
@@ -226,8 +201,8 @@ def states(rows: Mapping[tuple[str, str], Row]) -> Iterator[str]:
 def main() -> None:
     """Measure both and print the table, scenario by scenario, and the counts."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--old", default="benchmarks.rebuilt:shipped", metavar="MODULE:FUNCTION")
-    parser.add_argument("--new", default="benchmarks.rebuilt:shipped", metavar="MODULE:FUNCTION")
+    parser.add_argument("--old", type=named, default=NAME, metavar="MODULE:FUNCTION")
+    parser.add_argument("--new", type=named, default=NAME, metavar="MODULE:FUNCTION")
     parser.add_argument("--only", nargs="+", default=[""], help="names of rows, or words in them")
     parser.add_argument("--methods", default=",".join(METHODS))
     parser.add_argument("--recordings", type=int, default=30)
@@ -238,11 +213,6 @@ def main() -> None:
     if not names or not set(methods) <= set(METHODS):
         parser.error(f"no scenario, or a method that is none of {', '.join(METHODS)}")
     both = (options.old, options.new)
-    for name in both:
-        try:
-            pkgutil.resolve_name(name)
-        except (ImportError, AttributeError, ValueError) as error:
-            parser.error(f"{name}: {error}")
     stored: Found = {}
     if options.keep and options.keep.exists():
         stored = json.loads(options.keep.read_text("utf-8"))

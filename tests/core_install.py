@@ -5,8 +5,8 @@ into an empty environment, makes the demo there and runs the help of each comman
 in it. The table has what was run, its exit status and the first line that it printed. What takes
 longer than `LIMIT_S`, as a session in real time does, is interrupted; examples that read what it
 would have made are left out. The status is 1 if one ended in a traceback, or a command that needs
-neither a rig nor an extra did not end with success. The examples of `study`, which take half of the
-time, run beside the others in a copy of the demo's folder.
+neither a rig nor an extra did not end with success within `HANGS_S`. The examples of `study`, which
+take half of the time, run beside the others in a copy of the demo's folder.
 """
 
 from __future__ import annotations
@@ -30,7 +30,10 @@ from typer.main import get_command
 from rigidimeter.cli.main import app
 
 LIMIT_S = 30.0
-"""What takes longer is interrupted, as by Ctrl-C; the demo, which the others read, is not."""
+"""What may refuse and takes longer is interrupted, as by Ctrl-C."""
+
+HANGS_S = 600.0
+"""What needs neither a rig nor an extra and takes longer has failed."""
 
 DEMO = "demo-study/"
 """Where `make demo` writes."""
@@ -44,9 +47,6 @@ MAY_REFUSE = {
     "reproduce": "the extra batch",
 }
 """Commands whose examples need what is not there; they refuse in a sentence."""
-
-MAKES_NOTHING = {"compare", "estimate", "inspect", "model"}
-"""What they are given is as it was after they were interrupted."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Ran:
 
     @property
     def failed(self) -> bool:
-        allowed = self.interrupted or self.words[0] in MAY_REFUSE or "--scheduler" in self.words
+        allowed = self.words[0] in MAY_REFUSE or "--scheduler" in self.words
         return "Traceback (most recent call last)" in self.out + self.err or bool(
             self.status and not (allowed and self.status in (1, 130, -signal.SIGINT))
         )
@@ -104,8 +104,12 @@ def run(program: Path, words: list[str], folder: Path, limit_s: float | None) ->
         out, err = started.communicate(timeout=limit_s)
     except subprocess.TimeoutExpired:
         started.send_signal(signal.SIGINT)
-        out, err = started.communicate()
-        return Ran(words, started.returncode, out, err, interrupted=True)
+        try:
+            out, err = started.communicate(timeout=LIMIT_S)
+        except subprocess.TimeoutExpired:
+            started.kill()
+            out, err = started.communicate()
+        return Ran(words, started.returncode or 1, out, err, interrupted=True)
     return Ran(words, started.returncode, out, err)
 
 
@@ -118,8 +122,8 @@ def tried(program: Path, lines: list[list[str]], folder: Path) -> list[Ran]:
             print(f"             {shlex.join(words)}: needs what was interrupted", flush=True)
             continue
         began_s = time.monotonic()
-        ran = run(program, words, folder, None if words == ["demo"] else LIMIT_S)
-        if ran.interrupted and words[0] not in MAKES_NOTHING:
+        ran = run(program, words, folder, LIMIT_S if words[0] in MAY_REFUSE else HANGS_S)
+        if ran.interrupted:
             named = words[2 if words[0] == "study" else 1 :]
             unmade |= {word for word in named if not word.startswith("-")}
         took_s = time.monotonic() - began_s

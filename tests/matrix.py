@@ -1,8 +1,9 @@
 """Install and first command with each version of Python and each extra: `python -m tests.matrix`.
 
 The versions are those of the classifiers in pyproject.toml; one that is not on this computer is
-named. Each cell is an environment of its own with the wheel, an extra and the pinned packages: what
-the extra names is imported, and a small recording is estimated. The row `oldest` has everything of
+named and skipped, but for the oldest, without which the status is 1. Each cell is an environment of
+its own with the wheel, an extra and the pinned packages: what the extra names is imported, and a
+small recording is estimated. The row `oldest` has everything of
 the extra `all` at the lower bounds in pyproject.toml, and with the first Python the golden answers
 are compared too. `--oldest` makes that row alone, with that Python, and without these answers.
 """
@@ -116,7 +117,7 @@ def golden(folder: Path) -> str:
 
 
 def main() -> int:
-    """Print the table, row by row; return 1 if a cell failed."""
+    """Print the table, row by row; return 1 if a cell failed or there is no oldest Python."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--oldest", action="store_true")
     only_oldest = parser.parse_args().oldest
@@ -124,7 +125,10 @@ def main() -> int:
     found = {version: interpreter(version) for version in wanted}
     pythons = {version: python for version, python in found.items() if python}
     for version in found.keys() - pythons.keys():
-        print(f"Python {version} is not on this computer")
+        print(f"Python {version} is not on this computer: skipped")
+    if wanted[0] not in pythons:
+        print(f"Python {wanted[0]} is the oldest, and needed")
+        return 1
     with tempfile.TemporaryDirectory() as text:
         place = Path(text)
         wheel, recording = built(place), place / "small.csv"

@@ -21,6 +21,7 @@ import rigidimeter as rm
 
 J, B, K = 0.0045, 0.1368, 1.751
 RATE_HZ = 2000.0
+TRIM_S = 1.0
 BURSTS_S = [(5.0, 6.0), (13.2, 14.6), (22.0, 23.2)]
 
 rng = np.random.default_rng(1)
@@ -60,8 +61,8 @@ for found in left_out.findings:
 # The figure
 # ----------
 #
-# Shaded: what is left out, until 0.2 s after the EMG, since the muscle still pulls. The torque
-# that J, B and K do not explain lies there.
+# Shaded: what is left out, until 0.2 s after the EMG, since the muscle still pulls, and 1 s on each
+# side, which the filters need. The torque that J, B and K do not explain lies there.
 
 figure, axes = plt.subplots(3, 1, figsize=(8, 5.5), sharex=True, layout="constrained")
 residual = torque - np.array([J, B, left_out.fits[0].stiffness_nm_rad]) @ angle[::-1]
@@ -74,7 +75,8 @@ for axis, values, label in zip(
     axis.plot(time_s, values, lw=0.6, color="black")
     axis.set_ylabel(label)
     for stretch in left_out.fits[0].activity.stretches:
-        axis.axvspan(stretch.start_s, stretch.stop_s + 0.2, color="tab:orange", alpha=0.3, lw=0)
+        out_s = stretch.start_s - TRIM_S, stretch.stop_s + 0.2 + TRIM_S
+        axis.axvspan(*out_s, color="tab:orange", alpha=0.3, lw=0)
 axes[-1].set_xlabel("Time (s)")
 axes[-1].set_xlim(0, 30)
 

@@ -52,7 +52,7 @@ octave("""
   torque_nm = torque_nm + 0.005 * randn(n, 1);
   angle_rad = angle_rad + 1e-5 * randn(n, 1);
   save('-v7', 'mine.mat', 'time_s', 'torque_nm', 'angle_rad')
-  printf('%d samples, angle SD %.1f deg\\n', n, std(angle_rad) * 180 / pi)
+  fprintf('%d samples, angle SD %.1f deg\\n', n, std(angle_rad) * 180 / pi)
 """)
 
 # %%
@@ -81,7 +81,7 @@ columns = {name: column.to_numpy() for name, column in table.items()}
 scipy.io.savemat(folder / "estimates.mat", {"estimates": columns})
 printed = octave("""
   load('estimates.mat')
-  printf('J %.5f kg m^2, B %.4f N m s/rad, K %.3f N m/rad\\n', ...
+  fprintf('J %.5f kg m^2, B %.4f N m s/rad, K %.3f N m/rad\\n', ...
          estimates.inertia_kg_m2, estimates.damping_nm_s_rad, estimates.stiffness_nm_rad)
 """)
 

@@ -27,7 +27,7 @@ def test_a_plan_of_three_days_is_drawn_and_its_first_session_run(chromium, tmp_p
         page.get_by_role("option", name="given").click()
         fill(page, "plan_given", "DBS,OFF")
         page.get_by_role("button", name="30 min").click()
-        page.get_by_text("OFF may still be partly treated").wait_for()
+        page.get_by_text("some of the effect may be left").wait_for()
         page.get_by_role("button", name="Draw the plan").click()
         page.get_by_text("'three' is no number").wait_for()
         fill(page, "plan_days", "3")

@@ -33,7 +33,7 @@ def scenarios(method: str) -> Figure:
         row for row in own
         if np.nanmax(np.abs(numbers(row[bias]))) > 1 or "**" in row[-1] or _flagged(row[flags])
     ]  # fmt: skip
-    rest = f"{len(own) - len(shown)} others: within 1 %, silent"
+    rest = f"{len(own) - len(shown)} others: right"
     figure, axes, places = rows_of([*(row[1] for row in shown), rest], 34)
     symlog(axes, 1, (-100, -10, -1, 0, 1, 10, 100), f"bias of {method}, % of the truth")
     marks = Marks(axes)

@@ -61,6 +61,8 @@ def _of_document(document: Mapping[str, Any], table: str) -> dict[str, Any]:
 
 def _kind(value: Any, table: str, *required: str) -> dict[str, Any]:
     """Return the kind of a value; what is a number or a text in one document may be null."""
+    if table == "facts":  # each kind of finding has its own
+        return {"type": ["object", "null"]}
     if isinstance(value, Mapping):
         inside = {
             key: {**_kind(one, TABLES.get(key, key)), **_description(key, table)}

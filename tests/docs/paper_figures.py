@@ -51,7 +51,7 @@ def days() -> Figure:
     figure = Figure(figsize=(6.4, 2.8), layout="constrained")
     result = rm.compare(rm.data("study"))
     print(result.statements.concluded)
-    result.plot_days(ax=figure.subplots())
+    result.plot_days(axes=figure.subplots())
     return figure
 
 

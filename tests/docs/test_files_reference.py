@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jsonschema import Draft202012Validator
 from tests.docs.files_tables import analysis
+from tests.docs.generated import FOLDER
 from tests.docs.markdown import ROOT, table
 from tests.known_joint import angle_rad, torque_nm
 from typer.testing import CliRunner
@@ -18,7 +21,7 @@ from rigidimeter.analysis.reading import ReadOptions, estimates_document, read_r
 from rigidimeter.cli.main import app
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import Activity
-from rigidimeter.core.session import SAMPLE_UNITS, SessionWriter, read_events, read_manifest
+from rigidimeter.core.session import SessionWriter, read_events, read_manifest, read_session_files
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.study_files import STUDY_SCHEMA
 
@@ -27,9 +30,10 @@ HOW_TO = ROOT / "docs" / "how-to"
 RUN = CliRunner()
 
 
-def test_the_sample_columns_are_those_of_the_log() -> None:
-    assert table(FILES, "samples.arrows") == dict(SAMPLE_UNITS)
-    assert list(table(FILES, "samples.arrows")) == list(SAMPLE_UNITS)
+def test_the_sample_columns_are_those_of_the_log(simulate: Callable[[], Path]) -> None:
+    recorded = read_session_files(simulate())
+    assert list(table(FILES, "samples.arrows")) == list(recorded.samples.columns)
+    assert table(FILES, "samples.arrows") == recorded.manifest["channel_units"]
 
 
 def test_the_manifest_and_event_keys_are_those_of_a_session(tmp_path: Path) -> None:
@@ -99,12 +103,43 @@ def test_the_keys_of_a_study_are_documented(study: Path) -> None:
     document: dict[str, Any] = json.loads((study / "analysis/comparison.json").read_text("utf-8"))
     assert list(table(FILES, "Top level of a comparison")) == list(document)
     assert list(table(FILES, "Each test by days")) == list(document["comparisons"][0]["days"])
+    _assert_valid(document, "comparison.json")
     kept = {path.name for path in (study / "analysis").iterdir()}
     section = FILES.read_text("utf-8").split("## Study folder")[1].split("### Top level")[0]
     assert kept <= set(re.findall(r"`([a-z_-]+\.(?:json|csv))`", section))
     inputs = json.loads((study / "analysis/inputs.json").read_text("utf-8"))
     for schema in (document["schema"], inputs["schema"], STUDY_SCHEMA):
         assert f"`{schema}`" in FILES.read_text("utf-8")
+
+
+def test_the_estimates_of_a_session_are_as_documented(
+    simulate: Callable[[], Path], tmp_path: Path
+) -> None:
+    out = tmp_path / "estimates.json"
+    result = RUN.invoke(app, ["estimate", str(simulate()), "--json", str(out)])
+    assert result.exit_code == 0, result.output
+    document = json.loads(out.read_text("utf-8"))
+    assert list(table(FILES, "Top level")) == list(document)
+    of_emg = set(Activity((), 0.0, 0.0).row())
+    assert set(table(FILES, "Each fit")) - of_emg == set(document["epochs"][0])
+    _assert_valid(document, "estimates.json")
+
+
+def _assert_valid(document: dict[str, Any], name: str) -> None:
+    schema = json.loads((FOLDER / name).read_text("utf-8"))
+    assert [error.message for error in Draft202012Validator(schema).iter_errors(document)] == []
+    assert _unknown(document, schema) == set()
+
+
+def _unknown(value: Any, schema: dict[str, Any]) -> set[str]:
+    """Return the keys of a document that its schema does not have."""
+    if isinstance(value, list):
+        return {key for one in value for key in _unknown(one, schema.get("items", {}))}
+    if not isinstance(value, dict) or "properties" not in schema:
+        return set()
+    known = schema["properties"]
+    below = {key for name in value.keys() & known for key in _unknown(value[name], known[name])}
+    return below | (value.keys() - known)
 
 
 def _elbow(tmp_path: Path) -> dict[str, str]:

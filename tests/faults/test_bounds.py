@@ -11,7 +11,7 @@ import pytest
 import scipy.io
 
 from rigidimeter.analysis.reading.formats.read_options import ReadOptions
-from rigidimeter.analysis.reading.formats.readers import read_recording, recorded_settings
+from rigidimeter.analysis.reading.formats.readers import read_recording, settings_in_file
 from rigidimeter.analysis.statistics import bootstrap, fit_mixed
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import (
@@ -97,7 +97,7 @@ def test_only_regular_files(tmp_path, read):
 def test_settings_are_not_sought_in_a_pipe(tmp_path):
     pipe = tmp_path / "pipe.xdf"
     os.mkfifo(pipe)
-    assert "cannot be read (it is a named pipe)" in refusal(recorded_settings, pipe)
+    assert "cannot be read (it is a named pipe)" in refusal(settings_in_file, pipe)
 
 
 @pytest.mark.parametrize("suffix", ["csv", "npz", "mat"])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import doctest
+import hashlib
 
 import pytest
 from benchmarks import house
@@ -19,6 +20,8 @@ NAMES = (
     *("EpochMotion", "Solved", "VaryingLines", "BeyondLinear", "LineMethod"),
 )
 """Types of the room that its rebuilding does without."""
+DIGEST = "f646eb6bb680cced508c6d64f305014081176ccf3fee61739f8f0eb352f373ad"
+"""Of the files of the room, which does not change while its successor is written."""
 
 
 @pytest.fixture(scope="module")
@@ -54,16 +57,23 @@ def test_every_ceiling_is_of_a_room_that_exists(now: dict[str, dict[str, int]]) 
     assert set(highest()["rooms"]) == set(now["rooms"])
 
 
+def test_the_room_stays_as_it_is_while_its_successor_is_written() -> None:
+    digest = hashlib.sha256()
+    for path in sorted(ROOM.rglob("*.py")):
+        digest.update(path.relative_to(ROOM).as_posix().encode() + b"\0" + path.read_bytes())
+    assert digest.hexdigest() == DIGEST, f"{ROOM.relative_to(ROOT)} changed"
+
+
 class TestEndOfEstimation:
     """The room built anew: what is missing of it is marked, a line each."""
 
     @pytest.mark.xfail(strict=True, reason="the room is not rebuilt")
     def test_code_lines(self, now: dict[str, dict[str, int]]) -> None:
-        assert now["rooms"]["analysis.estimation"] <= 4300
+        assert now["rooms"]["analysis.estimation"] <= 4300 + 487
 
     @pytest.mark.xfail(strict=True, reason="the room is not rebuilt")
     def test_code_lines_of_findings(self, now: dict[str, dict[str, int]]) -> None:
-        assert now["rooms"]["core.findings"] <= 1050
+        assert now["rooms"]["core.findings"] <= 1050 + 179
 
     @pytest.mark.xfail(strict=True, reason="the room is not rebuilt")
     def test_modules(self, rooms: House) -> None:

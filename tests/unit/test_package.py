@@ -1,10 +1,13 @@
 """Version, authors and addresses stand in one place; the other files agree with it."""
 
 import re
+import sys
 import tomllib
 from pathlib import Path
 
+import pytest
 import yaml
+from tests import core_install, matrix
 from tests.docs.licences import needed_by, plain
 from tests.packages import extras
 
@@ -75,3 +78,24 @@ def test_the_hosting_address_is_that_of_the_citation() -> None:
             r"https?://(?:github|gitlab)[^\s)\"]*rigidimeter\S*", (ROOT / name).read_text("utf-8")
         )
         assert set(named) <= {address}
+
+
+def test_a_command_that_hangs_has_failed_and_one_that_lasts_has_not(monkeypatch) -> None:
+    monkeypatch.setattr(core_install, "LIMIT_S", 0.5)
+    lasts = "import time; time.sleep(60)"
+    deaf = f"import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); {lasts}"
+    asked = core_install.run(Path(sys.executable), ["-c", lasts], ROOT, 0.5)
+    killed = core_install.run(Path(sys.executable), ["-c", deaf], ROOT, 2.0)
+    assert asked.interrupted
+    assert asked.failed
+    assert killed.failed
+    assert not core_install.Ran(["run"], 130, "", "", interrupted=True).failed
+    assert core_install.Ran(["run"], -9, "", "", interrupted=True).failed
+
+
+@pytest.mark.parametrize("options", [[], ["--oldest"]])
+def test_a_matrix_without_the_oldest_python_has_failed(monkeypatch, capsys, options) -> None:
+    monkeypatch.setattr(matrix, "interpreter", lambda _: None)
+    monkeypatch.setattr(sys, "argv", ["matrix", *options])
+    assert matrix.main() == 1
+    assert "is not on this computer: skipped" in capsys.readouterr().out

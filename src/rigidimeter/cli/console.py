@@ -76,8 +76,8 @@ def console(
 ) -> None:
     """Run sessions from a page in a browser: plan, run, look, repeat.
 
-    Where --out is a study with a plan, the page offers the session that is due, after its wait. Any
-    other gets a plan there, if it is to have one.
+    Where --out is a study with a plan, the page offers the session that is due, after its wait. In
+    any other folder a plan can be drawn on the page.
 
     The page's heartbeat is a dead-man's switch: a page that is closed, frozen or cut off stops the
     arm. The printed link holds a token, without which nobody looks or acts. SPACE and e in this

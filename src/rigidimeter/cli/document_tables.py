@@ -2,39 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
+from rigidimeter.core.units import deg_from_rad, named_unit
 from rigidimeter.core.words import axis_unit, number
 
 MOST_ENTRIES, ABREAST = 8, 4
 """How many entries of a list are shown, and how many of them side by side."""
-
-DEG = 180.0 / math.pi
-UNITS: dict[str, tuple[float, str]] = {
-    "_kg_m2_per_deg": (1.0, "kg·m²/deg"),
-    "_nm_s_rad": (1.0, "N·m·s/rad"),
-    "_nm_s_deg": (1.0, "N·m·s/deg"),
-    "_n2m2_hz": (1.0, "N²m²/Hz"),
-    "_nm_rad": (1.0, "N·m/rad"),
-    "_rad_s2": (DEG, "deg/s²"),
-    "_deg_s2": (1.0, "deg/s²"),
-    "_kg_m2": (1.0, "kg·m²"),
-    "_rad_s": (DEG, "deg/s"),
-    "_deg_s": (1.0, "deg/s"),
-    "_percent": (1.0, "%"),
-    "_rad": (DEG, "deg"),
-    "_deg": (1.0, "deg"),
-    "_nm": (1.0, "N·m"),
-    "_hz": (1.0, "Hz"),
-    "_db": (1.0, "dB"),
-    "_kg": (1.0, "kg"),
-    "_s": (1.0, "s"),
-    "_m": (1.0, "m"),
-}
-"""What a key of the document ends with, the longest first; people read degrees."""
 
 
 def document_tables(document: Mapping[str, Any], *above: str) -> Iterator[Block]:
@@ -82,7 +58,7 @@ def _table(columns: Mapping[str, Mapping[str, Any]], above: Sequence[str]) -> Ta
     for keys in dict.fromkeys(keys for each in leaves.values() for keys in each):
         values = [each.get(keys) for each in leaves.values()]
         named = [_named(key) for key in (*above, *keys)]
-        factor, unit = next((each for _, each in named if each), (1.0, ""))
+        factor, unit = next((each for _, each in named if each[1]), (1.0, ""))
         numbers = [value for value in values if isinstance(value, float)]
         scale, unit = axis_unit((factor * value for value in numbers), unit)
         name = ", ".join(filter(None, (" ".join(words for words, _ in named[len(above) :]), unit)))
@@ -95,10 +71,11 @@ def _table(columns: Mapping[str, Mapping[str, Any]], above: Sequence[str]) -> Ta
     return Table(headings, rows, "<" + ">" * len(columns))
 
 
-def _named(key: str) -> tuple[str, tuple[float, str] | None]:
+def _named(key: str) -> tuple[str, tuple[float, str]]:
     """Return the words of a key, and the factor and the unit that it ends with."""
-    ending = next((one for one in UNITS if key.endswith(one)), "")
-    return key.removesuffix(ending).replace("_", " "), UNITS.get(ending)
+    words, unit = named_unit(key)
+    turned = deg_from_rad(1.0) if unit.startswith("rad") else 1.0  # people read degrees
+    return words.replace("_", " "), (turned, unit.replace("rad", "deg", turned > 1.0))
 
 
 def _leaves(part: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], Any]]:

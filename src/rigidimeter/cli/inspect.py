@@ -13,6 +13,7 @@ from rigidimeter.cli.output import echo, keep_inputs, say
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import Table, show
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import is_dictionary
 from rigidimeter.core.words import with_error
 
 if TYPE_CHECKING:
@@ -40,10 +41,11 @@ def inspect(
       rigidimeter inspect demo-study/elbow.csv --write-mapping lab.toml
     """
     keep_inputs((write_mapping, plot), recordings.paths)
-    several = len(recordings.paths) > 1
+    named = [path for path in recordings.paths if not is_dictionary(path)] or recordings.paths
+    several = len(named) > 1
     if several and (write_mapping is not None or (plot is not None and not recordings.join)):
         raise UserError("--write-mapping and --plot are for one file; name one")
-    groups = [[*recordings.paths]] if recordings.join else [[path] for path in recordings.paths]
+    groups = [[*named]] if recordings.join else [[path] for path in named]
     status = 0
     for paths in groups:
         try:

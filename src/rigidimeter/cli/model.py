@@ -42,8 +42,8 @@ def model(
     For example:
       rigidimeter model demo-study/elbow.csv --terms inertia,reflex --compare
     """
-    from rigidimeter.analysis.study.fitted_terms import asked
-    from rigidimeter.analysis.study.torque_models import model_document, model_recording
+    from rigidimeter.analysis.study.fitted_terms import fit_terms
+    from rigidimeter.analysis.study.torque_models import model_document
     from rigidimeter.cli.model_text import model_blocks
     from rigidimeter.core.files import write_json
 
@@ -51,7 +51,6 @@ def model(
         raise UserError(
             f"--method {recordings.method}: terms are fitted only with bandlimited; leave it out"
         )
-    models, grow = asked(terms, compare)
     band_hz = recordings.band_hz
     if band_hz is not None and band_hz[0] == 0:
         if not band_hz[1] > 0:
@@ -65,9 +64,8 @@ def model(
     read = recordings.read()
     say(read.notices)
     with Meter("model", 1.0, from_first=True) as meter:
-        found = model_recording(
-            read, models, compare=compare, grow=grow, high_hz=high_hz, progress=meter.advance
-        )
+        advance = meter.advance
+        found = fit_terms(read, terms, compare=compare, high_hz=high_hz, progress=advance).epochs
     for each in found:
         problems = () if compare else each.unfitted
         for problem in problems or ((each.problem,) if each.problem else ()):

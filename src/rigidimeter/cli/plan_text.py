@@ -18,6 +18,7 @@ def show_plan(plan: StudyPlan) -> None:
     """Show the plan of each subject, what was recorded of it, and what is due."""
     from rigidimeter.core.study_files import (
         PLAN_COLUMNS,
+        next_block,
         next_words,
         plan_rows,
         plan_words,
@@ -25,12 +26,7 @@ def show_plan(plan: StudyPlan) -> None:
     )
 
     edited = " Edited after it was drawn." if plan.edited else ""
-    show(
-        [
-            f"{plan.folder}: {plan_words(plan)}.{edited}",
-            "",
-        ]
-    )
+    show([f"{plan.folder}: {plan_words(plan)}.{edited}", ""])
     recorded = recorded_blocks(plan.folder)
     headings = tuple(name.replace(", ", "\n") for name in PLAN_COLUMNS)
     for subject in plan.about.subjects:
@@ -43,7 +39,8 @@ def show_plan(plan: StudyPlan) -> None:
         if more:
             echo(f"  {more} more in {plan.folder / 'plan.csv'}")
         echo(f"  {next_words(plan, subject, recorded)}")
-    echo(f"Run the next one: rigidimeter run --next {plan.folder}")
+    if any(next_block(plan, one, None, recorded) for one in plan.about.subjects):
+        echo(f"Run the next one: rigidimeter run --next {plan.folder}")
 
 
 def show_switches(plan: StudyPlan, subject: str) -> None:

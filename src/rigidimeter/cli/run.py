@@ -34,7 +34,7 @@ def run(
         "--next STUDY", "Run the session of this study's plan that is due, after its wait."
     ),
     block: str = RUN.further(
-        "--block DAY/ORDER", "With --next: another session of the plan, or one once more.", ""
+        "--block DAY/ORDER", "With --next: this session of the plan, not the one that is due.", ""
     ),
     subject: str = RUN.option("--subject CODE", "Code of the subject.", ""),
     operator: str = RUN.further("--operator NAME", "Who leads the session.", ""),

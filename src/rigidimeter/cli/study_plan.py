@@ -7,8 +7,7 @@ from pathlib import Path
 
 import typer
 
-from rigidimeter.cli.help_pages import OPTIONS, READ, HelpCommand, argument
-from rigidimeter.cli.options import STUDY_SEED
+from rigidimeter.cli.help_pages import OPTIONS, READ, RUN, HelpCommand, argument
 from rigidimeter.cli.output import echo
 from rigidimeter.cli.plan_text import show_plan, show_switches
 from rigidimeter.cli.progress import Meter
@@ -18,7 +17,7 @@ from rigidimeter.core.errors import UserError
 def plan_days(
     folder: Path = argument("STUDY", "Study folder; made if it is none."),
     subjects: str = OPTIONS.option("--subjects A,B", "Codes of the subjects.", ""),
-    days: int = OPTIONS.option("--days N", "Days of each subject.", 8, min=1, max=1000),
+    days: int = OPTIONS.option("--days N", "Days of each subject.", 8),
     conditions: str = OPTIONS.further(
         "--conditions A,B", "Conditions, the reference first.", "OFF,DBS"
     ),
@@ -33,8 +32,6 @@ def plan_days(
         "Sessions a day of each condition. Above 1 conditions alternate, at most two alike in a "
         "row.",
         1,
-        min=1,
-        max=6,
     ),
     order: str = OPTIONS.further(
         "--order balanced|drawn|A,B",
@@ -42,21 +39,15 @@ def plan_days(
         "itself; or one order for all days.",
         "balanced",
     ),
-    wait_on_min: float = OPTIONS.further(
-        "--wait-after-on MIN", "Wait after switching on.", 15.0, min=0.0, max=1440.0
-    ),
+    wait_on_min: float = OPTIONS.further("--wait-after-on MIN", "Wait after switching on.", 15.0),
     wait_off_min: float = OPTIONS.option(
         "--wait-after-off MIN",
         "Wait after switching off. Rigidity returns in 30 to 60 minutes; the paper waited 15.",
         60.0,
-        min=0.0,
-        max=1440.0,
     ),
-    prbs_epochs: int = OPTIONS.option(
-        "--prbs-epochs N", "PRBS epochs of a session.", 5, min=0, max=500
-    ),
+    prbs_epochs: int = OPTIONS.option("--prbs-epochs N", "PRBS epochs of a session.", 5),
     sinusoid_epochs: int = OPTIONS.further(
-        "--sinusoid-epochs N", "Sinusoidal epochs of a session.", 3, min=0, max=500
+        "--sinusoid-epochs N", "Sinusoidal epochs of a session.", 3
     ),
     rests: str = OPTIONS.further(
         "--rests S,S",
@@ -73,7 +64,9 @@ def plan_days(
     design: Path | None = READ.further(
         "--from-design FILE", "Take days and PRBS epochs from the JSON of design --detect."
     ),
-    seed: int = STUDY_SEED,
+    seed: int | None = RUN.option(
+        "--seed N", "Seed of orders and codes. Default: 2023; with --blinded, one that is drawn."
+    ),
 ) -> None:
     """Plan the days of a study, or show its plan.
 

@@ -1,7 +1,7 @@
 """The one exception that is meant for the person at the keyboard."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -36,11 +36,17 @@ class UserError(Exception):
     The command line prints the sentence and exits with a non-zero status, without a traceback.
     The sentence names the file, the field and the value, and says what would be right. Where
     several things are wrong, each is a line of its own.
+
+    Attributes
+    ----------
+    lines : tuple of str
+    places : mapping of str to str
+        The sentence of each value that is wrong, by its key in a file or a form.
     """
 
-    def __init__(self, *lines: str) -> None:
+    def __init__(self, *lines: str, places: Mapping[str, str] | None = None) -> None:
         super().__init__("\n".join(lines))
-        self.lines = lines
+        self.lines, self.places = lines, places or {}
 
 
 @contextmanager

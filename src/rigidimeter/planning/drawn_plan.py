@@ -15,8 +15,9 @@ from typing import Literal
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import read_json, toml_text
 from rigidimeter.core.session import drawn_codes
-from rigidimeter.core.settings import Settings, changed_settings
+from rigidimeter.core.settings import Settings, changed_settings, validated
 from rigidimeter.core.study_files import (
+    PLAN_BOUNDS,
     ConditionTable,
     PlannedBlock,
     PlanToml,
@@ -31,16 +32,14 @@ from rigidimeter.planning.study_days import StudyDays, WrongValue, draw_days
 Order = Literal["balanced", "drawn", "given"]
 
 BOUNDS: Mapping[str, tuple[float, float]] = {
-    "days": (1, 1000),
+    **PLAN_BOUNDS,
     "sessions": (1, 6),
-    "seed": (0, 2**31),
     "prbs_epochs": (0, 500),
     "sinusoid_epochs": (0, 500),
-    "wait_after_on": (0.0, 1440.0),
-    "wait_after_off": (0.0, 1440.0),
 }
 """The least and the largest value of each number."""
 
+_SEED = 2023
 _NAME = re.compile(r"\w[\w.+-]*")
 _LONGEST_NAME = 40
 _COUNT = re.compile(r"\d{1,9}", re.ASCII)
@@ -58,6 +57,9 @@ class PlanValues:
         `given` for that of `given`.
     rests_s : tuple of float
         Those of the settings if empty.
+    seed : int, optional
+        Of orders, codes and sessions; a usual one by default, or one that nobody knows where
+        examiners are blinded.
     """
 
     subjects: tuple[str, ...]
@@ -75,29 +77,24 @@ class PlanValues:
     rests_s: tuple[float, ...] = ()
     raters: tuple[str, ...] = ()
     blinded: bool = False
-    seed: int = 2023
+    seed: int | None = None
 
     def __post_init__(self) -> None:
         for key, (low, high) in BOUNDS.items():
             value = getattr(self, key)
-            if not low <= value <= high:
+            if value is not None and not low <= value <= high:
                 raise WrongValue(key, f"must be from {low:g} to {high:.0f}", f"{value:.10g}")
         for name in self.stimulated or ():
             if name not in self.conditions:
                 known = ", ".join(self.conditions)
                 raise WrongValue("stimulated", f"is not one of the conditions {known}", name)
         if not self.prbs_epochs and not self.sinusoid_epochs:
-            raise WrongValue(
-                "prbs_epochs",
-                "a session needs an epoch; give some here or to --sinusoid-epochs",
-                "0",
-            )
+            raise WrongValue("prbs_epochs", "a session needs an epoch, PRBS or sinusoidal", "0")
 
-    @property
-    def days_asked(self) -> StudyDays:
-        """The same as what the days are drawn from."""
+    def days_asked(self, seed: int) -> StudyDays:
+        """Return the same as what the days are drawn from."""
         counts = ("prbs", self.prbs_epochs), ("sinusoid", self.sinusoid_epochs)
-        codes = drawn_codes(self.conditions, random.Random(f"codes {self.seed}"))
+        codes = drawn_codes(self.conditions, random.Random(f"codes {seed}"))
         return StudyDays(
             subjects=self.subjects,
             conditions=self.conditions,
@@ -159,23 +156,27 @@ def draw_plan(values: PlanValues, base: Settings) -> DrawnPlan:
     WrongValue
         If the values do not go together.
     UserError
-        If the settings do not hold with them.
+        If the plan or the settings do not hold with them.
     """
-    spec = values.days_asked
-    about = PlanToml(
-        subjects=list(spec.subjects),
-        days=spec.days,
-        conditions=list(spec.conditions),
-        stimulated=list(spec.stimulated),
-        order=values.order,
-        seed=values.seed,
-        wait_after_on_min=spec.wait_after_on_min,
-        wait_after_off_min=spec.wait_after_off_min,
-        raters=list(spec.raters),
-        codes=dict(spec.codes),
-    )
+    seed = values.seed
+    if seed is None:
+        seed = random.SystemRandom().randrange(2**31) if values.blinded else _SEED
+    spec = values.days_asked(seed)
+    stated = {
+        "subjects": list(spec.subjects),
+        "days": spec.days,
+        "conditions": list(spec.conditions),
+        "stimulated": list(spec.stimulated),
+        "order": values.order,
+        "seed": seed,
+        "wait_after_on_min": spec.wait_after_on_min,
+        "wait_after_off_min": spec.wait_after_off_min,
+        "raters": list(spec.raters),
+        "codes": dict(spec.codes),
+    }
+    about = validated(PlanToml, stated, "the plan")
     protocols = {spec.protocol_of(name): _protocol(base, name, values) for name in spec.conditions}
-    return DrawnPlan(about, draw_days(spec, values.seed), protocols)
+    return DrawnPlan(about, draw_days(spec, seed), protocols)
 
 
 def plan_names(text: str, key: str) -> tuple[str, ...]:

@@ -48,15 +48,14 @@ class WrongValue(UserError):
     Attributes
     ----------
     key : str
-        The option of `study plan`, with ``_`` in place of ``-``.
-    sentence : str
-        Without the option.
+        The option of `study plan`, with ``_`` in place of ``-``. Its sentence in `places` is
+        without the option.
     """
 
     def __init__(self, key: str, sentence: str, text: str | None = None) -> None:
         where = "" if text is None else f"--{key.replace('_', '-')} {text}: "
-        super().__init__(f"{where}{sentence}")
-        self.key, self.sentence = key, sentence
+        super().__init__(f"{where}{sentence}", places={key: sentence})
+        self.key = key
 
 
 @dataclass(frozen=True)

@@ -247,3 +247,55 @@ def test_a_value_whose_square_is_no_number_is_refused_with_its_line(rigidimeter,
     ran = rigidimeter("compare", path, "--value", "a")
     assert ran.status == 1
     assert "t.csv, line 3: a is 2e+200; values up to 1e+100 can be compared" in ran.err
+
+
+def two_rows_of_each(path: Path, head: str, label) -> None:
+    """Eight subjects with two rows in each condition; `label` gives subject and day."""
+    g = np.random.default_rng(3)
+    rows = [
+        f"{name},{label(name, k, twice)},{level + 0.1 * k + 0.01 * g.standard_normal():.6f}"
+        for k in range(8)
+        for name, level in (("OFF", 1.7), ("DBS", 1.5))
+        for twice in range(2)
+    ]
+    path.write_text("\n".join([f"condition,{head},k", *rows]) + "\n")
+
+
+@pytest.mark.parametrize(
+    ("head", "label"),
+    [
+        ("subject,day", lambda name, k, twice: f"M{k},"),
+        ("subject,day", lambda name, k, twice: f"M{k},NA"),
+        ("Subject", lambda name, k, twice: f"M{k}"),
+        ("Subject,Day", lambda name, k, twice: f"M{k},1"),
+    ],
+)
+def test_a_subject_in_several_rows_is_one(compared, tmp_path, head, label) -> None:
+    """A blank column of days is none, and a column is what its name says in capitals too."""
+    two_rows_of_each(tmp_path / "t.csv", head, label)
+    ran, found = compared(tmp_path / "t.csv", "--value", "k")
+    assert "Paired t-test of 8 subjects." in ran.out
+    assert found["comparisons"][0]["days"]["p"] < 0.001
+
+
+@pytest.mark.parametrize(
+    ("label", "sentence"),
+    [
+        (
+            lambda name, k, twice: f"M{k},{'' if name == 'OFF' else k}",
+            "lines 2, 3, 6, 7, 10 and 11 more: day is blank",
+        ),
+        (
+            lambda name, k, twice: f"{'' if k == 3 else f'M{k}'},1",
+            "lines 14, 15, 16, 17: subject is blank",
+        ),
+        (lambda name, k, twice: f"{'0' * twice}{k},1", "subject 0 is written in another way"),
+        (lambda name, k, twice: f"{'mM'[twice]}{k},1", "subject m0 is written in another way"),
+    ],
+)
+def test_whose_a_row_is_must_be_clear(compared, tmp_path, label, sentence) -> None:
+    two_rows_of_each(tmp_path / "t.csv", "subject,day", label)
+    ran, _ = compared(tmp_path / "t.csv", "--value", "k")
+    assert ran.status == 1
+    assert sentence in ran.err
+    assert ran.err.count("\n") == 1

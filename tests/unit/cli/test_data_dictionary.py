@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from rigidimeter.cli.main import app
 from rigidimeter.core.files import DICTIONARY, dictionary_text, is_dictionary, meaning_of
 from rigidimeter.core.session import SAMPLE_UNITS
+from rigidimeter.core.study_files import write_study_dictionary
 
 RUN = CliRunner()
 
@@ -80,20 +81,47 @@ def test_every_column_that_is_written_is_described(written: Path) -> None:
 
 
 def test_a_dictionary_is_no_recording(written: Path, tmp_path: Path) -> None:
-    """Also where a pattern finds it."""
-    shutil.copytree(written / "exported", tmp_path / "archive")
-    for named in ([str(tmp_path / "archive")], [str(tmp_path / "archive/*.csv")]):
-        out = tmp_path / f"{len(named[0])}.csv"
-        RUN.invoke(app, ["batch", *named, "--out", str(out)])
+    """Also where a pattern finds it, or a shell names it."""
+    archive = shutil.copytree(written / "exported", tmp_path / "archive")
+    expanded = [str(path) for path in sorted(archive.glob("*.csv"))]
+    assert any(is_dictionary(Path(name)) for name in expanded)
+    for named in ([str(archive)], [str(archive / "*.csv")], expanded):
+        out = tmp_path / f"{len(named)}{len(named[0])}.csv"
+        result = RUN.invoke(app, ["batch", *named, "--out", str(out)])
+        assert result.exit_code == 1, result.output  # tables without torque are errors
         inputs = {row[0] for row in _rows(out)[1:]}
         assert any(name.endswith("torque.csv") for name in inputs)
         assert not any(is_dictionary(Path(name)) for name in inputs)
 
 
+@pytest.mark.parametrize("command", ["inspect", "estimate"])
+def test_a_shell_that_names_a_dictionary_names_no_recording(written: Path, command: str) -> None:
+    tables = [str(path) for path in (written / "exported").glob("[mt]o*.csv")]
+    dictionary = str(written / "exported" / DICTIONARY)
+    said = [RUN.invoke(app, [command, *tables, *more]).output for more in ([], [dictionary])]
+    assert said[0] == said[1]
+    assert len(tables) > 1
+
+
+def test_a_dictionary_of_a_laboratory_is_kept(tmp_path: Path) -> None:
+    """And ours names a table as the study does."""
+    theirs = tmp_path / DICTIONARY
+    theirs.write_text("variable;meaning\nk;stiffness\n", "utf-8")
+    write_study_dictionary(tmp_path)
+    assert theirs.read_text("utf-8").startswith("variable;")
+    theirs.unlink()
+    for named in ({}, {"ratings": "updrs.csv"}):
+        write_study_dictionary(tmp_path, **named)
+    files = {row[0]: row[4] for row in _rows(theirs)[1:]}
+    assert "ratings.csv" not in files
+    assert files["updrs.csv"] == "each rating"
+
+
 def test_what_is_no_file_gets_no_dictionary(tmp_path: Path) -> None:
     table = tmp_path / "t.csv"
     table.write_text("name,condition,state\na,OFF,1\nb,DBS,2\n", "utf-8")
-    RUN.invoke(app, ["compare", str(table), "--value", "state", "--csv", "/dev/null"])
+    result = RUN.invoke(app, ["compare", str(table), "--value", "state", "--csv", "/dev/null"])
+    assert result.exit_code == 0, result.output
     assert not Path("/dev/null.data-dictionary.csv").exists()
     assert [path.name for path in tmp_path.iterdir()] == ["t.csv"]
 
@@ -111,6 +139,7 @@ def test_what_is_no_file_gets_no_dictionary(tmp_path: Path) -> None:
         ("conclusion", "level", "1", "significance level"),
         ("findings", "level", "", "note, caution or exclude"),
         ("comparisons", "days_mean_other", "(column unit)", "test by days: mean in the other"),
+        ("emg", "emg_8_v", "V", "of muscle 8"),
         ("band_sensitivity", "inertia_kg_m2_p", "1", "probability of as large a change"),
     ],
 )

@@ -163,6 +163,11 @@ def test_what_is_left_of_a_planned_session_enters_the_study(study, session, rigi
     rows = (study / "sessions.csv").read_text()
     assert "sessions/S01-day-1-1-2,S01,1,OFF" in rows
     assert "Next: Session 2 of 2 of S01" in ran.out
+    assert "Run the next one" in rigidimeter("study", "plan", study).out
+    rigidimeter("run", "--next", study, "--unattended", "--begin-anyway", "why")
+    shown = rigidimeter("study", "plan", study).out
+    assert "All sessions of the plan are recorded." in shown
+    assert "Run the next one" not in shown
 
 
 @pytest.mark.parametrize(

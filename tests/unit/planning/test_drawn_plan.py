@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -19,13 +20,34 @@ from rigidimeter.planning import (
 )
 
 
-def test_the_command_has_the_bounds_of_the_plan() -> None:
-    """They stand there again, so that its help does not load all that a plan needs."""
+def test_the_command_has_the_defaults_and_the_bounds_of_the_plan(tmp_path, rigidimeter) -> None:
     options = inspect.signature(plan_days).parameters
     names = {"wait_after_on": "wait_on_min", "wait_after_off": "wait_off_min"}
-    for key, bounds in BOUNDS.items():
+    usual = PlanValues(("S01",))
+    for key, (_, high) in BOUNDS.items():
         option = options[names.get(key, key)].default
-        assert (option.min, option.max) == bounds, key
+        assert option.default == getattr(usual, key), key
+        beyond = (f"--{key.replace('_', '-')}", f"{high + 1:.0f}")
+        refused = rigidimeter("study", "plan", tmp_path / "s", "--subjects", "S01", *beyond)
+        assert f"{' '.join(beyond)}: must be from" in refused.err
+        assert refused.status == 1
+
+
+def test_a_plan_that_its_file_does_not_hold_is_refused_in_a_sentence(tmp_path, rigidimeter) -> None:
+    options = ("--subjects", "S01", "--conditions", "code-A,code-B", "--blinded")
+    refused = rigidimeter("study", "plan", tmp_path / "study", *options)
+    assert refused.status == 1
+    assert "codes must hold another code for each condition" in refused.err
+
+
+def test_codes_are_others_in_each_study_and_those_of_its_seed() -> None:
+    """Else whoever knows the codes of one study knows those of all."""
+    values = PlanValues(("S01",), conditions=tuple("ABCDEFGH"), blinded=True)
+    first, second = (draw_plan(values, Settings()).about for _ in range(2))
+    assert first.seed != second.seed
+    assert first.codes != second.codes
+    assert draw_plan(replace(values, seed=first.seed), Settings()).about == first
+    assert draw_plan(replace(values, blinded=False), Settings()).about.seed == 2023
 
 
 @pytest.mark.parametrize(("key", "value"), [(key, high + 1) for key, (_, high) in BOUNDS.items()])

@@ -54,7 +54,7 @@ def inputs_of(named: Iterable[str | Path], apart: Iterable[Path] = ()) -> Iterat
         What is no input though it lies among them: our own output.
     """
     seen = dict.fromkeys(map(place_of, apart), False)
-    for path in _expanded(named):
+    for path in (one for one in _expanded(named) if not is_dictionary(one)):
         yield from _below(path, seen, asked=True)
 
 
@@ -104,7 +104,7 @@ def _expanded(named: Iterable[str | Path]) -> Iterator[Path]:
         path = Path(one)
         if glob.has_magic(str(one)) and not path.exists():
             found = sorted(glob.glob(str(one), recursive=True))
-            yield from (path for path in map(Path, found or [str(one)]) if not is_dictionary(path))
+            yield from map(Path, found or [str(one)])
         else:
             yield path
 

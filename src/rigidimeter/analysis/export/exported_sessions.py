@@ -35,17 +35,8 @@ from rigidimeter.core.session import (
 )
 from rigidimeter.core.settings import Settings, dump_settings
 from rigidimeter.core.study_files import SubjectTable
+from rigidimeter.core.units import named_unit
 from rigidimeter.core.version import __version__
-
-_UNITS: Mapping[str, str] = {
-    **CHANNEL_UNITS,
-    "target_angle_rad": "rad",
-    "velocity_request_rad_s": "rad/s",
-    "lateness_s": "s",
-    "drive_torque_nm": "N·m",
-    "drive_torque_time_s": "s",
-}
-"""The unit of every column that has one; the others are counts and codes."""
 
 _CLOCKS = {
     "torque": ("torque_time_s", ("torque_nm", "torque_sequence", "torque_status")),
@@ -258,12 +249,14 @@ def _exported(
         "settings": dumped,
         "epochs": [_epoch(epoch) for epoch in epochs],
         "streams": {each.name: list(each.columns) for each in streams},
-        "units": {column: _UNITS.get(column, "1") for each in streams for column in each.columns},
+        "units": {
+            column: named_unit(column)[1] or "1" for each in streams for column in each.columns
+        },
         "column_meanings": {
             column: SAMPLE_UNITS[column]
             for each in streams
             for column in each.columns
-            if column in SAMPLE_UNITS and column not in _UNITS
+            if column in SAMPLE_UNITS and not named_unit(column)[1]
         },
         "estimates": None if analysis is None else _estimates(analysis, source, name),
     }

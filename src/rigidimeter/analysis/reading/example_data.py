@@ -32,7 +32,7 @@ class Listed(dict[str, str]):
 
 EXAMPLES = Listed(
     {
-        "elbow": "a relaxed elbow, 3 PRBS epochs in OFF and 3 in DBS",
+        "elbow": "the paper's small joint, relaxed: 3 PRBS epochs in OFF and 3 in DBS",
         "pushing": "the subject pushes with 0.2 N·m (SD): least squares is biased",
         "tremor": "a tremor of 0.3 N·m at 5 Hz",
         "reflex": "a reflex of 0.3 N·m·s/rad, 60 ms late, beside J, B and K",

@@ -18,12 +18,12 @@ from rigidimeter.analysis.reading.formats import (
     ReadOptions,
     read_recording,
     read_table,
-    recorded_settings,
+    settings_in_file,
 )
 from rigidimeter.analysis.reading.formats.table_epochs import epochs_from_table
 from rigidimeter.analysis.reading.leave_out import with_left_out
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import noted_digests
+from rigidimeter.core.files import is_dictionary, noted_digests
 from rigidimeter.core.records import Epoch, Notice, Task
 from rigidimeter.core.settings import Settings, load_settings, settings_from
 from rigidimeter.core.words import html_table, one_line, plural, short_names
@@ -318,7 +318,7 @@ def read_as(
         begun = sizes[path]
         try:
             with noted_digests() as noted:
-                recorded = recorded_settings(path)
+                recorded = settings_in_file(path)
                 found, remarks = read_recording(path, replace(options, condition=name))
         except UserError as error:
             notices += [Notice("error", line) for line in error.lines]
@@ -403,7 +403,8 @@ def _paths(paths: object) -> list[Path]:
     for one in given:
         if not isinstance(one, str | PathLike):
             raise UserError(f"what to read is a path or a list of paths, not {one!r}")
-    return [Path(one) for one in given]
+    found = [Path(one) for one in given]
+    return [one for one in found if not is_dictionary(one)] or found  # a shell names them too
 
 
 def _by_name(argument: str, given: object, example: str) -> dict[str, str]:

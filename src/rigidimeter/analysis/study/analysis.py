@@ -64,4 +64,6 @@ def estimate(
         raise UserError(
             "estimate takes a Recording or a list of its epochs; read a path with rigidimeter.read"
         )
+    if method not in estimate_anew.method_names():
+        raise ValueError(f"method {method!r}: {estimate_anew.no_such_method(method)}")
     return estimate_anew.estimate(epochs, settings_from(settings), method, progress=progress)

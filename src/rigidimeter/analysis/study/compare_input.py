@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -36,7 +37,7 @@ from rigidimeter.analysis.study.study_analysis import (
     read_study,
 )
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import TextTable, lines_text, read_text_table
+from rigidimeter.core.files import TextTable, is_missing, lines_text, read_text_table
 from rigidimeter.core.records import Analysis, Notice
 from rigidimeter.core.settings import Settings, settings_from
 from rigidimeter.core.study_files import is_study
@@ -50,6 +51,7 @@ _LARGEST = 1e100
 """Squares of larger values overflow in the tests."""
 _OCCASIONS = ("visit", "session", "block", "run")
 """Columns that split the rows also where their labels are numbers."""
+_ZEROS = re.compile(r"(?<!\d)0+(?=\d)")
 _OF_DAY = ("subject", "day")
 """Columns of a table that say which values belong together."""
 
@@ -246,11 +248,6 @@ def _compare_columns(
     further = [name for name in known if name not in names] if pair[1] is None else []
     rows, notices = _kept(table, labels, [*names, *further], by)
     days = _days(table, rows, by, session)
-    if days:
-        dayless = [table.lines[k] for k in rows if "" in days[k]]
-        rows = [k for k in rows if "" not in days[k]]
-        if dayless:
-            notices.append(f"{table.source}: no subject or day in {lines_text(dayless)}; left out")
     if splits := _splitting(table, rows, {*values, by, session or by}):
         which = f"column {splits[0]} splits the rows and is"
         if len(splits) > 1:
@@ -291,7 +288,7 @@ def _compare_columns(
 
 def _of_group(table: TextTable, group: str) -> TextTable:
     """Return the rows of one group of subjects."""
-    labels = table.column(GROUP, "group=")
+    labels = table.column(_spelled(table, GROUP), "group=")
     rows = [k for k, label in enumerate(labels) if label == group]
     if not rows:
         raise UserError(no_such_group(table.source, group, labels))
@@ -311,7 +308,7 @@ def _splitting(table: TextTable, rows: Sequence[int], used: Collection[str]) -> 
         labels = Counter(cells[k] for k in rows if cells[k])
         words = not all(label.replace(".", "", 1).lstrip("+-").isdigit() for label in labels)
         few = len(labels) > 1 and min(labels.values()) > 1
-        if few and (words or name in _OCCASIONS) and name not in {*used, *_OF_DAY, GROUP}:
+        if few and (words or name in _OCCASIONS) and name.lower() not in {*used, *_OF_DAY, GROUP}:
             found.append(name)
     return found
 
@@ -339,21 +336,48 @@ def _kept(
 def _days(
     table: TextTable, rows: Sequence[int], by: str, session: str | None
 ) -> list[tuple[str, str]]:
-    """Return subject and day of every row, the same for all where there is no column of it.
+    """Return subject and day of every row, the same for all where no row has one.
 
     Nothing where no two of the rows are of one day, or of one of several subjects.
     """
-    subject, day = (table.columns.get(name) if name != by else None for name in _OF_DAY)
-    if day is None and session is not None and session not in (by, _OF_DAY[0]):
-        day = table.columns.get(session)
-    if subject is None and day is None:
+    subject, day = (_spelled(table, name) for name in _OF_DAY)
+    subjects, days = (_of_every(table, rows, name) if name != by else () for name in (subject, day))
+    if not days and session not in (None, by, subject):
+        days = _of_every(table, rows, session)
+    if not (subjects or days):
         return []
     alike = ("1",) * len(table.lines)
-    found = list(zip(subject or alike, day or alike, strict=True))
-    known = [found[row] for row in rows if "" not in found[row]]
-    subjects = {of for of, _ in known}
-    apart = subjects if len(subjects) > 1 else set(known)
-    return found if len(apart) < len(known) else []
+    found = list(zip(subjects or alike, days or alike, strict=True))
+    several = {found[row][0] for row in rows}
+    apart = several if len(several) > 1 else {found[row] for row in rows}
+    return found if len(apart) < len(rows) else []
+
+
+def _of_every(table: TextTable, rows: Sequence[int], name: str) -> Sequence[str]:
+    """Return the labels of a column, nothing where it is not there or blank in each of the rows.
+
+    Raises
+    ------
+    UserError
+        If it is blank in some, or writes one label in two ways.
+    """
+    cells = table.columns.get(name, ())
+    blank = [row for row in rows if not cells or is_missing(cells[row])]
+    if len(blank) == len(rows):
+        return ()
+    plain = [_ZEROS.sub("", cells[row].casefold()) for row in rows]
+    written = dict(zip(plain, (cells[row] for row in rows), strict=True))
+    other = [row for row in rows if cells[row] not in written.values()]
+    if wrong := blank or other:
+        what = "is blank" if blank else f"{cells[other[0]]} is written in another way elsewhere"
+        lines = lines_text([table.lines[row] for row in wrong])
+        raise UserError(f"{table.source}, {lines}: {name} {what}; say it in every row, in one way")
+    return cells
+
+
+def _spelled(table: TextTable, name: str) -> str:
+    """Return a name as the table capitalises it."""
+    return next((own for own in table.columns if own.lower() == name), name)
 
 
 def _column(
@@ -367,7 +391,9 @@ def _column(
 ) -> tuple[Comparison, list[str]]:
     observations, missing = [], []
     nowhere = ("",) * len(labels)
-    subjects, groups = (table.columns.get(of, nowhere) for of in (_OF_DAY[0], GROUP))
+    subjects, groups = (
+        table.columns.get(_spelled(table, of), nowhere) for of in (_OF_DAY[0], GROUP)
+    )
     for row in rows:
         line = table.lines[row]
         value = table.number(name, row)

@@ -91,12 +91,14 @@ class FittedTerms:
         return str(self.table().to_html(index=False))
 
 
-def asked(terms: str | Sequence[str] | None, compare: bool) -> tuple[list[tuple[str, ...]], bool]:
+def _asked(terms: str | Sequence[str] | None, compare: bool) -> tuple[list[tuple[str, ...]], bool]:
     """Return the models that are asked for, and whether terms are added to the best of them."""
     texts = [terms] if isinstance(terms, str) else terms or [COMPARED if compare else USUAL]
     if not isinstance(texts, Sequence) or not all(isinstance(text, str) for text in texts):
         raise UserError(f"terms are a text such as '{USUAL}', or a list of them, not {terms!r}")
     named = [parse_terms(text) for text in texts]
+    if len(named) > 1 and all(len(one) == 1 for one in named):
+        raise UserError(f"terms: each text is a model of its own; say '{','.join(texts)}' for one")
     grow = compare and len(named) == 1
     return [*candidates(named[0])] if grow else named, grow
 
@@ -118,8 +120,8 @@ def fit_terms(
     recording : Recording
     terms : str or sequence of str, optional
         The terms of a model, comma-separated, such as ``"inertia,damping,stiffness,coulomb"``, or
-        of several models. Default: J, B and K; with `compare` also a reflex, cubic stiffness,
-        damping of each direction, and friction.
+        of several models, each a text of its own. Default: J, B and K; with `compare` also a
+        reflex, cubic stiffness, damping of each direction, and friction.
     compare : bool
         Compare the models by what they predict of blocks that they were not fitted to, and
         recommend one. Of one model J, B and K alone are tried, and each further term.
@@ -148,12 +150,12 @@ def fit_terms(
     """
     if not isinstance(recording, Recording):
         raise UserError("fit_terms takes a Recording; read a path with rigidimeter.read")
-    models, grow = asked(terms, compare)
+    models, grow = _asked(terms, compare)
     found = FittedTerms(
         model_recording(
             recording, models, compare=compare, grow=grow, high_hz=high_hz, progress=progress
         )
     )
     if not compare and found.problems and found.table().empty:
-        raise UserError(found.problems[0])
+        raise UserError(*found.problems)
     return found

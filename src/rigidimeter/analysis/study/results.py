@@ -339,7 +339,7 @@ class StudyResult:
         """
         return rigidimeter.plot(self, measures=measures, axes=axes)
 
-    def plot_days(self, measure: str = "stiffness_nm_rad", *, ax: Axes | None = None) -> Axes:
+    def plot_days(self, measure: str = "stiffness_nm_rad", *, axes: Axes | None = None) -> Axes:
         """Draw a measure day by day: every value a point, and each day's median and quartiles.
 
         A line joins the medians of a day that has both conditions.
@@ -349,9 +349,9 @@ class StudyResult:
         ValueError
             If the measure was not compared, or days are not known, as they are of a study folder.
         """
-        return rigidimeter.plot(self, "days", measure=measure, axes=ax)
+        return rigidimeter.plot(self, "days", measure=measure, axes=axes)
 
-    def plot_effects(self, *, ax: Axes | None = None) -> Axes:
+    def plot_effects(self, *, axes: Axes | None = None) -> Axes:
         """Draw the effect size r of each measure with its 95 % interval.
 
         Raises
@@ -359,7 +359,7 @@ class StudyResult:
         ValueError
             If no measure was tested.
         """
-        return rigidimeter.plot(self, "effects", axes=ax)
+        return rigidimeter.plot(self, "effects", axes=axes)
 
     def __repr__(self) -> str:
         """Return the medians of the conditions in each measure as one line."""

@@ -14,7 +14,7 @@ from pathlib import Path, PurePath
 from rigidimeter.analysis.reading import ReadOptions, read_recording
 from rigidimeter.analysis.reading.channels.joining import FOUND
 from rigidimeter.analysis.reading.channels.mapping_file import read_mapping
-from rigidimeter.analysis.reading.formats import reader_of, recorded_settings
+from rigidimeter.analysis.reading.formats import reader_of, settings_in_file
 from rigidimeter.analysis.reading.recording import read_joined
 from rigidimeter.analysis.estimate_anew import task_of
 from rigidimeter.analysis.study.blinding import Naming
@@ -169,7 +169,7 @@ def _read(
         raise _Refused(f"{path}: there is no such session folder or recording")
     from_session = is_session(path)
     reader_of(path)
-    settings = recorded_settings(path)
+    settings = settings_in_file(path)
     if from_session:
         events, _ = read_events(path / EVENTS) if (path / EVENTS).is_file() else ([], False)
         if not any(event.get("event") == "session_ended" for event in events):

@@ -60,29 +60,25 @@ def statements(result: StudyResult) -> Statements | None:
 def statements_of_all(result: StudyResult) -> Statements | None:
     """Return the statements on each comparison with the reference, beside each other.
 
-    What does not name the other condition begins with the difference that it is of.
+    Where there are several, each begins with the difference that it is of.
     """
     told = [
-        (f"{condition_name(pair.other)} − {condition_name(pair.reference)}: ", pair.other, said)
+        (f"{condition_name(pair.other)} − {condition_name(pair.reference)}: ", said)
         for pair in (result, *result.further_pairs)
         if (said := statements(pair)) is not None
     ]
     if len(told) < 2:
-        return told[0][2] if told else None
-    measured = [said.measured.removesuffix(f" {MEASUREMENT_ALONE}") for *_, said in told]
-    if any(said.measured.endswith(MEASUREMENT_ALONE) for *_, said in told):
+        return told[0][1] if told else None
+    measured = [said.measured.removesuffix(f" {MEASUREMENT_ALONE}") for _, said in told]
+    if any(said.measured.endswith(MEASUREMENT_ALONE) for _, said in told):
         measured.append(MEASUREMENT_ALONE)
-    tested = [said.tested for *_, said in told]
+    tested = [said.tested for _, said in told]
     if len(set(tested)) > 1:
-        tested = [f"{which}{text}" for (which, *_), text in zip(told, tested, strict=True)]
+        tested = [f"{which}{said.tested}" for which, said in told]
     return Statements(
         " ".join(measured),
         " ".join(dict.fromkeys(tested)),
-        tuple(
-            sentence if condition_name(other) in sentence else f"{which}{sentence}"
-            for which, other, said in told
-            for sentence in said.concluded
-        ),
+        tuple(f"{which}{sentence}" for which, said in told for sentence in said.concluded),
     )
 
 

@@ -15,7 +15,7 @@ from rigidimeter.core.files.data_dictionary import (
     dictionary_text,
     is_dictionary,
     meaning_of,
-    rows_of,
+    write_dictionary,
     write_dictionary_beside,
 )
 from rigidimeter.core.files.escaping import NUMBER_TEXT, as_read, as_written, printable, visible
@@ -62,7 +62,14 @@ from rigidimeter.core.files.size_limits import (
     lines_text,
     size_text,
 )
-from rigidimeter.core.files.text_lines import content, joined_names, read_utf8, records, trimmed
+from rigidimeter.core.files.text_lines import (
+    content,
+    is_missing,
+    joined_names,
+    read_utf8,
+    records,
+    trimmed,
+)
 from rigidimeter.core.files.writing import (
     append_line,
     csv_text,

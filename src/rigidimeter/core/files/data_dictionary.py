@@ -11,34 +11,15 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rigidimeter.core.files.reading import parse_toml
+from rigidimeter.core.files.reading import parse_toml, read_bytes
+from rigidimeter.core.files.size_limits import DOCUMENT_BYTES
 from rigidimeter.core.files.writing import csv_text, write_text
+from rigidimeter.core.units import named_unit
 
 DICTIONARY = "data-dictionary.csv"
 """Its name in a folder; beside a single table the name of the table comes first."""
 
 HEADER = ("file", "column", "unit", "meaning", "row")
-
-_UNITS = {
-    "_kg_m2": "kg·m²",
-    "_nm_s_rad": "N·m·s/rad",
-    "_nm_rad": "N·m/rad",
-    "_nm_s": "N·m·s",
-    "_nm": "N·m",
-    "_rad_s": "rad/s",
-    "_rad": "rad",
-    "_hz": "Hz",
-    "_percent": "%",
-    "_min": "min",
-    "_us": "µs",
-    "_ua": "µA",
-    "_ma": "mA",
-    "_j": "J",
-    "_v": "V",
-    "_s": "s",
-}
-"""How names end that state their unit; the longer ending comes first."""
-
 
 _ENDS = ("_se", "_low", "_high")
 """What may follow the unit in a name."""
@@ -114,8 +95,7 @@ def _meaning(said: str | list[str], column: str) -> Meaning:
         unit, words = said
         return Meaning(f"(column {unit})" if unit in _OTHER_COLUMNS else unit, words)
     base = next((column.removesuffix(e) for e in _ENDS if column.endswith(e)), column)
-    ends = (unit for ending, unit in _UNITS.items() if base.endswith(ending))
-    return Meaning(next(ends, ""), said)
+    return Meaning(named_unit(base)[1], said)
 
 
 def dictionary_text(
@@ -163,7 +143,20 @@ def write_dictionary_beside(path: Path, table: str, columns: Iterable[str]) -> N
     """
     if path.is_file():
         text = dictionary_text({path.name: columns}, {path.name: table})
-        write_text(path.with_name(f"{path.stem}.{DICTIONARY}"), text)
+        write_dictionary(path.with_name(f"{path.stem}.{DICTIONARY}"), text)
+
+
+def write_dictionary(path: Path, text: str) -> None:
+    """Write a data dictionary, but never over one that is not of this program.
+
+    Raises
+    ------
+    UserError
+        If it cannot be written.
+    """
+    head = text[: text.index("\n")].encode()
+    if not path.exists() or read_bytes(path, DOCUMENT_BYTES).startswith(head):
+        write_text(path, text)
 
 
 def is_dictionary(path: Path) -> bool:

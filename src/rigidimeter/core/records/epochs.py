@@ -11,6 +11,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rigidimeter.core.units import named_unit
+
 Task = Literal["prbs", "sinusoid"]
 Axis = Literal["unknown", "vertical", "horizontal"]
 """How the joint's axis stands: about a vertical one the limb's weight has no moment."""
@@ -20,13 +22,10 @@ OutcomeKind = Literal["included", "excluded", "failed"]
 EMG_CHANNELS = ("emg_v", *(f"emg_{muscle}_v" for muscle in range(2, 9)))
 """Raw EMG: one muscle each."""
 
+_MEASURED = ("torque_nm", "angle_rad", "velocity_rad_s")
+_COMMANDED = ("velocity_command_rad_s", "perturbation_nm")
 CHANNEL_UNITS: Mapping[str, str] = {
-    "torque_nm": "N·m",
-    "angle_rad": "rad",
-    "velocity_rad_s": "rad/s",
-    "velocity_command_rad_s": "rad/s",
-    "perturbation_nm": "N·m",
-    **dict.fromkeys(EMG_CHANNELS, "V"),
+    name: named_unit(name)[1] for name in (*_MEASURED, *_COMMANDED, *EMG_CHANNELS)
 }
 """The channels an epoch may hold, and their units."""
 

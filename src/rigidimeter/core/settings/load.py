@@ -50,9 +50,7 @@ def load_settings(path: Path | None) -> Settings:
     UserError
         If the file cannot be read, is not TOML, or holds a bad value.
     """
-    if path is None:
-        return Settings()
-    return parse_settings(read_toml(path), source=str(path))
+    return Settings() if path is None else parse_settings(read_toml(path), source=str(path))
 
 
 def dump_settings(settings: Settings) -> dict[str, Any]:

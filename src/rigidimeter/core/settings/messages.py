@@ -21,13 +21,15 @@ def validated(model: type[Model], values: Mapping[str, Any], source: str) -> Mod
     Raises
     ------
     UserError
-        Naming the source, and each offending key with its value and what would be right.
+        Naming the source, and each offending key with its value and what would be right. A
+        sentence begins with its key, so what is wrong with several is placed at the first.
     """
     try:
         return model.model_validate(dict(values))
     except ValidationError as error:
         told = dict.fromkeys(_sentence(model, detail) for detail in error.errors())
-        raise UserError(f"{source}: {'; '.join(told)}") from None
+        places = {one.replace(": ", ".", 1).split()[0]: one for one in told}
+        raise UserError(f"{source}: {'; '.join(told)}", places=places) from None
 
 
 def _sentence(root: type[BaseModel], detail: ErrorDetails) -> str:

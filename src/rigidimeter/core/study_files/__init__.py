@@ -2,6 +2,7 @@
 
 from rigidimeter.core.study_files.continued_session import ContinuedSession, continued_session
 from rigidimeter.core.study_files.day_plan import (
+    PLAN_BOUNDS,
     PLAN_FILE,
     PLAN_SCHEMA,
     PLAN_TABLE,

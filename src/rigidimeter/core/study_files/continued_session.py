@@ -41,21 +41,18 @@ class ContinuedSession:
         """Of the clock of the waits: that of the part before."""
         return float(self.place["clock_speed"])
 
-    def changed(self, now: datetime) -> bool:
-        """Whether the stimulation is not known to be as it was when the part before began."""
-        before = self.place["stimulation_changed_utc"]
-        return bool(change_facts(self.due, now)["stimulation_changed_utc"] != before)
-
     def waits(self, now: datetime) -> bool:
-        """Whether a wait has to pass before it is continued."""
-        return self.changed(now) and self.due.left_min(now, self.speed) != 0.0
+        """Whether a wait has to pass: the stimulation is not known to be as it was before."""
+        since = change_facts(self.due, now)["stimulation_changed_utc"]
+        changed = bool(since != self.place["stimulation_changed_utc"])
+        return changed and self.due.left_min(now, self.speed) != 0.0
 
     def words(self, now: datetime) -> str:
         """Return why it has to wait; empty where it has not."""
         if not self.waits(now):
             return ""
         what = (
-            "Nobody wrote down what was done to the stimulation since this session began"
+            "Whether the stimulation was switched since this session began is not known"
             if self.due.change is None
             else "The stimulation was switched since this session began"
         )

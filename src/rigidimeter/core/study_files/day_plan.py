@@ -14,7 +14,7 @@ import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -38,6 +38,14 @@ PLAN_FILE, PLAN_TABLE = "plan.toml", "plan.csv"
 PLAN_SCHEMA = "rigidimeter.plan/1"
 TASKS = ("prbs", "sinusoid")
 LONGEST_WAIT_MIN = 24 * 60.0
+PLAN_BOUNDS: Mapping[str, tuple[float, float]] = {
+    "days": (1, 1000),
+    "seed": (0, 2**31),
+    "wait_after_on": (0.0, LONGEST_WAIT_MIN),
+    "wait_after_off": (0.0, LONGEST_WAIT_MIN),
+}
+"""The least and the largest value of numbers of a plan."""
+
 _LONGEST_DAY, _MOST_ORDER = 40, 1000
 
 COLUMNS = ("subject", "day", "order", "condition", "task", "protocol", "wait_min", "raters")
@@ -81,6 +89,11 @@ class PlannedBlock:
         return self.subject, self.day, self.order
 
 
+def _number(key: str, unit: str = "min", default: Any = ...) -> Any:
+    low, high = PLAN_BOUNDS[key]
+    return Field(default, ge=low, le=high, json_schema_extra={"unit": unit})
+
+
 class PlanToml(Section):
     """All of `plan.toml` but its schema.
 
@@ -98,17 +111,13 @@ class PlanToml(Section):
     """
 
     subjects: list[str] = Field(min_length=1, max_length=1000)
-    days: int = Field(ge=1, le=1000, json_schema_extra={"unit": "1"})
+    days: int = _number("days", "1")
     conditions: list[str] = Field(min_length=1, max_length=20)
     stimulated: list[str] = Field(default_factory=list)
     order: Literal["balanced", "drawn", "given"] = "balanced"
-    seed: int = Field(1, ge=0, le=2**31, json_schema_extra={"unit": "1"})
-    wait_after_on_min: float = Field(
-        15.0, ge=0.0, le=LONGEST_WAIT_MIN, json_schema_extra={"unit": "min"}
-    )
-    wait_after_off_min: float = Field(
-        60.0, ge=0.0, le=LONGEST_WAIT_MIN, json_schema_extra={"unit": "min"}
-    )
+    seed: int = _number("seed", "1", 1)
+    wait_after_on_min: float = _number("wait_after_on", default=15.0)
+    wait_after_off_min: float = _number("wait_after_off", default=60.0)
     raters: list[str] = Field(default_factory=list)
     codes: dict[str, str] = Field(default_factory=dict)
     sha256: str = Field("", max_length=64)
@@ -177,22 +186,16 @@ class StudyPlan:
 
 
 def read_plan(study: Path) -> StudyPlan | None:
-    """Read and check the plan of a study folder; None if it has none.
+    """Read and check the plan of a study folder; None if none was written to its end.
 
     Raises
     ------
     UserError
         Naming the file, the line, the value and what would be right.
     """
-    about_path = study / PLAN_FILE
-    if not (study / PLAN_TABLE).exists() and not about_path.exists():
+    if not (study / PLAN_FILE).exists():
         return None
-    if not about_path.exists():
-        raise UserError(
-            f"{study / PLAN_TABLE}: has no {PLAN_FILE} beside it, so the plan was not written to "
-            "its end; draw it again with the same options of rigidimeter study plan, or remove it"
-        )
-    about = read_section(about_path, PLAN_SCHEMA, PlanToml)
+    about = read_section(study / PLAN_FILE, PLAN_SCHEMA, PlanToml)
     try:
         return _read_table(study, about)
     except UserError as error:

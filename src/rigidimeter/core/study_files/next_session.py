@@ -258,9 +258,9 @@ def wait_words(due: DueBlock, now: datetime, speed: float = 1.0) -> str:
     left = due.left_min(now, speed)
     if due.wait_from is not None and due.wait_from.is_ahead_of(now):
         return (
-            f"The wait of {due.block.wait_min:g} min has not begun: the last change in "
-            f"{STIMULATION_TABLE} is of {due.wait_from.changed_utc:%Y-%m-%d %H:%M} UTC, which has "
-            "not come; correct it"
+            f"The wait of {due.block.wait_min:g} min has not begun: in {STIMULATION_TABLE} the "
+            f"last change is at {due.wait_from.changed_utc:%Y-%m-%d %H:%M} UTC, which is still to "
+            "come; correct the table"
         )
     if left is None and due.change is not None and due.change.stimulation != due.stimulation:
         return "The wait has not begun: the stimulation is not yet as this session needs it"

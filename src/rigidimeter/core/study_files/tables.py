@@ -23,6 +23,7 @@ from rigidimeter.core.files import (
     read_utf8,
     replace_file,
     text_bytes,
+    write_dictionary,
     write_text,
 )
 from rigidimeter.core.study_files.day_plan import COLUMNS as PLAN_COLUMNS
@@ -51,16 +52,25 @@ def empty_table(name: str) -> str:
     return f"{_ABOUT[name]}{','.join(_COLUMNS[name])}\n"
 
 
-def write_study_dictionary(folder: Path) -> None:
+def write_study_dictionary(folder: Path, **named: str) -> None:
     """Write what is in each column of every table that a study may have.
+
+    Parameters
+    ----------
+    folder : Path
+    **named : str
+        The files of tables that are called otherwise.
 
     Raises
     ------
     UserError
         If it cannot be written.
     """
-    columns = {f"{name}.csv": (*needed, *more) for name, (needed, more) in TABLE_COLUMNS.items()}
-    write_text(folder / DICTIONARY, dictionary_text(columns | {PLAN_TABLE: PLAN_COLUMNS}))
+    files = {name: named.get(name, f"{name}.csv") for name in TABLE_COLUMNS}
+    columns = {files[name]: (*needed, *more) for name, (needed, more) in TABLE_COLUMNS.items()}
+    tables = dict(zip(columns, files, strict=True))
+    text = dictionary_text(columns | {PLAN_TABLE: PLAN_COLUMNS}, tables)
+    write_dictionary(folder / DICTIONARY, text)
 
 
 def table_path(folder: Path, name: str) -> Path:
@@ -116,7 +126,7 @@ def add_rows(path: Path, name: str, rows: Sequence[Mapping[str, str]]) -> None:
         with refused(path, "cannot be made"):
             path.parent.mkdir(parents=True, exist_ok=True)
         write_text(path, empty_table(name))
-        write_study_dictionary(path.parent)
+        write_study_dictionary(path.parent, **{name: path.name})
     table = checked_table(path, name)
     for row in rows:
         absent = [

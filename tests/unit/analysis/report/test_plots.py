@@ -61,8 +61,8 @@ def plots(
         "torque": lambda axes: analysis.plot_torque(recording, 1, axes=axes),
         "fit": lambda axes: analysis.fits[1].plot(axes=axes),
         "result": lambda axes: study.plot(axes=axes),
-        "days": lambda axes: cohort.plot_days(ax=axes),
-        "effects": lambda axes: cohort.plot_effects(ax=axes),
+        "days": lambda axes: cohort.plot_days(axes=axes),
+        "effects": lambda axes: cohort.plot_effects(axes=axes),
         "design": lambda axes: planned.plot(axes=axes),
     }
 

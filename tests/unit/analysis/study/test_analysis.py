@@ -56,7 +56,7 @@ def test_a_recording_is_estimated_with_its_settings():
     assert found == estimate(epochs, "bandlimited", settings=settings)
     assert found.fits[0].band_hz == pytest.approx((0.1, 12.0))
     assert estimate(epochs, "bandlimited") == estimate(epochs, "bandlimited", settings=Settings())
-    with pytest.raises(ValueError, match="no such method"):
+    with pytest.raises(ValueError, match="method 'magic': there is no such method"):
         estimate(epochs, "magic")
 
 

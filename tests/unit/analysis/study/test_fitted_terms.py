@@ -52,6 +52,16 @@ def test_a_model_that_cannot_be_fitted_beside_one_that_can_is_a_problem(recordin
     assert "leave offset out" in repr(found)
 
 
+def test_single_terms_are_not_taken_for_models(recording, rigidimeter, tmp_path) -> None:
+    """Each text is a model; a list of terms would be models of one term each, none a joint."""
+    sentence = "each text is a model of its own; say 'inertia,damping' for one"
+    with pytest.raises(UserError, match=sentence):
+        rm.fit_terms(recording, ["inertia", "damping"])
+    ran = rigidimeter("model", recording.paths[0], "--terms", "inertia", "--terms", "damping")
+    assert ran.status == 1
+    assert sentence in ran.err
+
+
 @pytest.mark.parametrize("terms", [7, [1, 2], {"inertia"}])
 def test_terms_that_are_no_text_are_refused_in_a_sentence(recording, terms) -> None:
     with pytest.raises(UserError, match="terms are a text such as 'inertia,damping,stiffness'"):

@@ -106,9 +106,9 @@ def test_each_condition_is_stated_beside_the_reference() -> None:
     assert said is not None
     for name in ("1 mA", "2 mA", "3 mA"):
         assert f"{name} − OFF: k " in said.measured
-        assert sum(name in sentence for sentence in said.concluded) == 1
+        assert sum(sentence.startswith(f"{name} − OFF: ") for sentence in said.concluded) == 1
     assert said.tested.count("Paired t-test of 8 days") == 1
-    assert "k is lower in 3 mA than in OFF." in said.concluded
+    assert "3 mA − OFF: k is lower in 3 mA than in OFF." in said.concluded
     assert repr(found) == "OFF, 1 mA, 2 mA and 3 mA; medians: k 1.685, 1.741, 1.383 and 1.218"
     pair = compare(pd.DataFrame(rows), "2 mA", reference="OFF", value="k", resamples=100)
     assert repr(pair).startswith("OFF and 2 mA; medians: ")

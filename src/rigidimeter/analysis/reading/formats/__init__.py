@@ -17,7 +17,7 @@ if TYPE_CHECKING:
         read_recording,
         read_table,
         reader_of,
-        recorded_settings,
+        settings_in_file,
     )
     from rigidimeter.analysis.reading.formats.table import Table
 
@@ -31,7 +31,7 @@ __all__ = [
     "read_recording",
     "read_table",
     "reader_of",
-    "recorded_settings",
+    "settings_in_file",
 ]
 
 __getattr__ = lazy_names(
@@ -46,7 +46,7 @@ __getattr__ = lazy_names(
             "read_recording",
             "read_table",
             "reader_of",
-            "recorded_settings",
+            "settings_in_file",
         ),
         "table": ("Table",),
     },

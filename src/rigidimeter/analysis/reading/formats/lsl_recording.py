@@ -60,6 +60,9 @@ def epochs_of_samples(
     UserError
         If a column of a session is missing.
     """
+    size = max(map(len, columns.values()), default=0)
+    # What a stream had not always.
+    columns = {n: np.full(size, d) for n, d in Sample._field_defaults.items()} | {**columns}
     missing = [name for name in Sample._fields if name not in columns]
     if missing:
         raise UserError(f"{source}: its stream of samples has no channel {missing[0]}")

@@ -281,7 +281,7 @@ def read_recording(path: Path, options: ReadOptions) -> Epochs:
     return epochs_from_table(found, options) if isinstance(found, Table) else found
 
 
-def recorded_settings(path: Path) -> Settings | None:
+def settings_in_file(path: Path) -> Settings | None:
     """Return the settings with which a path was recorded; None where it does not say.
 
     Raises

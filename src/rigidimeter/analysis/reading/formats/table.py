@@ -145,7 +145,6 @@ _ALIASES: Mapping[str, tuple[str, ...]] = {
     "torque_nm": ("torque", "moment"),
     "angle_rad": ("angle", "position", "theta"),
     "velocity_rad_s": ("velocity", "speed", "omega"),
-    "emg_v": ("emg",),
 }
 
 

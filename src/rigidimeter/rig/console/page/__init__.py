@@ -33,12 +33,7 @@ from rigidimeter.rig.console.page.page_messages import (
     session_state,
 )
 from rigidimeter.rig.console.page.page_token import new_token, require_token, token_in
-from rigidimeter.rig.console.page.plan_form import (
-    EnteredPlan,
-    empty_plan_form,
-    read_plan_form,
-    wait_leaves,
-)
+from rigidimeter.rig.console.page.plan_form import empty_plan_form, read_plan_form
 from rigidimeter.rig.console.page.plan_view import PlanView
 from rigidimeter.rig.console.page.prediction import detected, dry_run_lines, prediction_lines
 from rigidimeter.rig.console.page.recorded_traces import amplitude_densities, as_json, epoch_panes

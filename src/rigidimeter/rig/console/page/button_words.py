@@ -12,6 +12,7 @@ _MAX_TEXTS = 3
 _BUTTONS = (
     (re.compile(r"`rigidimeter run --resume[^`]*`"), "“Run what is left” under After"),
     (re.compile(r"`rigidimeter recover[^`]*`"), "“Recover” under After"),
+    (re.compile(r"lead the arm [^;]*--lead-range[^;]*; on the page enter"), "enter"),
     (re.compile(r"order `save to FOLDER`"), "name another folder under “Save to another folder”"),
 )
 

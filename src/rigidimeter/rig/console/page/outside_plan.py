@@ -94,8 +94,8 @@ class OutsideView:
                 ui.label(str(error)).classes("problem")
                 return
             ui.label(
-                "It is recorded as not of the plan, without a wait; compare and report list it "
-                "among the sessions not as planned."
+                "It has no place in the plan and no wait, and is listed among the sessions that "
+                "were not as planned."
             )
             codes = plan.about.codes if plan is not None else {}
             self._form(codes)

@@ -11,11 +11,11 @@ from typing import Any
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings
-from rigidimeter.planning import DrawnPlan, PlanValues, WrongValue, draw_plan
+from rigidimeter.planning import DrawnPlan, PlanValues, draw_plan
 from rigidimeter.planning import plan_days_of as read_days_of
 from rigidimeter.planning import plan_names as read_names
 from rigidimeter.rig.console.page.form_values import parse_integer, parse_number, parse_numbers
-from rigidimeter.rig.console.page.session_form import YES, Field
+from rigidimeter.rig.console.page.session_form import YES, Field, placed
 
 WHO = (
     Field("subjects", "Subjects (codes)"),
@@ -47,6 +47,7 @@ EXAMPLES = {
     "rests_s": "as in the settings (10; 20: drawn)",
     "raters": "A,B",
     "given": "OFF,DBS",
+    "seed": "2023; drawn if blinded",
 }
 """What an empty field shows."""
 
@@ -80,11 +81,9 @@ class EnteredPlan:
 def empty_plan_form() -> dict[str, str]:
     """Return the form that `study plan` without options is."""
     usual = PlanValues(("",))
-    numbers = {key: f"{getattr(usual, key):g}" for key in (*_WHOLE, *_NUMBERS)}
-    return dict.fromkeys(
-        ("subjects", "stimulated", "days_of", "rests_s", "raters", "given"), ""
-    ) | {
-        **numbers,
+    numbers = {key: getattr(usual, key) for key in (*_WHOLE, *_NUMBERS)}
+    return dict.fromkeys(EXAMPLES, "") | {
+        **{key: f"{value:g}" for key, value in numbers.items() if value is not None},
         "conditions": ",".join(usual.conditions),
         "order": usual.order,
         "blinded": "",
@@ -104,14 +103,12 @@ def read_plan_form(form: Mapping[str, str], base: Settings) -> EnteredPlan:
     found: dict[str, Any] = {"order": form["order"], "blinded": form["blinded"] == YES}
     for key in (*_WHOLE, *_NUMBERS, *_NAMES, "days_of", "rests_s"):
         text = form[key].strip()
-        if not text and key in (*_NAMES, "days_of", "rests_s") and key not in _NEEDED:
+        if not text and key in EXAMPLES and key not in _NEEDED:
             continue
         try:
             found[key] = _read(key, text)
-        except WrongValue as error:
-            errors[key] = error.sentence
         except UserError as error:
-            errors[key] = str(error)
+            errors[key] = error.places.get(key, str(error))
     if form["order"] != "given":
         found.pop("given", None)
         errors.pop("given", None)
@@ -123,12 +120,10 @@ def read_plan_form(form: Mapping[str, str], base: Settings) -> EnteredPlan:
     try:
         values = PlanValues(**found)
         return EnteredPlan(draw_plan(values, base), {}, values)
-    except WrongValue as error:
-        key = "given" if error.key == "order" and form["order"] == "given" else error.key
-        return EnteredPlan(None, {key: error.sentence}, values)
     except UserError as error:
-        key = "rests_s" if "rests_s" in str(error) else ""
-        return EnteredPlan(None, {key: str(error)}, values)
+        at = {"order": "given"} if form["order"] == "given" else {}
+        at["protocol.rests_s"] = "rests_s"
+        return EnteredPlan(None, placed(error, {key: key for key in form} | at), values)
 
 
 def _read(key: str, text: str) -> Any:
@@ -141,25 +136,19 @@ def _read(key: str, text: str) -> Any:
     return (parse_integer if key in _WHOLE else parse_number)(text, _LABELS[key])
 
 
+_RETURNS = "Rigidity returns in 30 to 60 min"
+
+
 def wait_leaves(minutes: float) -> str:
     """Return what a wait after switching off leaves of the stimulation's effect.
 
     Examples
     --------
-    >>> wait_leaves(60.0)
-    'Rigidity returns in 30 to 60 min: OFF is without the effect of stimulation in most subjects.'
+    >>> wait_leaves(15.0)
+    'Some of the effect is left, as in the paper: the difference is measured too small.'
     """
     if minutes >= 60.0:
-        return (
-            "Rigidity returns in 30 to 60 min: OFF is without the effect of stimulation in most "
-            "subjects."
-        )
+        return f"{_RETURNS}: the effect of stimulation is gone in most subjects."
     if minutes >= 30.0:
-        return (
-            "Rigidity returns in 30 to 60 min: OFF may still be partly treated, and the difference "
-            "is then measured too small."
-        )
-    return (
-        "OFF is still partly treated, as in the paper after 15 min: the difference is measured too "
-        "small."
-    )
+        return f"{_RETURNS}: some of the effect may be left, and make the difference too small."
+    return "Some of the effect is left, as in the paper: the difference is measured too small."

@@ -26,7 +26,7 @@ from typing import Any
 
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings
-from rigidimeter.core.study_files import PLAN_TABLE
+from rigidimeter.core.study_files import PLAN_FILE
 from rigidimeter.rig.acquisition.processes import Flag, SessionMemory
 from rigidimeter.rig.console import SessionPlan
 
@@ -198,7 +198,7 @@ class Place:
     @property
     def planned(self) -> bool:
         """Whether its sessions are those of a plan."""
-        return not self.one_session and (self.root / PLAN_TABLE).exists()
+        return not self.one_session and (self.root / PLAN_FILE).exists()
 
     @property
     def protocols(self) -> Path:

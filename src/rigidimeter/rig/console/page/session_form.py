@@ -101,6 +101,8 @@ MAX_BLOCKS = 12
 LONGEST_VALUE = 400
 
 _OF_A_BLOCK = re.compile(r"(task|condition|epochs)\d+")
+_PLACES = {one.path: one.key for one in SETTINGS} | {"protocol.rests_s": "rests"}
+_BLOCK = re.compile(r"protocol\.blocks\[(\d+)\]\.(\w+)")
 
 
 @dataclass(frozen=True)
@@ -229,11 +231,11 @@ def read_form(form: Mapping[str, str], base: Settings) -> EnteredSession:
         if stimulation:
             about["stimulation"] = entered.model_dump(exclude_unset=True)
     except UserError as error:
-        errors |= _placed(str(error).removeprefix("stimulation: "), STIMULATION)
+        errors |= placed(error, {one.path: one.key for one in STIMULATION if one.path})
     try:
         settings = changed_settings(_with_subjects(base, blocks), changes, "form")
     except UserError as error:
-        errors |= _placed(str(error).removeprefix("form: "), SETTINGS)
+        errors |= placed(error, _PLACES)
     about["conditions"] = list(dict.fromkeys(block["condition"] for block in blocks))
     primary = PRIMARIES.get(form.get(PRIMARY, ""))
     return EnteredSession(None if errors else settings, about, about["subject"], errors, primary)
@@ -250,16 +252,14 @@ def _with_subjects(base: Settings, blocks: Sequence[Mapping[str, Any]]) -> Setti
     return changed_settings(base, {"subject": more}, "form") if more else base
 
 
-def _placed(text: str, fields: Sequence[Field]) -> dict[str, str]:
-    """Return each sentence under the field whose place it names."""
+def placed(error: UserError, fields: Mapping[str, str]) -> dict[str, str]:
+    """Return each sentence under the field that `fields` has for its place; others under none."""
     found: dict[str, list[str]] = {}
-    places = {one.path: one.key for one in fields if one.path} | {"rests_s": "rests"}
-    key = ""
-    for part in text.split("; "):
-        # A part that names no place belongs to the sentence before it.
-        key = next((places[path] for path in places if path in part), key)
-        found.setdefault(key, []).append(part)
-    return {key: "; ".join(parts) for key, parts in found.items()}
+    for place, sentence in (error.places or {"": str(error)}).items():
+        block = _BLOCK.match(place)
+        known = next((key for path, key in fields.items() if place.startswith(path)), "")
+        found.setdefault(f"{block[2]}{block[1]}" if block else known, []).append(sentence)
+    return {key: "; ".join(sentences) for key, sentences in found.items()}
 
 
 def read_range(

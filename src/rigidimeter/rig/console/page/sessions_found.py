@@ -199,6 +199,8 @@ def _asked(reason: str, by: str) -> tuple[str, str]:
 
 
 def _session(root: Path, folder: Path, excluded: dict[tuple[str, str], str]) -> FoundSession:
+    if not (folder / EVENTS).is_file():
+        raise UserError(f"has no {EVENTS}; put back a copy of it")
     one = scan_session(root, folder)
     manifest, about = one.manifest, one.about
     end: Mapping[str, Any] = next(iter(one.of("session_ended")), {})

@@ -61,6 +61,17 @@ def test_the_epochs_are_those_of_the_folder(session: Path, received) -> None:
     assert settings_of_samples(received["described"], "there") == read(session).settings
 
 
+def test_a_stream_from_before_there_were_all_columns_is_read(session: Path, received) -> None:
+    for name in ("cause", "drive_torque_nm", "drive_torque_time_s", "reported_cause"):
+        del received["columns"][name]
+    epochs, notices = epochs_of_samples("there", **received)
+    assert notices == []
+    assert_same_epochs(epochs, read(session).epochs)
+    del received["columns"]["torque_nm"]
+    with pytest.raises(UserError, match="has no channel torque_nm"):
+        epochs_of_samples("there", **received)
+
+
 def test_samples_that_were_not_received_are_counted(session: Path, received) -> None:
     columns = {
         name: np.delete(values, slice(100, 150)) for name, values in received["columns"].items()

@@ -31,3 +31,12 @@ def test_unfinished_sessions_are_named_the_newest_first():
         "c: 0 of 2 epochs are good, “Run what is left” under After."
     )
     assert unfinished_words([left] * 5).endswith("2 more are unfinished.")
+
+
+def test_the_range_is_entered_in_the_form():
+    said = (
+        "rig.toml: is hardware, so the range of motion of this person is needed: lead the arm "
+        "through it with --lead-range, or give it on the drive's scale with --range-deg LOW HIGH; "
+        "on the page enter it in the form"
+    )
+    assert in_buttons(said).endswith("is needed: enter it in the form")

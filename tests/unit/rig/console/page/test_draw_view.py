@@ -149,12 +149,12 @@ def test_the_plan_is_shown_before_it_is_written_and_taken_back_by_a_change(clien
 
 def test_what_the_wait_leaves_is_said_for_named_and_other_waits(client, tmp_path):
     shown = Form(client, tmp_path)
-    assert "without the effect of stimulation" in shown.named("leaves").text
+    assert "the effect of stimulation is gone" in shown.named("leaves").text
     shown.named("named-wait").value = "15"
     assert shown.field("wait_after_off").value == "15"
     assert "as in the paper" in shown.named("leaves").text
     shown.enter(wait_after_off="45")
-    assert "may still be partly treated" in shown.named("leaves").text
+    assert "some of the effect may be left" in shown.named("leaves").text
     assert shown.named("named-wait").value is None
 
 

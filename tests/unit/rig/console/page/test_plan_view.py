@@ -257,6 +257,14 @@ def test_a_session_outside_of_a_blinded_plan_takes_its_codes(client, study):
     assert not any(name in (folder / "draft.json").read_text() for name in NAMES)
 
 
+def test_a_plan_that_was_not_written_to_its_end_is_none_and_can_be_drawn_again(study):
+    folder = study()
+    (folder / "plan.toml").unlink()  # it is written last
+    assert not Place(folder, Settings(), "").planned
+    study()
+    assert Place(folder, Settings(), "").planned
+
+
 def test_a_damaged_plan_is_an_error_on_the_page(client, study):
     folder = study()
     table = folder / "plan.csv"

@@ -154,3 +154,13 @@ def test_a_range_of_motion_is_never_kept(form):
     kept = restored_form(form | RANGE, BASE)
     assert [kept[key] for key in RANGE] == ["", "", ""]
     assert kept["subject"] == "S01"
+
+
+def test_what_is_wrong_stands_at_the_field_that_is_wrong_whatever_the_sentence_names_beside_it(
+    form,
+):
+    """The amplitude is compared with a limit that has a field, too."""
+    errors = read_form(form | {"sin_amplitude": "20", "position_limit": "15"}, BASE).errors
+    assert errors.keys() == {"sin_amplitude"}
+    errors = read_form(form | {"epochs1": "9999"}, BASE).errors
+    assert errors.keys() == {"epochs1"}

@@ -219,3 +219,9 @@ def test_what_is_left_is_what_no_session_goes_on_with(tmp_path):
     session("c", planned[2:], 1, folder="a", session_id=first)
     left = {one.name: one.left for one in found_sessions(tmp_path)[0]}
     assert left == {"a": (), "b": (), "c": (4,)}
+
+
+def test_a_session_without_its_events_is_named_with_what_to_do(root):
+    (root / "S01-1" / "events.jsonl").unlink()
+    found, problems = found_sessions(root)
+    assert (found, problems) == ([], ["S01-1: has no events.jsonl; put back a copy of it"])
