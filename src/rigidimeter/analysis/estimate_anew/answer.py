@@ -318,7 +318,7 @@ def with_phases(case: Case, state: State) -> Case:
         phase, at = np.unwrap(np.angle(np.fft.ifft(spectrum)[:n])), np.arange(n)
         steady = np.polyval(np.polyfit(at, phase, 1, w=w), at)
         even = np.sqrt((phase - steady) ** 2 @ w / w.sum()) < STEADY
-        found.append(own._replace(phase=steady if even else phase))
+        found.append(own._replace(phase=np.asarray(steady if even else phase, float)))
     return case._replace(measured=found)
 
 
@@ -500,7 +500,7 @@ def _tested(case: Case, state: State, terms: Sequence[Term]) -> _Tested:
 
 def _scores(model: Model, tested: dict[str, list[Place]]) -> tuple[by.Fitted, dict[str, Score]]:
     fit = by.fitted(model.parts, model.base, [p for own in tested.values() for p in own])
-    blocks = fit.blocks()
+    blocks = fit.blocks() if tested else []
     return fit, {name: fit.score(blocks, own) for name, own in tested.items()}
 
 
@@ -678,15 +678,15 @@ def _answered(
             mean[one.term.parameter, own] = 1 / len(case.observations)
     joint, of_joint = mean @ fit.values, mean @ covariance @ mean.T
     half = half_of_all[:3] * np.sqrt(np.diag(of_joint) / np.diag(covariance)[:3])
-    lines = {name: model.tested[name] for name in (of.ANY_LINEAR.name,) if case.caused}
+    linear, name = tested.scores[of.ANY_LINEAR.name], of.ANY_LINEAR.name
+    lines = {name: model.tested[name]} if case.caused and linear.p < REMAINS else {}
     others = [*_other_drives(case, state, model, lines)]
     moved = [np.abs(one.values - fit.values)[:3] for one, _ in others]
     half = half + np.max([np.zeros(3), *moved], axis=0)
     remains, left, change = np.nan, 0.0, np.zeros(3)
     if case.caused:
-        linear = tested.scores[of.ANY_LINEAR.name]
         # What another drive explains is not of the joint.
-        remains = max(linear.p, *(p for _, one in others for p in one.values()))
+        remains = max([linear.p, *(p for _, one in others for p in one.values())])
         plain = linear if remains >= REMAINS else nameless
         left = float(np.sqrt(2 * np.mean(plain.values**2)))
         change = _otherwise(model, fit.values, lambda w: w[0] / w)
@@ -728,14 +728,21 @@ def _other_drives(
     case: Case, state: State, model: Model, tested: dict[str, list[Place]]
 ) -> Iterator[tuple[by.Fitted, dict[str, float]]]:
     """Return what is fitted, and p of what is tested, with each drive that may be the one."""
+    looked = [place for own in tested.values() for place in own]
+    rows = sorted({c for c, _ in (*model.base, *looked)} | {0, 1, 2})
+    at = {c: i for i, c in enumerate(rows)}
+    base = [(at[c], e) for c, e in model.base]
+    tested = {name: [(at[c], e) for c, e in own] for name, own in tested.items()}
+    made = {id(one.instruments): one.instruments[rows] for one in model.parts}
     for k in range(1, max(len(one.changes) for one in case.observations)):
         parts = []
         for one, part, power in zip(case.observations, model.parts, state.powers, strict=True):
-            columns = part.columns.copy()
+            columns = part.columns[rows]
             if k < len(one.changes):
                 columns[:3] += one.changes[k].T / np.sqrt(power)
-            parts.append(part._replace(columns=columns))
-        fit, scores = _scores(model._replace(parts=parts), tested)
+            looked_at = made[id(part.instruments)]
+            parts.append(part._replace(columns=columns, instruments=looked_at))
+        fit, scores = _scores(model._replace(parts=parts, base=base), tested)
         yield fit, {name: one.p for name, one in scores.items()}
 
 

@@ -17,6 +17,7 @@ and Kearney 2000.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -217,11 +218,12 @@ def over_phase(phase: Array, harmonics: int = HARMONICS) -> Array:
 
 
 def _in_time(first: int, last: int) -> Callable[[Motion], Array]:
-    def factors(motion: Motion) -> Array:
-        count = motion.velocity.size
-        return over_time((2 * np.arange(count) + 1) / count - 1, first, last)
+    return lambda motion: _over_samples(motion.velocity.size, first, last)
 
-    return factors
+
+@lru_cache(maxsize=16)
+def _over_samples(count: int, first: int, last: int) -> Array:
+    return over_time((2 * np.arange(count) + 1) / count - 1, first, last)
 
 
 def _movement(motion: Motion, inner: Array) -> Complex:
@@ -390,7 +392,7 @@ TERMS: tuple[Term, ...] = (
     ),
     Term(
         "stiffness by angle", "N·m/rad²", "stiffness that goes with the angle",
-        _of(lambda v, x: x**2, lambda v, x: x**3), finding="varying_with_angle",
+        _of(lambda v, x: x * x, lambda v, x: x * x * x), finding="varying_with_angle",
         asked="quadratic,cubic",
     ),
     _reflex_of("reflex+", "reflex+", lambda v: np.maximum(v, 0)),
