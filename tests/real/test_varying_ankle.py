@@ -26,16 +26,17 @@ def varying(epochs):
 
 
 def moved(epoch, share):
-    """Return the epoch on a movement of 8 deg and 0.5 Hz, K going up and down by a share with it.
+    """Return the epoch on a movement of 2.5 deg and 0.5 Hz, K going up and down by a share with it.
 
-    The torque of the movement itself is not in phase with it.
+    K is highest half-way down, so that the angle does not tell it; nor is the torque of the movement
+    itself in phase with it.
     """
     angle, torque = (epoch.channels[name] for name in ("angle_rad", "torque_nm"))
     phase = 2 * np.pi * 0.5 * (angle.time_s - angle.time_s[0])
     about = angle.values - np.mean(angle.values)
-    more = share * 60.0 * np.cos(phase) * about + 2.0 * np.cos(phase - 1.0)
+    more = share * 60.0 * np.sin(phase) * about + 2.0 * np.cos(phase - 1.0)
     channels = {
-        "angle_rad": angle.values + np.radians(8.0) * np.cos(phase),
+        "angle_rad": angle.values + np.radians(2.5) * np.cos(phase),
         "torque_nm": torque.values + more,
     }
     channels = {name: Channel(name, angle.time_s, v) for name, v in channels.items()}
