@@ -28,7 +28,7 @@ def varying(epochs):
 def moved(epoch, share):
     """Return the epoch on a movement of 2.5 deg and 0.5 Hz, K going up and down by a share with it.
 
-    K is highest half-way down, so that the angle does not tell it; nor is the torque of the movement
+    K is highest half-way, so that the angle does not tell it; nor is the torque of the movement
     itself in phase with it.
     """
     angle, torque = (epoch.channels[name] for name in ("angle_rad", "torque_nm"))

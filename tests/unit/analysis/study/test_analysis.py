@@ -5,14 +5,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rigidimeter.analysis.estimate_anew import task_of
 from rigidimeter.analysis.reading import Recording
-from rigidimeter.analysis.study import (
-    compare,
-    compare_analysis,
-    conditions,
-    estimate,
-    task_of,
-)
+from rigidimeter.analysis.study import compare, compare_analysis, conditions, estimate
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import Analysis, Channel, Epoch, Fit, Outcome, Score
 from rigidimeter.core.settings import Settings, parse_settings
