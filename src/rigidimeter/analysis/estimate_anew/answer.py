@@ -31,6 +31,7 @@ from rigidimeter.analysis.estimate_anew import score as by
 from rigidimeter.analysis.estimate_anew import terms as of
 from rigidimeter.analysis.estimate_anew.checks import found as said
 from rigidimeter.analysis.estimate_anew.grid import SAME_TIME, Array, Complex
+from rigidimeter.analysis.estimate_anew.methods import DEPENDS
 from rigidimeter.analysis.estimate_anew.observation import Observation, torque_filter_of
 from rigidimeter.analysis.estimate_anew.score import EVERY, Part, Place, Score, real
 from rigidimeter.analysis.estimate_anew.signals import values_at, velocity_at
@@ -250,7 +251,8 @@ def answer(
         if not case.caused and any(not one.linear for one in sure):
             sure = [one for one in sure if not one.linear]
         named = {one.name: tested.model.tested[one.name] for one in sure}
-        for _, other in _other_drives(case, state, tested.model, named) if sure else ():
+        others = [*_other_drives(case, state, tested.model, named)][1:] if sure else []
+        for _, other in others:
             sure = [one for one in sure if len(names) * other[one.name] < chance]
         gains = _gains(case, state, tested, sure)
         strongest = strongest or max((gain for gain, _ in gains.values()), default=0.0)
@@ -681,12 +683,14 @@ def _answered(
     linear, name = tested.scores[of.ANY_LINEAR.name], of.ANY_LINEAR.name
     lines = {name: model.tested[name]} if case.caused and linear.p < REMAINS else {}
     others = [*_other_drives(case, state, model, lines)]
-    moved = [np.abs(one.values - fit.values)[:3] for one, _ in others]
-    half = half + np.max([np.zeros(3), *moved], axis=0)
+    without, *moved = [np.abs(one.values - fit.values)[:3] for one, _ in others] or [np.zeros(3)]
+    most = np.max([np.zeros(3), *moved], axis=0)
+    depends = most > DEPENDS * np.abs(joint)
+    half = half + np.where(depends, np.maximum(most, 2 * without), most)
     remains, left, change = np.nan, 0.0, np.zeros(3)
     if case.caused:
         # What another drive explains is not of the joint.
-        remains = max([linear.p, *(p for _, one in others for p in one.values())])
+        remains = max([linear.p, *(p for _, one in others[1:] for p in one.values())])
         plain = linear if remains >= REMAINS else nameless
         left = float(np.sqrt(2 * np.mean(plain.values**2)))
         change = _otherwise(model, fit.values, lambda w: w[0] / w)
@@ -727,14 +731,14 @@ def _linear(term: Term) -> bool:
 def _other_drives(
     case: Case, state: State, model: Model, tested: dict[str, list[Place]]
 ) -> Iterator[tuple[by.Fitted, dict[str, float]]]:
-    """Return what is fitted, and p of what is tested, with each drive that may be the one."""
+    """Return what is fitted, and p of what is tested: without a drive, then with others."""
     looked = [place for own in tested.values() for place in own]
     rows = sorted({c for c, _ in (*model.base, *looked)} | {0, 1, 2})
     at = {c: i for i, c in enumerate(rows)}
     base = [(at[c], e) for c, e in model.base]
     tested = {name: [(at[c], e) for c, e in own] for name, own in tested.items()}
     made = {id(one.instruments): one.instruments[rows] for one in model.parts}
-    for k in range(1, max(len(one.changes) for one in case.observations)):
+    for k in range(max(len(one.changes) for one in case.observations)):
         parts = []
         for one, part, power in zip(case.observations, model.parts, state.powers, strict=True):
             columns = part.columns[rows]
