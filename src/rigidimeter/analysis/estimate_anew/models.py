@@ -445,7 +445,7 @@ def _measured(one: Observation, lines: Complex) -> Motion:
     return Motion(one.grid, one.coarse[0], angle, lines, lines, np.ones(3), through)
 
 
-def _motions(seen: Sequence[Observation], joint: Array) -> Motions:
+def _motions(seen: Seen, joint: Array) -> Motions:
     """Return the motion that is the instrument, and the measured one, of each."""
     if seen[0].cause is None:
         both = zip(seen, direct(seen, joint), strict=True)
@@ -530,7 +530,7 @@ class _Model(NamedTuple):
 # --- One model
 
 
-def fit_model(observations: Sequence[Observation], names: str | Sequence[str]) -> ModelRow:
+def fit_model(observations: Seen, names: str | Sequence[str]) -> ModelRow:
     """Fit one model to epochs; one that cannot be fitted says why.
 
     Parameters
@@ -575,7 +575,7 @@ def fit_model(observations: Sequence[Observation], names: str | Sequence[str]) -
     return replace(better, fit=fit)
 
 
-def _fitted(seen: Sequence[Observation], names: tuple[str, ...]) -> ModelRow:
+def _fitted(seen: Seen, names: tuple[str, ...]) -> ModelRow:
     """Fit one model whose terms are decided; ValueError says why not."""
     known, joint = _known(), start_of(seen)
     terms = tuple(sorted((known[name] for name in names), key=lambda one: one.asked not in JOINT))
@@ -668,7 +668,7 @@ def _real(lines: Sequence[Complex]) -> Array:
     return np.concatenate([whole.real, whole.imag])
 
 
-def _settled(model: _Model, seen: Sequence[Observation], begin: Array) -> tuple[_Model, Solution]:
+def _settled(model: _Model, seen: Seen, begin: Array) -> tuple[_Model, Solution]:
     """Return the model at its solution; inner parameters that the data do not tell are held."""
     free = model.limit(model.inner, NEAR_BOUND) == model.inner
     while True:
@@ -826,13 +826,13 @@ def _inverse(gram: Array) -> Array:
 # --- Models compared
 
 
-def fit_models(observations: Sequence[Observation], models: Sequence[Sequence[str]]) -> Comparison:
+def fit_models(observations: Seen, models: Sequence[Sequence[str]]) -> Comparison:
     """Fit each model to all of the data; none is recommended."""
     return Comparison(tuple(fit_model(observations, one) for one in models), None, "")
 
 
 def compare_models(
-    observations: Sequence[Observation],
+    observations: Seen,
     models: Sequence[Sequence[str]],
     *,
     grow: bool = False,
@@ -880,26 +880,23 @@ def refusal(fit: Fit) -> str:
 
 
 def better_clock(
-    aligned: Sequence[Observation],
-    recorded: Sequence[Observation],
-    models: Sequence[Sequence[str]],
-) -> tuple[Sequence[Observation], str]:
+    aligned: Seen, recorded: Seen, delay_s: float, models: Sequence[Sequence[str]]
+) -> tuple[Seen, str]:
     """Return epochs on the clock on which the best of the models leaves less, and a remark.
 
     The delay of the torque is found with J, B and K alone, to which friction and a reflex look like
     one.
     """
-    rows = [[fit_model(seen, one).fit for one in models] for seen in (aligned, recorded)]
+    every = [[fit_model(seen, one).fit for one in models] for seen in (aligned, recorded)]
     moved, plain = (
-        min((fit.misfit / fit.independent_samples for fit in one if fit), default=np.inf)
-        for one in rows
+        min((fit.misfit / fit.independent_samples for fit in fits if fit), default=np.inf)
+        for fits in every
     )
     if not plain < moved:
         return aligned, ""
-    first_s, moved_s = (one[0].epoch.channels["torque_nm"].time_s[0] for one in (recorded, aligned))
     return recorded, (
-        f"torque as recorded: J, B and K alone would have it {1e3 * (first_s - moved_s):.2g} ms "
-        f"late, but moved so these terms leave {np.exp(moved - plain):.2g} times as much of it"
+        f"torque as recorded: J, B and K alone would have it {1e3 * delay_s:.2g} ms late, but "
+        f"moved so these terms leave {np.exp(moved - plain):.2g} times as much of it"
     )
 
 

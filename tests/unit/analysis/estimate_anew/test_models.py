@@ -1,7 +1,5 @@
 """Named terms: closed forms, names, and which model is recommended."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy import signal
@@ -10,6 +8,7 @@ from tests.scenarios.scenario import scenario
 from rigidimeter.analysis.estimate_anew.drive import find_drive
 from rigidimeter.analysis.estimate_anew.models import (
     ASKED,
+    better_clock,
     candidates,
     compare_models,
     fit_model,
@@ -232,7 +231,16 @@ def test_torque_of_the_subject_biases_no_term_where_the_perturbation_was_recorde
     assert fit.test.input_p > 0.01
 
 
+def test_friction_is_fitted_to_the_torque_as_recorded_and_a_late_torque_is_moved():
+    seen, models = noisy(of_joint(**TRUTH, coulomb=0.05)), [f"{JBK},coulomb".split(",")]
+    moved = [one.late(0.004) for one in seen]
+    chosen, remark = better_clock(moved, seen, 0.004, models)
+    assert chosen is seen
+    assert "torque as recorded: J, B and K alone would have it 4 ms late" in remark
+    assert better_clock(seen, moved, 0.004, models) == (seen, "")
+
+
 def test_what_a_check_forbids_is_not_recommended():
     compared = compare_models(noisy(of_joint(**TRUTH)), [JBK.split(",")], refused="it is excluded")
     assert compared[1:] == (None, "it is excluded")
-    assert replace(compared.rows[0]).name == "inertia+damping+stiffness"
+    assert compared.rows[0].name == "inertia+damping+stiffness"
