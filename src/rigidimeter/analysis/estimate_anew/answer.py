@@ -785,8 +785,13 @@ def beside(found: Answer) -> list[Problem]:
     return problems
 
 
-def findings_of(found: Answer, solution: Solution, settings: Settings) -> tuple[Finding, ...]:
+def findings_of(
+    found: Answer, solution: Solution, settings: Settings, *, stands: bool
+) -> tuple[Finding, ...]:
     """Return the findings of an answer, one for each kind.
+
+    What was answered is a note where J, B and K beside it stand in the fit, and nothing that is
+    linear remains. Where something does, a fit is withheld.
 
     Parameters
     ----------
@@ -794,25 +799,32 @@ def findings_of(found: Answer, solution: Solution, settings: Settings) -> tuple[
     solution : Solution
         J, B and K without terms.
     settings : Settings
+    stands : bool
+        Whether the fits give J, B and K beside the terms.
     """
     limits, told = settings.diagnostics, []
-    stands: Fact = "beside" if found.answered else "withheld"
+    tested = bool(np.isfinite(found.remains))
     for kind in dict.fromkeys(one.term.finding for one in found.found):
         own = [one for one in found.found if one.term.finding == kind]
         if kind == "varying_between_epochs":
             continue  # told with the fits of single epochs
         added = np.sum([one.effect for one in own], axis=0)
         value, limit, facts, variant = _told(kind, own, added, found, limits)
+        how = "" if not stands else "answered" if tested else "beside"
+        if not found.answered:
+            how = "withheld"
         told.append(
             said(
-                kind, limits, value, limit, p=max(one.p for one in own), variant=variant,
+                kind, limits, value, limit, p=max(one.p for one in own),
+                variant=f"{variant} {how}".strip() if how in ("beside", "withheld") else variant,
                 effect=Effect.of(added, found.joint + added, found.half),
-                facts={**facts, "remains": found.remains, "stands": stands},
-                harmless="answered" if found.answered else "",
+                facts={**facts, "remains": found.remains},
+                harmless=how if how == "answered" else "",
+                excludes=how == "withheld",
             )
         )  # fmt: skip
-    if not found.answered:
-        percent, most = 100 * found.left, limits.max_lack_of_fit_percent
+    percent, most = 100 * found.left, limits.max_lack_of_fit_percent
+    if found.remains < REMAINS and percent > most and (found.answered or not found.found):
         low_hz, high_hz = found.case.measured[0].grid.band_hz
         change = (100 * found.change / found.joint).tolist()
         facts = {f"half_{symbol}": one for symbol, one in zip("JBK", change, strict=True)}

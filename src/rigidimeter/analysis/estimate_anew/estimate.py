@@ -631,9 +631,14 @@ def _checked(
     serious = [one for one in findings if one.level == "exclude"]
     outcome = fit.outcome
     if serious and outcome.included:
-        words = serious[0].words
-        outcome = Outcome("excluded", f"{words.headline}. {words.remedy}".rstrip(". "))
+        outcome = _excluded(serious[0])
     return in_half_intervals(replace(fit, outcome=outcome, findings=(*fit.findings, *findings)))
+
+
+def _excluded(finding: Finding) -> Outcome:
+    """Return the outcome of an epoch that a finding excludes."""
+    words = finding.words
+    return Outcome("excluded", f"{words.headline}. {words.remedy}".rstrip(". "))
 
 
 def _findings(
@@ -796,7 +801,9 @@ def _together(
             bands += band_estimates(seen, one.values, pool if method.uses_perturbation else None)
         found_in[one.condition] = [
             replace(finding, condition=one.condition, epochs=one.labels)
-            for finding in findings_of(one.answer, one.solution, seen[0].settings)
+            for finding in findings_of(
+                one.answer, one.solution, seen[0].settings, stands=bool(one.problems)
+            )
         ]
 
     def with_shared(fit: Fit, more: Sequence[Finding], settings: Settings) -> Fit:
@@ -808,7 +815,12 @@ def _together(
                 replace(finding, condition=fit.condition, epochs=labels)
                 for finding in band_finding(fit, own, settings.diagnostics)
             ]
-        return in_half_intervals(replace(fit, findings=(*fit.findings, *shared, *more)))
+        outcome = fit.outcome
+        serious = [finding for finding in shared if finding.level == "exclude"]
+        if serious and outcome.included:
+            outcome = _excluded(serious[0])
+        found = (*fit.findings, *shared, *more)
+        return in_half_intervals(replace(fit, outcome=outcome, findings=found))
 
     alone = []
     for ready, fit, pull in zip(epochs, fits, pulls, strict=True):
@@ -823,6 +835,8 @@ def _together(
     together = []
     for pool in pooled:
         own = [f for f in alone if f.outcome.included and pool.condition in ("", f.condition)]
+        if len(own) < sum(f.outcome.included and pool.condition in ("", f.condition) for f in fits):
+            continue  # withheld
         settings = epochs[0].settings
         biases = [
             pull.bias
