@@ -71,7 +71,6 @@ class TestEndOfEstimation:
     def test_code_lines(self, now: dict[str, dict[str, int]]) -> None:
         assert now["rooms"]["analysis.estimation"] <= 4300 + 487
 
-    @pytest.mark.xfail(strict=True, reason="the room is not rebuilt")
     def test_code_lines_of_findings(self, now: dict[str, dict[str, int]]) -> None:
         assert now["rooms"]["core.findings"] <= 1050 + 179
 

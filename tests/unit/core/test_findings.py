@@ -45,7 +45,7 @@ def test_words_are_few_and_complete(words):
     assert words.remedy.endswith(".") or not words.remedy
     assert not re.search(r"[.!?] [A-Z]", words.remedy)  # one sentence
     for text in words:
-        assert not re.search(r"[{}]|\bnan\b|\binf\b|  ", text), text
+        assert not re.search(r"[{}]|<\w|\bnan\b|\binf\b|  ", text), text
 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
@@ -78,10 +78,46 @@ def test_a_value_beside_its_limit_has_the_digits_that_tell_them_apart():
 
 def test_the_last_variant_that_has_a_part_gives_it():
     kind = KINDS["missing_term"]
-    assert kind.template("headline", "coupling within") == kind.variants["coupling"]["headline"]
-    assert kind.template("meaning", "coupling within") == kind.variants["within"]["meaning"]
+    assert kind.template("measured", "coupling answered") == kind.variants["coupling"]["measured"]
+    assert kind.template("meaning", "coupling answered") == kind.variants["answered"]["meaning"]
     assert kind.template("remedy", "several") == kind.variants["several"]["remedy"]
+    assert kind.template("remedy", "several answered") == ""
     assert kind.template("remedy", "negligible") == ""
+
+
+TERMS = {
+    "one": {"terms": "friction", "sizes": "friction of 0.1 ± 0.0002 N·m"},
+    "several": {
+        "terms": "directional damping, directional stiffness and a soft coupling",
+        "sizes": "directional damping of 0.1 ± 0.02 N·m·s/rad, directional stiffness of 0.2 ± 0.02 "
+        "N·m/rad and a soft coupling of 0.01 ± 0.001 rad/(N·m)",
+    },
+}
+
+
+@pytest.mark.parametrize("count", TERMS)
+@pytest.mark.parametrize(
+    ("variant", "headline", "details"),
+    [
+        (
+            "answered",
+            "J, B and K are those beside {terms}",
+            "J, B and K are those beside that; without it they would be J +16 %, B 0 %, K −1 %.",
+        ),
+        ("beside", "The torque holds {terms}, and perhaps more", "linear remains cannot be tested"),
+        ("withheld", "No estimate: the torque holds more than {terms}", "too (p = 2.0·10⁻⁵), J, B"),
+    ],
+)
+def test_a_term_is_told_with_what_it_leaves(count, variant, headline, details):
+    facts = {**TERMS[count], "asked": "coulomb", "remains": 2e-5, "variant": f"{count} {variant}"}
+    effect = Effect((16.0, 0.0, -1.0))
+    told = Finding("missing_term", "note", 900.0, 100.0, p=1e-12, effect=effect, facts=facts)
+    assert told.headline == headline.format_map(facts)
+    assert told.details.startswith(f"The torque holds {facts['sizes']} (p < 10⁻⁶). ")
+    assert details in told.details
+    assert len(told.headline.split()) <= 15
+    assert len(told.details.split()) <= 60
+    assert told.harmless == (variant == "answered")
 
 
 def test_each_variant_says_when_it_is_used():

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, cast
+
+from rigidimeter.core.findings.shared import SHARED
 
 Level = Literal["note", "caution", "exclude"]
 
@@ -23,14 +27,14 @@ EXAMPLE: Mapping[str, object] = {
     **{"little": 2.0, "seen": 96.0, "late_ms": 48.0, "factor": 3.0, "p": 4e-5},
     **{"terms": "friction", "sizes": "friction of 0.1 ± 0.004 N·m"},
     **{"asked": "inertia,damping,stiffness,coulomb", "shown_inertia": 0.0458},
-    **{"shown_damping": 1.6, "sd_nm": 0.21, "above_nm": 0.1, "first_s": 3.0, "baseline_uv": 12.0},
+    **{"shown_damping": 1.6, "sd_nm": 0.21, "above_nm": 0.1, "first_s": 3.0},
     **{"frequency_hz": 4.6, "amplitude_nm": 0.3, "stands_out": 12.0, "sd": 0.21},
     **{"low": 1.34, "low_half": 0.1, "high": 2.05, "high_half": 0.12, "others": ""},
     **{"low_at": "epoch 2", "high_at": "epoch 5", "trend": ", rising by 40 % over the epochs"},
     **{"reference": "OFF", "other": "DBS", "earlier": "OFF", "later": "DBS", "where": "DBS"},
     **{"cause": "tremor", "counts": "0 of 6 epochs in OFF, 5 of 6 in DBS", "without": "p = 0.31"},
     **{"first": "J", "second": "K", "high_j": 5.9e-3, "low_j": 4.5e-3, "who": "examiners A and B"},
-    **{"df": 1.0, "tests": "5 tests", "units": "days", "of": " for 2 measures"},
+    **{"tests": "5 tests", "of": " for 2 measures", "half_ms": 0.05, "remains": 3e-9},
     **{"which": "the recording", "condition": "DBS", "reason": "there is no such file"},
     **{"remark": "there is one day in each condition"},
 }
@@ -93,3 +97,44 @@ class Kind:
                 return self.variants[name][part]
         text: str = getattr(self, part)
         return text
+
+
+def kinds_of(text: str) -> tuple[Kind, ...]:
+    """Return the kinds of a text.
+
+    A kind begins with ``== name | level | unit | setting`` and has ``checks:``, the four `PARTS`
+    and ``example:`` (JSON); a variant begins with ``-- name`` and has the parts that differ.
+    ``<name>`` is one of the `SHARED` words.
+    """
+    for name, words in SHARED.items():
+        text = text.replace(f"<{name}>", words)
+    kinds = []
+    for block in text.split("\n== ")[1:]:
+        (row, own), *variants = map(_section, block.split("\n-- "))
+        name, level, unit, setting = (cell.strip() for cell in row.split("|"))
+        examples = {one: json.loads(parts.pop("example", "{}")) for one, parts in variants}
+        example = json.loads(own.pop("example", "{}"))
+        kinds.append(
+            Kind(
+                name,
+                own["checks"],
+                own["headline"],
+                own["measured"],
+                own["meaning"],
+                own["remedy"],
+                unit=unit,
+                level=cast(Level, level),
+                setting=setting,
+                variants=dict(variants),
+                example=example,
+                examples=examples,
+            )
+        )
+    return tuple(kinds)
+
+
+def _section(text: str) -> tuple[str, dict[str, str]]:
+    """Return the first line of a section and its parts, each as one line."""
+    head, *rest = re.split(rf"\n(checks|{'|'.join(PARTS)}|example):", text)
+    names, words = rest[::2], (" ".join(one.split()) for one in rest[1::2])
+    return head.strip(), dict(zip(names, words, strict=True))

@@ -17,7 +17,6 @@ WHEN: Mapping[str, str] = {
     "in_interval": "When the intervals include the bias",
     "first_order": "When the intervals include the bias to the first order only",
     "negligible": "When the effect is negligible",
-    "within": "When the effect is less than half the intervals",
     "unknown": "When the bias cannot be computed",
     "not_known": "When the controller is not known",
     "at_rest": "When the joint did not move",
@@ -25,14 +24,14 @@ WHEN: Mapping[str, str] = {
     "too_much": "When more was active than may be left out",
     "noise": "When not all of the intervals lie below zero",
     "reaction": "When all of the intervals lie below zero",
-    "with_term": "When a missing term was found as well",
     "of_settings": "When the drive is that of the settings",
     "unknown_drive": "When the drive is not known",
     "friction": "When the drive may have friction",
-    "of_drive": "When it may be friction of the drive",
     "as_sampled": "When the torque is used as it was sampled",
     "several": "When several terms are missing",
-    "reflex": "When the term is a reflex",
+    "answered": "When J, B and K are those beside it",
+    "beside": "When they are, without a recorded perturbation",
+    "withheld": "When something else follows the perturbation as well",
     "coupling": "When the coupling is compliant",
     "shown": "When the recording shows the controller",
     "per_degree": "When the settings seem to be per degree",
@@ -109,8 +108,9 @@ def _shown(facts: Mapping[str, Any]) -> dict[str, Any]:
         shown[name] = Shown(fact) if isinstance(fact, float) else fact
     if isinstance(shown.get("value"), Shown):
         shown["value"].limit = float(facts.get("limit", math.nan))
-    if math.isfinite(facts.get("p", math.nan)):
-        shown["p"] = p_text(facts["p"])
+    for name in ("p", "remains"):
+        if math.isfinite(facts.get(name, math.nan)):
+            shown[name] = p_text(facts[name])
     if "percent_of" in facts:
         shown["changes"] = ", ".join(
             f"{symbol} {_change(percent)} %"
