@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from rigidimeter.analysis.estimate_anew import (
     epoch_signals,
-    fit_epochs,
+    estimate,
     fit_inertia_damping_stiffness,
 )
 from rigidimeter.core.records import Fit
@@ -103,7 +103,7 @@ def _noise_runs(context: Context) -> NoiseRuns:
     batch = simulate_epochs(settings, runs, joints=[printed.SEC_34] * runs, conditions="OFF")
     epochs = [batch.epoch(i) for i in range(runs)]
     errors, as_printed = (
-        np.array([_fitted(fit) for fit in fit_epochs(epochs, method, settings)[0]]) - TRUTH
+        np.array([_fitted(fit) for fit in estimate(epochs, settings, method).fits]) - TRUTH
         for method in ("iv", "published")
     )
     perturbation = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
@@ -226,11 +226,11 @@ def _voluntary(context: Context) -> Mapping[str, Triple]:
     found = {"expected": errors_percent(TRUTH + np.array(bias))}
     # As the paper fits them: without weights.
     ordinary = [
-        fit_inertia_damping_stiffness(epoch_signals(epoch, "bandlimited", settings.estimation))
+        fit_inertia_damping_stiffness(epoch_signals(epoch, settings, "bandlimited"))
         for epoch in epochs
     ]
     found["least squares"] = errors_percent(np.mean([fit.value for fit in ordinary], axis=0))
-    _, (pooled,) = fit_epochs(epochs, "iv", settings)
+    (pooled,) = [one for one in estimate(epochs, settings, "iv").pooled if not one.condition]
     found["iv"] = errors_percent(_fitted(pooled))
     return found
 

@@ -40,6 +40,7 @@ from rigidimeter.analysis.estimate_anew.terms import TERMS, Motion, Term
 from rigidimeter.core.findings import Effect, Fact, Finding
 from rigidimeter.core.records import PARAMETERS
 from rigidimeter.core.settings import DiagnosticsSettings, Settings
+from rigidimeter.core.words import series
 from rigidimeter.model import lowpass
 
 CHANCE, MOST_TERMS = 1e-3, 3
@@ -74,6 +75,10 @@ FAINT = 0.01
 
 PLACES, INNER_TIME, INNER_ANGLE = 61, 0.8, (0.05, 0.95)
 """Where a parameter that changes is looked at: at the ends polynomials follow the noise."""
+
+LEAST_ANGLE_RAD = np.radians(5.0)
+"""Where the angle stays within, stiffness is not told by the angle: muscles are stiffer in the
+first degrees from any posture."""
 
 _LATE = ("delay", "cuff", "filter")
 _ELASTIC = ("stiffness by side", "stiffness by angle", "K over phase")
@@ -250,10 +255,12 @@ def answer(
         sure = [one for one in offered if p[one.name] < chance]
         if not case.caused and any(not one.linear for one in sure):
             sure = [one for one in sure if not one.linear]
-        named = {one.name: tested.model.tested[one.name] for one in sure}
-        others = [*_other_drives(case, state, tested.model, named)][1:] if sure else []
+        # A free filter holds any drive.
+        named = {one.name: tested.model.tested[one.name] for one in sure
+                 if case.caused or one.linear}  # fmt: skip
+        others = [*_other_drives(case, state, tested.model, named)][1:] if named else []
         for _, other in others:
-            sure = [one for one in sure if len(names) * other[one.name] < chance]
+            sure = [one for one in sure if len(names) * other.get(one.name, 0.0) < chance]
         gains = _gains(case, state, tested, sure)
         strongest = strongest or max((gain for gain, _ in gains.values()), default=0.0)
         # The gain of a coupling is that of a straight column, and it bends.
@@ -518,7 +525,8 @@ def _gains(
             looked = _instruments(case, state, [(term, term.inner)], len(term.inner))
             each = by.explained(looked, tested.fit)
             gain, inner = float(np.max(each)) - 4, term.inner[int(np.argmax(each))]
-        if not (term.resists and one.values[0] <= 0):
+        # Of several kernels the first may be negative though their sum resists.
+        if not (term.resists and len(term.first) == 1 and one.values[0] <= 0):
             found[term.name] = gain, inner
     return found
 
@@ -546,6 +554,8 @@ def _chosen(
         except ValueError:
             continue
         size, least = size_of(case, new)
+        if term.resists and term.bent is None and new.taken[-1].values[0] <= 0:
+            continue
         clear = state.unlikely - new.unlikely > ALONE * sum(one.size for one in new.powers)
         if size < least or (term.linear and not (case.caused or clear)):
             continue
@@ -650,7 +660,7 @@ def courses(
         return [(j, of.over_time(x).T, own, [f"{t:.1f} s" for t in at_s]) for own, at_s in each]
     if term.finding == "varying_with_phase":
         x = np.linspace(0, 2 * np.pi, PLACES)
-        return [(j, of.over_phase(x).T, values, [f"{t:.0f}° of the cycle" for t in np.degrees(x)])]
+        return [(j, of.over_phase(x).T, values, [f"{t:.0f}°" for t in np.degrees(x)])]
     angle = np.concatenate([m.angle for m in case.measured])
     low, high = np.quantile(angle, INNER_ANGLE).tolist()
     x = np.linspace(low, high, PLACES)
@@ -804,8 +814,9 @@ def findings_of(
     """
     limits, told = settings.diagnostics, []
     tested = bool(np.isfinite(found.remains))
-    for kind in dict.fromkeys(one.term.finding for one in found.found):
-        own = [one for one in found.found if one.term.finding == kind]
+    kinds = [_kind(one.term, found.case) for one in found.found]
+    for kind in dict.fromkeys(kinds):
+        own = [one for one, its in zip(found.found, kinds, strict=True) if its == kind]
         if kind == "varying_between_epochs":
             continue  # told with the fits of single epochs
         added = np.sum([one.effect for one in own], axis=0)
@@ -833,6 +844,15 @@ def findings_of(
     return tuple(told)
 
 
+def _kind(term: Term, case: Case) -> str:
+    """Return the kind of a term's finding: within a small range the angle is not what counts."""
+    if term.finding == "varying_with_angle":
+        angle = np.concatenate([one.angle for one in case.measured])
+        if np.ptp(np.quantile(angle, INNER_ANGLE)) < LEAST_ANGLE_RAD:
+            return "missing_term"
+    return term.finding
+
+
 def _told(
     kind: str, own: Sequence[Found], added: Array, found: Answer, limits: DiagnosticsSettings
 ) -> tuple[float, float, dict[str, Fact], str]:
@@ -845,8 +865,9 @@ def _told(
         return abs(late_ms), 1e3 * LEAST_DELAY_S, facts, ""
     if kind.startswith("varying"):
         ranges = sorted((_range(one, found) for one in own), key=lambda one: -one[0])
-        others = " and ".join(str(one["symbol"]) for _, one in ranges[1:])
-        facts = {**ranges[0][1], "others": f"; so does {others}" if others else ""}
+        others = series([str(one["symbol"]) for _, one in ranges[1:]])
+        does = "do" if len(ranges) > 2 else "does"
+        facts = {**ranges[0][1], "others": f"; so {does} {others}" if others else ""}
         return ranges[0][0], limits.max_varying_percent, facts, ""
     asked = ["inertia", "damping", "stiffness", *(one.term.asked for one in own)]
     if "directional-damping" in asked:
@@ -857,7 +878,7 @@ def _told(
         size = f"{one.values[0]:.3g} ± {one.half[0]:.2g} {one.term.unit}"
         sizes.append(f"{one.term.label} of {size}{late}")
     facts = {
-        "terms": " and ".join(one.term.label for one in own), "sizes": " and ".join(sizes),
+        "terms": series([one.term.label for one in own]), "sizes": series(sizes),
         "asked": ",".join(asked), "size": float(first.values[0]), "share": 100 * first.size,
     }  # fmt: skip
     if first.term.muscle:

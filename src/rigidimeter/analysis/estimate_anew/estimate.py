@@ -482,9 +482,9 @@ def estimate_recorded(
     every = recorded.analysed(as_recorded=estimator.as_recorded)
     epochs, imposed = every[: len(recorded.perturbed)], every[len(recorded.perturbed) :]
     observed = observed_for(estimator, epochs, recorded)
-    progress(0.3)
-    fitted = _fitted(estimator, epochs, observed, None, delays, pooled=not fits_alone)
     progress(0.2)
+    fitted = _fitted(estimator, epochs, observed, None, delays, pooled=not fits_alone)
+    progress(0.1)
     pulls = [_pull(estimator, seen, fit) for seen, fit in zip(observed, fitted.fits, strict=True)]
     fits = [
         _checked(estimator, *each, delays)
@@ -502,7 +502,7 @@ def estimate_recorded(
     fits = [_beside(estimator, one, told) for one in fits]
     if not fits_alone:
         fits, pooled, bands = _together(estimator, counted, fits, pooled, told, pulls, delays)
-    progress(0.3)
+    progress(0.6)
     included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
     inertia_kg_m2 = float(np.median(included)) if included else float("nan")
     fixed = [Fit(fit.source, fit.epoch, fit.condition, fit.method, fit.outcome) for fit in fits]
@@ -519,7 +519,7 @@ def estimate_recorded(
         score_epoch(one.epoch, settings.scores, settings.estimation)
         for one in (() if fits_alone else imposed)
     ]
-    progress(0.2)
+    progress(0.1)
     return Analysis(
         method,
         tuple(fits),
@@ -559,8 +559,8 @@ def estimate(
         If there is no such method.
     """
     clocks = method == "auto" or not method_named(method).as_recorded
-    recorded = prepare(epochs, settings, clocks=clocks, progress=lambda n: progress(0.5 * n))
-    return estimate_recorded(recorded, method, progress=lambda n: progress(0.5 * n))
+    recorded = prepare(epochs, settings, clocks=clocks, progress=lambda n: progress(0.4 * n))
+    return estimate_recorded(recorded, method, progress=lambda n: progress(0.6 * n))
 
 
 def fit_epoch(

@@ -9,9 +9,9 @@ with X, p what is fitted and C, q what is tested. Sums Σ Re go over lines and e
     D* = D − Z (XᴴZ)⁻¹ XᴴD,    g = Σ Re D*ᴴ y
     T = gᵀ (Σ g_b g_bᵀ)⁻¹ g,    χ² = 2 gᵀ (Σ Re D*ᴴD*)⁻¹ g
 
-Whitened noise has no memory, so the parts g_b of g from blocks of half a second are independent,
-whatever their sizes: a subject who pushes now and then is no other case. The probability of so
-large a T is
+Whitened noise has no memory, so the parts g_b of g from blocks of a quarter of a second are
+independent, whatever their sizes: a subject who pushes now and then is no other case. The
+probability of so large a T is
 
     p = max(2^(1−n), 4.46 min(P(χ²_q > T), P(Beta(q/2, (n−q)/2) > T/n)))
 
@@ -36,7 +36,7 @@ import scipy
 
 from rigidimeter.analysis.estimate_anew.grid import Array, Complex, Grid
 
-BLOCK_S = 0.5
+BLOCK_S = 0.25
 PINELIS = 2 * np.exp(3) / 9
 LEAST_DEGREES = 3.0
 TINY, ALIKE = 1e-300, 1e-9

@@ -332,12 +332,12 @@ KERNELS = np.array(
 _UNITS = {one.symbol: one.unit for one in PARAMETERS}
 
 
-def _reflex_of(name: str, asked: str, function: Callable[[Array], Array]) -> Term:
+def _reflex_of(name: str, asked: str, label: str, function: Callable[[Array], Array]) -> Term:
     return Term(
-        name, "N·m·s/rad", "reflex", _reflex(function), inner=KERNELS,
+        name, "N·m·s/rad", label, _reflex(function), inner=KERNELS,
         first=np.array([(0.03, 0.0), (0.06, 0.0), (0.05, _LAGS_S[1])]),
         steps=np.array([5e-4, 5e-4]), low=np.array([0.015, 0.0]), high=np.array([0.2, 0.2]),
-        muscle=True, linear=name == "reflex", asked=asked,
+        muscle=True, linear=name == "reflex", resists=True, asked=asked,
     )  # fmt: skip
 
 
@@ -354,9 +354,9 @@ def _late(name: str, label: str, bent: Bend, low: float, high: float) -> Term:
 MOVEMENT = Term("movement", "N·m", "", _movement, own=True, linear=True, finding="")
 ANY_LINEAR = Term("any linear", "1", "anything linear", any_linear, linear=True, finding="")
 FILTER = _late("filter", "a filter of the torque", _before_filter, 0.0, 0.03)
-DELAY = _late("delay", "a late torque", _at_delay, -0.05, 0.05)
+DELAY = _late("delay", "a delay", _at_delay, -0.05, 0.05)
 CUFF = Term(
-    "cuff", "rad/(N·m)", "soft coupling", _cuff,
+    "cuff", "rad/(N·m)", "a soft coupling", _cuff,
     inner=np.array([(0.0, lag) for lag in (0.0, 1e-3, 4e-3)]), first=np.zeros((1, 2)),
     low=np.zeros(2), high=np.array([np.inf, 0.02]), bent=_behind_cuff,
     resists=True, linear=True, asked="cuff",
@@ -370,7 +370,7 @@ FINER = {
 }  # fmt: skip
 """What is fitted beside a change that was found."""
 
-TERMS: tuple[Term, ...] = (
+TERMS: list[Term] = [
     Term(
         "friction", "N·m", "friction", _friction, first=np.array([[0.02]]),
         inner=np.array([[0.02]]), steps=np.array([1e-3]), low=np.array([1e-3]),
@@ -395,9 +395,9 @@ TERMS: tuple[Term, ...] = (
         _of(lambda v, x: x * x, lambda v, x: x * x * x), finding="varying_with_angle",
         asked="quadratic,cubic",
     ),
-    _reflex_of("reflex+", "reflex+", lambda v: np.maximum(v, 0)),
-    _reflex_of("reflex-", "reflex-", lambda v: np.minimum(v, 0)),
-    _reflex_of("reflex", "reflex+,reflex-", lambda v: v),
+    _reflex_of("reflex+", "reflex+", "a reflex to positive velocity", lambda v: np.maximum(v, 0)),
+    _reflex_of("reflex-", "reflex-", "a reflex to negative velocity", lambda v: np.minimum(v, 0)),
+    _reflex_of("reflex", "reflex+,reflex-", "a reflex", lambda v: v),
     DELAY,
     CUFF,
     *(
@@ -421,5 +421,5 @@ TERMS: tuple[Term, ...] = (
         )
         for j, (p, unit) in enumerate(_UNITS.items())
     ),
-)  # fmt: skip
+]  # fmt: skip
 """Code from outside the package may append its own."""
