@@ -37,7 +37,7 @@ from rigidimeter.analysis.estimate_anew.score import EVERY, Part, Place, Score, 
 from rigidimeter.analysis.estimate_anew.signals import values_at, velocity_at
 from rigidimeter.analysis.estimate_anew.solve import Problem, Solution, noise_powers
 from rigidimeter.analysis.estimate_anew.terms import TERMS, Motion, Term
-from rigidimeter.core.findings import Effect, Fact, Finding
+from rigidimeter.core.findings import UNKNOWN_EFFECT, Effect, Fact, Finding
 from rigidimeter.core.records import PARAMETERS
 from rigidimeter.core.settings import DiagnosticsSettings, Settings
 from rigidimeter.core.words import series
@@ -824,11 +824,12 @@ def findings_of(
         how = "" if not stands else "answered" if tested else "beside"
         if not found.answered:
             how = "withheld"
+        effect = Effect.of(added, found.joint + added, found.half)
         told.append(
             said(
                 kind, limits, value, limit, p=max(one.p for one in own),
                 variant=f"{variant} {how}".strip() if how in ("beside", "withheld") else variant,
-                effect=Effect.of(added, found.joint + added, found.half),
+                effect=UNKNOWN_EFFECT if how == "withheld" else effect,
                 facts={**facts, "remains": found.remains},
                 harmless=how if how == "answered" else "",
                 excludes=how == "withheld",
@@ -840,7 +841,12 @@ def findings_of(
         change = (100 * found.change / found.joint).tolist()
         facts = {f"half_{symbol}": one for symbol, one in zip("JBK", change, strict=True)}
         facts |= {"low_hz": low_hz, "high_hz": high_hz}
-        told.append(said("lack_of_fit", limits, percent, most, p=found.remains, facts=facts))
+        told.append(
+            said(
+                "lack_of_fit", limits, percent, most, p=found.remains, facts=facts,
+                harmless="answered" if found.answered else "",
+            )
+        )  # fmt: skip
     return tuple(told)
 
 
