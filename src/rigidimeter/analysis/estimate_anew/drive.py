@@ -32,16 +32,15 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimate_anew.stretches import Array, Rows, sound
+from rigidimeter.analysis.estimate_anew.grid import Array, Complex
+from rigidimeter.analysis.estimate_anew.stretches import Rows, motion_channels, sound
 from rigidimeter.core.records import Channel, Epoch
 from rigidimeter.core.settings import RigSettings, Settings
 from rigidimeter.model import (
     ON_EDGE,
     SAME_TIME_S,
     DriveModel,
-    HeldCommand,
     lowpass,
     same_time,
     state_at_ticks,
@@ -49,7 +48,6 @@ from rigidimeter.model import (
     with_conjugates,
 )
 
-Complex = NDArray[np.complex128]
 Values = Array | Complex
 
 MOST_TRIED = 5  # epochs of a recording, before its drive is taken for unknown
@@ -68,7 +66,7 @@ LONGEST_S, LONGEST_TICKS, SHORTEST_TICKS = 0.1, 4.0, 0.25  # of delays
 PASSED_HZ = 10.0  # an angle is used as the velocity through a low-pass with this corner
 # Of stretches of past commands, ever longer the longer ago.
 EDGES_TICKS = (0, 1, *sorted(step << octave for octave in range(13) for step in (2, 3)))
-MOST_STEPS, ENOUGH = 12, 1e-6  # of a search; the last share of the power to gain
+MOST_STEPS, ENOUGH = 12, 1e-4  # of a search; the last share of the power to gain
 STEP = 1e-4  # of a coordinate, for its slope
 FAR = 1e3  # a delay is not searched where more times the power of others is left near it
 
@@ -85,10 +83,10 @@ UNLIKELY, SLOW = 6.0, 1.0
 # Shares of the velocity's SD: where noise is larger the angle may show the drive better; where
 # more is left the command does not explain it.
 NOISY, MISFIT = 0.01, 0.1
-# A share of the SD below which nothing needs friction; the share to which it must bring the power,
-# times the next where drives of four poles were not tried; how much more power is as good with it,
-# for poles bend to what its law leaves; how often sign and drive are made of each other.
-QUIET, RUBS, EARLY, RUBBED, SIGNS = 3e-4, 0.8, 0.5, 4.0, 3
+# A share of the SD below which nothing needs friction; the share to which it must bring the power
+# that any linear drive would leave; how much more power is as good with it, for poles bend to what
+# its law leaves; how often sign and drive are made of each other.
+QUIET, RUBS, RUBBED, SIGNS = 3e-4, 0.8, 4.0, 3
 # A command that was logged more slowly than it was sent goes on between its samples: if lines
 # between them, in so many steps, leave this share of what stairs leave, the stairs are not known.
 STAIRS, FINER = 0.5, 4
@@ -104,11 +102,8 @@ SCATTERED = 5.0  # stamps keep step if their mean direction is so many standard 
 TINY = 1e-300
 
 
-class TorqueFilter(NamedTuple):
-    """A Butterworth low-pass between the torque and its samples."""
-
-    cutoff_hz: float
-    order: int
+TorqueFilter = tuple[float, int]
+"""Cutoff in Hz and order of a Butterworth low-pass between the torque and its samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,9 +123,20 @@ class Drive:
 
     def motion(self, command: Channel, time_s: Array) -> Array:
         """Return acceleration, velocity, angle that the command causes from rest, shape (3, n)."""
-        tick, after_s = since_ticks(command, time_s, self.model.delay_s)
-        held = HeldCommand(self.model, command.values, _lengths_s(command))
-        return np.stack(held.motion(tick, after_s))
+        at = since_ticks(command, time_s, self.model.delay_s)
+        return np.stack(self.model.motion(command.values, _lengths_s(command), *at))
+
+    def behind(self, torque_filter: TorqueFilter | None) -> Drive:
+        """Return the drive as the torque sensor sees its motion."""
+        return self if torque_filter is None else Drive(self.model.smoothed(*torque_filter))
+
+    def beyond(self, epoch: Epoch) -> Epoch:
+        """Return the epoch with what its motion sensors saw beyond what the command causes."""
+        command, rest = epoch.channels["velocity_command_rad_s"], dict(epoch.channels)
+        for one in motion_channels(epoch):
+            caused = self.motion(command, one.time_s)[2 if one.name == "angle_rad" else 1]
+            rest[one.name] = replace(one, values=one.values - caused)
+        return replace(epoch, channels=rest)
 
 
 def since_ticks(
@@ -152,9 +158,8 @@ def since_ticks(
 def _lengths_s(command: Channel) -> float | Array:
     """Return the time from each tick to the next; one number if all came evenly."""
     interval_s = 1.0 / command.mean_rate_hz
-    even_s = command.time_s[0] + interval_s * np.arange(len(command))
-    even = np.ptp(command.time_s - even_s) <= 1e-3 * interval_s
-    return interval_s if even else np.diff(command.time_s)
+    off_s = command.time_s - command.time_s[0] - interval_s * np.arange(len(command))
+    return interval_s if np.ptp(off_s) <= 1e-3 * interval_s else np.diff(command.time_s)
 
 
 def find_drive(epochs: Sequence[Epoch], settings: Settings) -> Drive | None:
@@ -179,9 +184,9 @@ def find_drive(epochs: Sequence[Epoch], settings: Settings) -> Drive | None:
     start = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
     for epoch in epochs[:MOST_TRIED]:
         found: list[tuple[float, bool, Drive]] = []
-        for name in ("velocity_rad_s", "angle_rad"):
-            if name in epoch.channels and (not found or (found[0][1] and found[0][0] > NOISY**2)):
-                found += _identified(epoch, epoch.channels[name], start)
+        for motion in motion_channels(epoch):  # the velocity first
+            if not found or (found[0][1] and found[0][0] > NOISY**2):
+                found += _identified(epoch, motion, start)
         if found:
             return min(found, key=lambda one: one[0])[2]
     return None
@@ -218,6 +223,28 @@ class _Record:
     every_s: float = 0.0
 
 
+def _record(epoch: Epoch, motion: Channel) -> _Record | None:
+    """Return what the drive is identified from; None where there is too little."""
+    command, stamps_s = epoch.channels.get("velocity_command_rad_s"), motion.time_s
+    if command is None or len(command) < 2 * FEWEST_SAMPLES:
+        return None
+    of_angle, last_s = motion.name == "angle_rad", command.time_s[:MOST_TICKS][-1]
+    holes = [one._replace(stop_s=one.stop_s + SETTLED_S * one.lost) for one in epoch.left_out]
+    inside = sound(replace(epoch, left_out=tuple(holes)), stamps_s)
+    inside &= (stamps_s >= command.time_s[0] + SETTLED_S) & (stamps_s <= last_s)
+    rows = np.flatnonzero(inside)[: MOST_TICKS if of_angle else MOST_SAMPLES]
+    if rows.size < FEWEST_SAMPLES or np.ptp(motion.values[rows]) == 0.0:
+        return None
+    time_s, measured = stamps_s[rows], motion.values[rows]
+    every_s = of_angle * float(time_s[-1] - time_s[0]) / (rows.size - 1)
+    if of_angle:
+        measured = np.real(_from_angle(measured, every_s))
+    scale, used = float(np.std(measured)), command.time_s <= time_s[-1]
+    sent = Channel(command.name, command.time_s[used], command.values[used])
+    held = 1.0 / command.mean_rate_hz, _lengths_s(sent), (sent.values[:, None],)
+    return _Record(sent, *held, time_s, measured / scale, scale, every_s)
+
+
 class _Fitted(NamedTuple):
     """The drive at a place, with the numerator that explains the velocity best.
 
@@ -248,34 +275,17 @@ class _Fitted(NamedTuple):
     @property
     def model(self) -> DriveModel:
         """From command to velocity."""
-        return _model(self.record, self.place, self.numerator[: self.zeros + 1])
+        poles, interval_s = _poles(self.place, self.record.interval_s), self.record.interval_s
+        own = self.record.scale * self.numerator[: self.zeros + 1]
+        residues = _shapes(poles, self.zeros) @ own
+        return DriveModel(poles, tuple(residues.tolist()), float(self.place[-1]) * interval_s)
+
+    def velocity(self, place: Array, numerator: Array) -> Array:
+        """Return the velocity at another place, with another numerator."""
+        return np.asarray(numerator @ _table(self.record, place, self.zeros))
 
 
 _power = attrgetter("power")
-
-
-def _record(epoch: Epoch, motion: Channel) -> _Record | None:
-    """Return what the drive is identified from; None where there is too little."""
-    command = epoch.channels.get("velocity_command_rad_s")
-    if command is None or len(command) < 2 * FEWEST_SAMPLES:
-        return None
-    of_angle, first_s = motion.name == "angle_rad", command.time_s[0] + SETTLED_S
-    holes = [one._replace(stop_s=one.stop_s + SETTLED_S * one.lost) for one in epoch.left_out]
-    inside = sound(replace(epoch, left_out=tuple(holes)), motion.time_s)
-    inside &= (motion.time_s >= first_s) & (motion.time_s <= command.time_s[:MOST_TICKS][-1])
-    rows = np.flatnonzero(inside)[: MOST_TICKS if of_angle else MOST_SAMPLES]
-    if rows.size < FEWEST_SAMPLES:
-        return None
-    time_s, measured = motion.time_s[rows], motion.values[rows]
-    every_s = of_angle * float(time_s[-1] - time_s[0]) / (rows.size - 1)
-    if of_angle:
-        measured = np.real(_from_angle(measured, every_s))
-    scale, used = float(np.std(measured)), command.time_s <= time_s[-1]
-    if scale == 0.0:
-        return None
-    sent = Channel(command.name, command.time_s[used], command.values[used])
-    held = 1.0 / command.mean_rate_hz, _lengths_s(sent), (sent.values[:, None],)
-    return _Record(sent, *held, time_s, measured / scale, scale, every_s)
 
 
 def _identified(
@@ -298,13 +308,12 @@ def _identified(
     if chosen is None or chosen.power > MISFIT**2 or not 0.5 < chosen.model.gain < 2.0:
         return []
     noise = bool(best.left[1:] @ best.left[:-1] < COLOURED * best.left.size * best.power)
-    most = (times if noise else RIVAL) * best.power + UNSEEN**2
-    likely = math.inf
+    most, likely = (times if noise else RIVAL) * best.power + UNSEEN**2, math.inf
     if noise and _fastest(chosen) < SLOW:
         likely = min(map(_information, found)) + UNLIKELY
     rivals = [one for one in found if one.power <= most and _information(one) <= likely]
-    others = [one.model for one in rivals if one is not chosen]
-    return [(chosen.power, noise, Drive(chosen.model, (*others, *_neighbours(chosen))))]
+    others = [one.model for one in (*rivals, *_neighbours(chosen)) if one is not chosen]
+    return [(chosen.power, noise, Drive(chosen.model, tuple(others)))]
 
 
 def _fastest(one: _Fitted) -> float:
@@ -323,13 +332,14 @@ def _climbed(record: _Record, start: DriveModel) -> list[_Fitted]:
 
     Each with two zeros fewer than poles (it smooths the steps of the command) and with one fewer
     (its acceleration jumps at them). One pole more where the best has a delay: a lag looks like it.
+    With friction instead, where that leaves less than any linear drive would.
     """
     rubs = len(record.inputs) > 1
     regressed = {} if rubs else _regressed(record)
     speeds = [1.0] if rubs or regressed else [2.0**-n for n in range(6)]
     models = [replace(start, poles_rad_s=tuple(x * p for p in start.poles_rad_s)) for x in speeds]
     found: list[_Fitted] = []
-    enough = False
+    spent = False
     for poles in range(2, MOST_POLES + 1):
         least = min((one.power for one in found), default=1.0)
         near = [*models, *regressed.get(poles, []), *(one.model for one in found[-2:])]
@@ -338,16 +348,16 @@ def _climbed(record: _Record, start: DriveModel) -> list[_Fitted]:
             found.append(_best(record, begins, zeros, least))
             begins.append(found[-1].place)
         best = min(found, key=_power)
-        spent = _explainable(best) < WORTH
-        done = enough or (spent and best.place[-1] == 0.0)
-        enough = spent
+        if rubs and poles > 2 and RUBBED * best.power > least:
+            break
         if rubs:
-            done = poles > 2 and RUBBED * best.power > least
-        elif best.power > QUIET**2 and (done or poles > 2):
-            most = best.power * (1.0 if done or poles == MOST_POLES else EARLY)
-            if (rubbed := _rubbed(found[1], most)) is not None:
-                return _climbed(rubbed.record, rubbed.model)
-        if done:
+            continue
+        share, before = _explainable(best), spent
+        rubbed = best.power > QUIET**2 and _rubbed(found[1], best.power * (1.0 - share))
+        if rubbed:
+            return _climbed(rubbed.record, rubbed.model)
+        spent = share < WORTH
+        if before or (spent and best.place[-1] == 0.0):
             break
     near = [*models, *regressed.get(1, []), *(one.model for one in found[:2])]
     single = [_coordinates(one, record.interval_s, 1) for one in near]
@@ -362,7 +372,7 @@ def _best(record: _Record, begins: Sequence[Array], zeros: int, least: float) ->
     """
     at = [_answer(record, np.append(one[:-1], 0.0), zeros) for one in begins]
     still = _searched(record, min(at, key=_power).place, zeros, False)
-    step, scatter, _ = _scatter(still)
+    step, scatter, *_ = _scatter(still)
     delay = still.place.size - 1
     if step[delay] <= ERRORS * np.linalg.norm(scatter[delay]):
         return still
@@ -393,9 +403,9 @@ def _searched(record: _Record, begin: Array, zeros: int, delayed: bool) -> _Fitt
         while tried is None or tried.power >= one.power:
             damped = gram + np.diag(damping * np.diag(gram) + TINY)
             step[: down.size] = np.linalg.solve(damped, -down)
-            if -down @ step[: down.size] <= ENOUGH * one.left.size * (one.power + UNSEEN**2):
-                return one
             tried = _answer(record, one.place + step, zeros)
+            if -down @ step[: down.size] <= ENOUGH * one.left.size * (one.power + UNSEEN**2):
+                return min(one, tried, key=_power)
             damping *= 10.0 if tried.power >= one.power else 0.2
         one = tried
     return one
@@ -407,8 +417,7 @@ def _answer(record: _Record, place: Array, zeros: int) -> _Fitted:
     lower = np.append(degrees * math.log(SLOWEST), 0.0)
     upper = np.append(degrees * math.log(FASTEST), _longest(record))
     place = np.minimum(np.maximum(place, lower), upper)
-    weights, modes = _modes(record, place, zeros)
-    table = weights @ modes
+    table = _table(record, place, zeros)
     size = np.linalg.norm(table, axis=1) + TINY
     scaled = table / size[:, None]
     numerator = np.linalg.lstsq(scaled @ scaled.T, scaled @ record.measured)[0] / size
@@ -418,44 +427,27 @@ def _answer(record: _Record, place: Array, zeros: int) -> _Fitted:
 
 def _slopes(one: _Fitted, count: int) -> Array:
     """Return how the velocity changes along coordinates of the place, shape (count, n)."""
-    explained = one.numerator @ one.table
-    moved = [
-        _velocity(one, one.place + by, one.numerator)
-        for by in STEP * np.eye(one.place.size)[:count]
-    ]
-    return (np.stack(moved) - explained) / STEP
+    moves = STEP * np.eye(one.place.size)[:count]
+    moved = [one.velocity(one.place + by, one.numerator) for by in moves]
+    return (np.stack(moved) - one.numerator @ one.table) / STEP
 
 
-def _velocity(one: _Fitted, place: Array, numerator: Array) -> Array:
-    """Return the velocity of a numerator at another place."""
-    weights, modes = _modes(one.record, place, one.zeros)
-    return np.asarray(numerator @ weights @ modes)
-
-
-def _modes(record: _Record, place: Array, zeros: int) -> tuple[Array, Array]:
-    """Return what each term of a numerator has of each mode, and the modes, shape (m, n)."""
-    poles = _poles(place[:-1], record.interval_s)
-    delay_s, count = float(place[-1]) * record.interval_s, place.size - 1
-    terms = (zeros + 1, count)[: len(record.inputs)]  # friction acts behind the controller's zeros
-    weights = np.zeros((sum(terms), count * len(terms)))
-    modes: list[Array] = []
-    for which, own in enumerate(terms):
-        rows = weights[zeros + 1 :] if which else weights[: zeros + 1]
-        for pole, shape in zip(poles, _shapes(poles, own - 1), strict=True):
-            mode = _mode(record, which, pole, 0.0 if which else delay_s)
-            rows[:, len(modes)] = shape.real * (2 if pole.imag else 1)
-            modes.append(mode.real)
-            if pole.imag:
-                rows[:, len(modes)] = -2 * shape.imag
-                modes.append(mode.imag)
-    return weights, np.stack(modes)
+def _table(record: _Record, place: Array, zeros: int) -> Array:
+    """Return the velocity that each term of a numerator makes, shape (j, n)."""
+    poles, delay_s = _poles(place, record.interval_s), float(place[-1]) * record.interval_s
+    twice = np.array([1.0 + (pole.imag != 0.0) for pole in poles])
+    parts = []
+    # Friction acts behind the zeros of the controller, at once.
+    for which, terms in enumerate((zeros + 1, place.size - 1)[: len(record.inputs)]):
+        modes = [_mode(record, which, pole, 0.0 if which else delay_s) for pole in poles]
+        parts.append(((_shapes(poles, terms - 1).T * twice) @ np.stack(modes)).real)
+    return np.concatenate(parts)
 
 
 @lru_cache(maxsize=64)
 def _mode(record: _Record, which: int, pole: complex, delay_s: float) -> Values:
     """Return x of x' = λ x + c at the stamps; for an angle what `_from_angle` makes of ∫ x dt."""
-    values = record.inputs[which]
-    tick, held_s = _since(record, delay_s)
+    values, (tick, held_s) = record.inputs[which], _since(record, delay_s)
     growth = pole if pole.imag else pole.real
     # Held for a tick, the weighted mean of its parts leaves the same state.
     parts = np.arange(values.shape[1] - 1, -1, -1) / values.shape[1]
@@ -463,25 +455,17 @@ def _mode(record: _Record, which: int, pole: complex, delay_s: float) -> Values:
     sent = values @ (share / np.sum(share)) if parts.size > 1 else values[:, 0]
     before = state_at_ticks(pole, sent, record.lengths_s)[tick]
     state = state_later(pole, before, sent[tick], held_s)
-    if record.every_s:  # x' = λ x + c
-        moved = _from_angle(state, record.every_s) - _integral(record, which, delay_s)
-        state = np.asarray(moved / growth)
-    return state
+    if not record.every_s:
+        return state
+    mean = np.mean(values, axis=1)
+    summed = np.append(0.0, np.cumsum(mean[:-1] * record.lengths_s))
+    return _from_angle((state - summed[tick] - held_s * mean[tick]) / growth, record.every_s)
 
 
 @lru_cache(maxsize=16)
 def _since(record: _Record, delay_s: float) -> tuple[Rows, Array | float]:
     tick, after_s = since_ticks(record.command, record.time_s, delay_s, even=0.0)
     return tick, same_time(after_s)
-
-
-@lru_cache(maxsize=16)
-def _integral(record: _Record, which: int, delay_s: float) -> Values:
-    """Return what `_from_angle` makes of ∫ c dt."""
-    tick, held_s = _since(record, delay_s)
-    sent = np.mean(record.inputs[which], axis=1)
-    summed = np.append(0.0, np.cumsum(sent[:-1] * record.lengths_s))
-    return _from_angle(summed[tick] + held_s * sent[tick], record.every_s)
 
 
 def _longest(record: _Record) -> float:
@@ -494,28 +478,17 @@ def _from_angle(angle_rad: Values, interval_s: float) -> Values:
     y_k = e^(−aT) y_(k−1) + θ_k − θ_(k−1), with a the corner: white noise of the angle stays white
     above it, and neither where the angle begins nor a slow drift counts.
     """
+    kept = math.exp(-2 * math.pi * PASSED_HZ * interval_s)
     steps = np.diff(angle_rad, prepend=angle_rad[:1])
-    return np.asarray(scipy.signal.lfilter([1.0], [1.0, -_kept(interval_s)], steps))
-
-
-def _kept(interval_s: float) -> float:
-    return math.exp(-2 * math.pi * PASSED_HZ * interval_s)
-
-
-def _model(record: _Record, place: Array, numerator: Array) -> DriveModel:
-    """Return the drive at a place with a numerator for the command."""
-    poles = _poles(place[:-1], record.interval_s)
-    residues = record.scale * _shapes(poles, numerator.size - 1) @ numerator
-    return DriveModel(poles, tuple(residues.tolist()), float(place[-1]) * record.interval_s)
+    return np.asarray(scipy.signal.lfilter([1.0], [1.0, -kept], steps))
 
 
 def _poles(place: Array, interval_s: float) -> tuple[complex, ...]:
     """Return the poles, of a conjugate pair the one with the positive imaginary part."""
     poles: list[complex] = []
-    coefficients = np.exp(place).tolist()
+    coefficients = np.exp(place[:-1]).tolist()
     for a, b in zip(coefficients[::2], coefficients[1::2], strict=False):
-        root = cmath.sqrt(a * a / 4 - b)
-        root = root if abs(root) >= DOUBLE * a else complex(DOUBLE * a)
+        root = max(cmath.sqrt(a * a / 4 - b), complex(DOUBLE * a), key=abs)
         if root.imag:
             poles.append(complex(-a / 2, min(abs(root.imag), QUICKEST)))
         else:
@@ -527,26 +500,23 @@ def _poles(place: Array, interval_s: float) -> tuple[complex, ...]:
 
 def _shapes(poles: tuple[complex, ...], zeros: int) -> Complex:
     """Return the residues of s^j / Π(s − λ), s in units of the first pole, shape (poles, j)."""
-    unit = abs(poles[0])
-    everyone = with_conjugates(poles)
-    rests = [math.prod(((pole - p) / unit for p in everyone if p != pole), start=complex(1))
-             for pole in poles]  # fmt: skip
-    return np.array([[unit * (pole / unit) ** j / rest for j in range(zeros + 1)]
-                     for pole, rest in zip(poles, rests, strict=True)])  # fmt: skip
+    own, everyone = np.array(poles), np.array(with_conjugates(poles))
+    apart = (own[:, None] - everyone) / abs(poles[0])
+    rest = np.prod(apart, axis=1, where=own[:, None] != everyone)[:, None]
+    powers = np.vander(own / abs(poles[0]), zeros + 1, increasing=True)
+    return np.asarray(abs(poles[0]) * powers / rest)
 
 
 def _coordinates(drive: DriveModel, interval_s: float, poles: int, beside: float = 1.0) -> Array:
     """Return where a search with so many poles begins at a drive."""
     slowest = sorted(drive.poles_rad_s, key=lambda pole: (pole.imag == 0, abs(pole)))
-    everyone = with_conjugates(slowest)[:poles]
-    everyone += [complex(-abs(everyone[0]) * beside**n)
-                 for n in range(1, poles - len(everyone) + 1)]  # fmt: skip
-    found: list[float] = []
-    for a, b in zip(everyone[::2], everyone[1::2], strict=False):
-        found += [-(a + b).real * interval_s, (a * b).real * interval_s**2]
-    if poles % 2:  # one of a pair does not stand alone
-        found.append(abs(everyone[-1]) * interval_s)
-    return np.append(np.log(found), drive.delay_s / interval_s)
+    known = np.array(with_conjugates(slowest)[:poles])
+    further = -abs(known[0]) * beside ** np.arange(1.0, poles - known.size + 1)
+    rates = -interval_s * np.append(known, further)
+    pairs, single = rates[: poles - poles % 2].reshape(-1, 2), rates[poles - poles % 2 :]
+    found = np.stack([pairs.sum(axis=1), pairs.prod(axis=1)], axis=1).real.ravel()
+    # One of a pair does not stand alone.
+    return np.append(np.log(np.append(found, np.abs(single))), drive.delay_s / interval_s)
 
 
 @lru_cache(maxsize=2)
@@ -575,23 +545,22 @@ def _regressed(record: _Record) -> dict[int, list[DriveModel]]:
     tick, held_s = _since(record, 0.0)
     rows = np.arange(MOST_POLES, tick.size)
     rows = rows[tick[rows] - tick[rows - MOST_POLES] == MOST_POLES]
-    found: dict[int, list[DriveModel]] = {}
     if np.ndim(held_s) or np.ndim(record.lengths_s) or rows.size < FEWEST_SAMPLES:
-        return found
-    sent = record.command.values
+        return {}
+    sent, lags = record.command.values, np.arange(MOST_POLES + 2)
     if record.every_s:
-        sent = scipy.signal.lfilter([1.0], [1.0, -_kept(record.every_s)], sent)
-    columns = [record.measured[rows - lag] for lag in range(MOST_POLES + 1)]
-    columns += [sent[np.maximum(tick[rows] - lag, 0)] for lag in range(MOST_POLES + 2)]
-    through = _past(record)[rows].T @ np.stack(columns, axis=1)
+        sent = np.real(_from_angle(np.cumsum(sent), record.every_s))
+    past = _past(record)[rows].T
+    measured = past @ record.measured[rows[:, None] - lags[:-1]]
+    sent = past @ sent[np.maximum(tick[rows][:, None] - lags, 0)]
+    found: dict[int, list[DriveModel]] = {}
     for poles in range(1, MOST_POLES + 1):
-        own = [*range(1, poles + 1), *range(MOST_POLES + 1, MOST_POLES + poles + 3)]
-        values = np.linalg.lstsq(through[:, own], through[:, 0], rcond=1e-12)[0]
-        roots = np.roots([1.0, *-values[:poles]]) + 0j
-        lasting = (np.abs(roots) < 1) & ((roots.imag > 0) | ((roots.imag == 0) & (roots.real > 0)))
-        if np.any(lasting):
-            shown = np.log(roots[lasting]) / record.interval_s
-            found[poles] = [DriveModel(tuple(shown.tolist()), ())]
+        table = np.hstack([measured[:, 1 : poles + 1], sent[:, : poles + 2]])
+        values = np.linalg.lstsq(table, measured[:, 0], rcond=1e-12)[0]
+        shown = np.log(np.roots([1.0, *-values[:poles]]) + 0j)
+        shown = shown[(shown.real < 0) & (shown.imag >= 0) & (shown.imag < math.pi)]
+        if shown.size:
+            found[poles] = [DriveModel(tuple((shown / record.interval_s).tolist()), ())]
     return found
 
 
@@ -600,32 +569,11 @@ def _rubbed(one: _Fitted, least: float) -> _Fitted | None:
     for again in range(SIGNS):
         record = replace(one.record, inputs=(one.record.inputs[0], _signs(one)))
         one = _answer(record, np.append(one.place[:-1], 0.0), one.zeros)
-        step, _, slopes = _scatter(one)
+        step, _, slopes, _ = _scatter(one)
         if not again and np.mean((one.left + step @ slopes) ** 2) > RUBS * least:
             return None
         one = _searched(record, one.place, one.zeros, False)
     return one if one.power < RUBS * least else None
-
-
-def _signs(one: _Fitted) -> Array:
-    """Return the mean sign of the velocity in parts of a tick, shape (ticks, parts).
-
-    The velocity is what a drive makes there, and straight between the samples what it leaves; of
-    an angle, what the drive makes.
-    """
-    record = one.record
-    ticks_s = np.append(record.command.time_s, record.command.time_s[-1] + record.interval_s)
-    parts = np.arange(FINER * len(record.command)) / FINER
-    time_s = np.interp(parts, np.arange(ticks_s.size), ticks_s)
-    inputs = tuple(np.repeat(x, FINER // x.shape[1], axis=1).reshape(-1, 1) for x in record.inputs)
-    sent = Channel(record.command.name, time_s, inputs[0][:, 0])
-    finer = replace(record, command=sent, lengths_s=_lengths_s(sent), inputs=inputs, time_s=time_s)
-    velocity = _velocity(one._replace(record=replace(finer, every_s=0.0)), one.place, one.numerator)
-    if not record.every_s:
-        velocity = velocity - np.interp(time_s, record.time_s, one.left)
-    after = np.append(velocity[1:], velocity[-1])
-    mean = (velocity + after) / (np.abs(velocity) + np.abs(after) + TINY)
-    return np.asarray(mean.reshape(-1, FINER))
 
 
 def _power_of_lines(found: Sequence[_Fitted]) -> float:
@@ -634,35 +582,51 @@ def _power_of_lines(found: Sequence[_Fitted]) -> float:
     parts = (np.arange(FINER * sent.size) + 0.5) / FINER
     lines = np.interp(parts, np.arange(sent.size), sent).reshape(-1, FINER)
     record = replace(found[0].record, inputs=(lines,))
-    begins = [(one.place, one.zeros) for one in found if one.place.size == 3]
-    return min(_searched(record, *begin, begin[0][-1] > 0).power for begin in begins)
+    two = [one for one in found if one.place.size == 3]
+    return min(_searched(record, one.place, one.zeros, one.place[-1] > 0).power for one in two)
 
 
-def _scatter(one: _Fitted) -> tuple[Array, Array, Array]:
-    """Return a step of place and numerator to where less is left, the scatter, and the slopes.
+def _signs(one: _Fitted) -> Array:
+    """Return the mean sign of the velocity in parts of a tick, shape (ticks, parts).
+
+    The velocity is what a drive makes there, and straight between the samples what it leaves; of
+    an angle, what the drive makes.
+    """
+    record, ticks_s = one.record, one.record.command.time_s
+    lengths_s = np.append(np.diff(ticks_s), record.interval_s)
+    time_s = (ticks_s[:, None] + lengths_s[:, None] * np.arange(FINER) / FINER).ravel()
+    finer = one._replace(record=replace(record, time_s=time_s, every_s=0.0))
+    velocity = finer.velocity(one.place, one.numerator)
+    if not record.every_s:
+        velocity = velocity - np.interp(time_s, record.time_s, one.left)
+    after = np.append(velocity[1:], velocity[-1])
+    mean = (velocity + after) / (np.abs(velocity) + np.abs(after) + TINY)
+    return np.asarray(mean.reshape(-1, FINER))
+
+
+def _scatter(one: _Fitted) -> tuple[Array, Array, Array, Array]:
+    """Return a step of place and numerator to where less is left, the scatter, slopes, their sizes.
 
     The covariance is that of the step, s sᵀ with the scatter s of shape (p, blocks).
     """
     slopes = np.concatenate([_slopes(one, one.place.size), one.table])
-    size = np.linalg.norm(slopes, axis=1)
+    size = np.linalg.norm(slopes, axis=1, keepdims=True)
     size[size == 0] = 1.0
-    basis, upper = np.linalg.qr((slopes / size[:, None]).T)
-    inverse = np.linalg.pinv(upper, rcond=1e-15) / size[:, None]  # one at its limit changes nothing
+    basis, upper = np.linalg.qr((slopes / size).T)
+    inverse = np.linalg.pinv(upper, rcond=1e-15) / size  # one at its limit changes nothing
     block = np.arange(0, one.left.size, -(-one.left.size // BLOCKS))
     sums = np.add.reduceat(basis * one.left[:, None], block)
-    return -inverse @ (one.left @ basis), inverse @ sums.T, slopes
+    return -inverse @ (one.left @ basis), inverse @ sums.T, slopes, size
 
 
-def _neighbours(one: _Fitted) -> Iterator[DriveModel]:
+def _neighbours(one: _Fitted) -> Iterator[_Fitted]:
     """Yield the drive moved by two standard errors either way along each axis of its covariance.
 
     A move is halved until it changes the velocity about as its slopes say, and leaves no delay
     below zero. At few samples a tick constant one axis is long: delay, fastest pole and numerator
     change together, hardly the velocity at the samples, and the acceleration between them a lot.
     """
-    _, scatter, slopes = _scatter(one)
-    size = np.linalg.norm(slopes, axis=1, keepdims=True)
-    size[size == 0] = 1.0
+    _, scatter, slopes, size = _scatter(one)
     axes, errors, _ = np.linalg.svd(scatter * size, full_matrices=False)
     explained, p = one.numerator @ one.table, one.place.size
     for longest in (ERRORS * errors * axes / size).T:
@@ -672,39 +636,47 @@ def _neighbours(one: _Fitted) -> Iterator[DriveModel]:
                 place, numerator = one.place + by[:p], one.numerator + by[p:]
                 if place[-1] < 0.0 or np.max(np.abs(by[:p])) > LONG:
                     continue
-                if np.linalg.norm(_velocity(one, place, numerator) - explained) <= most:
-                    yield _model(one.record, place, numerator[: one.zeros + 1])
+                if np.linalg.norm(one.velocity(place, numerator) - explained) <= most:
+                    yield one._replace(place=place, numerator=numerator)
                     break
 
 
-def behind(drive: Drive, torque_filter: TorqueFilter | None) -> Drive:
-    """Return the drive as the torque sensor sees its motion."""
-    return drive if torque_filter is None else Drive(drive.model.smoothed(*torque_filter))
+class Sampling(NamedTuple):
+    """How torque and motion are sampled, and at which lines they are compared.
+
+    Attributes
+    ----------
+    lines_rad_s : (float, float, int)
+        First, last and how many; they follow each other.
+    interval_s : float
+        Of the ticks.
+    torque_filter : (float, int), optional
+    angle_alone : bool
+        Whether acceleration and velocity are those of the angle's samples.
+    """
+
+    lines_rad_s: tuple[float, float, int]
+    interval_s: float
+    torque_filter: TorqueFilter | None = None
+    angle_alone: bool = False
 
 
-def beyond(
-    model: DriveModel,
-    omega_rad_s: Array,
-    interval_s: float,
-    after_s: float,
-    torque_filter: TorqueFilter | None = None,
-    *,
-    angle_alone: bool = False,
-) -> tuple[Complex, Complex]:
+def passed(torque_filter: TorqueFilter | None, omega_rad_s: Array) -> Complex:
+    """Return the response of what is in the torque sensor."""
+    s = np.asarray(1j * omega_rad_s)
+    return np.ones_like(s) if torque_filter is None else lowpass(s, *torque_filter)
+
+
+@lru_cache(maxsize=128)
+def beyond(model: DriveModel, at: Sampling, after_s: float) -> tuple[Complex, Complex]:
     """Return what the torque sees beyond the samples, and the velocity's samples, of each command.
 
     Parameters
     ----------
     model : DriveModel
-    omega_rad_s : array, shape (m,)
-        Of lines that follow each other.
-    interval_s : float
-        Of the ticks.
+    at : Sampling
     after_s : float
         How long after each tick torque and motion were sampled.
-    torque_filter : TorqueFilter, optional
-    angle_alone : bool
-        Whether acceleration and velocity are those of the angle's samples.
 
     Returns
     -------
@@ -713,42 +685,20 @@ def beyond(
     velocity : complex array, shape (m, 1)
         F H*, or jω F (H/s)* of the angle's samples.
     """
-    lines = float(omega_rad_s[0]), float(omega_rad_s[-1]), omega_rad_s.size
-    interval_s, after_s = float(f"{interval_s:.9g}"), round(after_s, 9)
-    return _beyond(model, lines, interval_s, after_s, torque_filter, angle_alone)
-
-
-@lru_cache(maxsize=128)
-def _beyond(
-    model: DriveModel,
-    lines: tuple[float, float, int],
-    interval_s: float,
-    after_s: float,
-    torque_filter: TorqueFilter | None,
-    angle_alone: bool,
-) -> tuple[Complex, Complex]:
-    omega = np.linspace(*lines)
-    z = np.exp(1j * omega * interval_s)
-    seen = motion = model.transfer(z, interval_s, after_s)
-    through: Complex = np.ones(omega.size, dtype=np.complex128)
-    if torque_filter is not None:
-        through = lowpass(np.asarray(1j * omega), *torque_filter)
-        seen = model.smoothed(*torque_filter).transfer(z, interval_s, after_s)
-    velocity = 1j * omega * motion[2] if angle_alone else motion[1]
-    sampled = through * np.stack([1j * omega * velocity, velocity, motion[2]])
+    omega = np.linspace(*at.lines_rad_s)
+    z = np.exp(1j * omega * at.interval_s)
+    motion = model.transfer(z, at.interval_s, after_s)
+    behind = Drive(model).behind(at.torque_filter).model
+    seen = motion if behind is model else behind.transfer(z, at.interval_s, after_s)
+    velocity = 1j * omega * motion[2] if at.angle_alone else motion[1]
+    sampled = np.stack([1j * omega * velocity, velocity, motion[2]])
+    sampled = passed(at.torque_filter, omega) * sampled
     return (seen - sampled).T, sampled[1][:, None]
 
 
 def alternatives(
-    drive: Drive,
-    motion: Complex,
-    sent: Complex,
-    omega_rad_s: Array,
-    interval_s: float,
-    after_s: Array,
-    torque_filter: TorqueFilter | None = None,
-    angle_alone: bool = False,
-) -> list[Complex]:
+    drive: Drive, motion: Complex, sent: Complex, at: Sampling, after_s: Array
+) -> Complex:
     """Return how the lines of the motion change: first without a drive, then with others.
 
     One that tells a little less, the rivals, samples that kept step with the ticks where it may be
@@ -760,27 +710,21 @@ def alternatives(
     motion : complex array, shape (m, 3)
     sent : complex array, shape (m, 1)
         Lines of the command.
-    omega_rad_s, interval_s, torque_filter, angle_alone
-        Those of `beyond`.
+    at : Sampling
     after_s : array
         How long the command was in force at each sample of the torque.
     """
-
-    def seen(model: DriveModel, late_s: float) -> tuple[Complex, Complex]:
-        at = omega_rad_s, interval_s, late_s, torque_filter
-        return beyond(model, *at, angle_alone=angle_alone)
-
-    mean_s = float(np.mean(after_s))
-    ours, velocity = seen(drive.model, mean_s)
-    changes = [-ours, -INEXACT * ours, *(seen(one, mean_s)[0] - ours for one in drive.rivals)]
-    turns = complex(np.mean(np.exp(2j * np.pi * after_s / interval_s)))
-    scattered = np.ptp(after_s) >= ON_EDGE * interval_s
+    mean_s = round(float(np.mean(after_s)), 9)
+    ours, velocity = beyond(drive.model, at, mean_s)
+    changes = [-ours, -INEXACT * ours, *(beyond(one, at, mean_s)[0] - ours for one in drive.rivals)]
+    turns = complex(np.mean(np.exp(2j * np.pi * after_s / at.interval_s)))
+    scattered = np.ptp(after_s) >= ON_EDGE * at.interval_s
     if scattered and SCATTERED / np.sqrt(after_s.size) <= abs(turns) <= 1.0 - ON_EDGE**2:
-        kept_s = cmath.phase(turns) / (2 * math.pi) % 1.0 * interval_s
+        kept_s = cmath.phase(turns) / (2 * math.pi) % 1.0 * at.interval_s
         late = np.quantile(after_s, np.linspace(0.05, 0.95, 10))
-        there = np.mean([seen(drive.model, one)[0] for one in late.tolist()], axis=0)
-        changes.append(seen(drive.model, kept_s)[0] - there)
-    return [*(one * sent for one in changes), ours * (motion[:, 1:2] / velocity - sent)]
+        there = np.mean([beyond(drive.model, at, one)[0] for one in late.tolist()], axis=0)
+        changes.append(beyond(drive.model, at, kept_s)[0] - there)
+    return np.stack([*(one * sent for one in changes), ours * (motion[:, 1:2] / velocity - sent)])
 
 
 def ticks_hz(rig: RigSettings, torque: Channel) -> float:
@@ -792,16 +736,10 @@ def ticks_hz(rig: RigSettings, torque: Channel) -> float:
     return rig.tick_rate_hz if stated else min(rig.tick_rate_hz, torque.rate_hz)
 
 
-def without_drive(
-    motion: Complex,
-    rig: RigSettings,
-    torque: Channel,
-    torque_filter: TorqueFilter | None,
-    omega_rad_s: Array,
-) -> list[Complex]:
+def without_drive(motion: Complex, rig: RigSettings, at: Sampling) -> Complex:
     """Return `alternatives` where the drive is not known: none, and that of the settings."""
     model = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
-    seen, velocity = beyond(model, omega_rad_s, 1.0 / ticks_hz(rig, torque), 0.0, torque_filter)
-    change = np.zeros_like(motion)
-    change[:, 0] = seen[:, 0] / velocity[:, 0] * motion[:, 1]
-    return [np.zeros_like(change), change]
+    seen, velocity = beyond(model, at, 0.0)
+    changes = np.zeros((2, *motion.shape), dtype=np.complex128)
+    changes[1, :, 0] = seen[:, 0] / velocity[:, 0] * motion[:, 1]
+    return changes

@@ -15,14 +15,15 @@ highest line or more.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from rigidimeter.analysis.estimate_anew.signals import uniform_grid
 from rigidimeter.core.records import Channel
 from rigidimeter.core.settings import FEWEST_LINES
 
@@ -119,16 +120,21 @@ class Grid:
         -------
         complex array, shape (derivatives + 1, ..., m)
         """
-        return self._by_parts(values, self.window, derivatives)[0]
-
-    def lines_and_noise(self, values: Array, derivatives: int = 0) -> tuple[Complex, Complex]:
-        """Return `lines`, and half the difference of what even and odd samples give.
-
-        That is the spectrum as far below half the rate as the line is above zero: noise alone
-        where the motion is slow.
-        """
-        found, apart = self._by_parts(values, self.window, derivatives, halves=True)
-        return found, apart
+        w, slope, bend = self.window
+        x = values - ((values @ (w * w)) / self.energy)[..., None]
+        through = np.stack([part * x for part in self.window[: derivatives + 1]])
+        place = slice(int(self.line[0]), int(self.line[-1]) + 1)
+        spectra = scipy.fft.rfft(through)[..., place]
+        turn, found = 1j * self.omega_rad_s, [spectra[0]]
+        if derivatives > 0:
+            found.append(turn * spectra[0] - spectra[1])
+        if derivatives > 1:
+            found.append(turn**2 * spectra[0] - 2 * turn * spectra[1] + spectra[2])
+        # The mean of a derivative: ∫ w² x' dt = −∫ (w²)' x dt.
+        means = -2 * (x @ (w * slope)), 2 * (x @ (w * bend + slope * slope))
+        for own, mean in zip(found[1:], means, strict=False):
+            own -= self.constant * (mean / self.energy)[..., None]
+        return np.stack(found)
 
     def coarse(self, values: Array) -> Array:
         """Return low-passed samples, one of `step`, shape (..., n / step)."""
@@ -158,12 +164,10 @@ class Grid:
     def coarse_motion(self, velocity: Array, angle: Array) -> Complex:
         """Return the lines of acceleration, velocity and angle of coarse samples, shape (m, 3)."""
         w, slope, _ = self.coarse_window
-        both = np.stack([velocity, angle])
-        both = both - ((both @ (w * w)) / (w @ w))[:, None]
-        through = np.stack([w * both[0], slope * both[0], w * both[1]])
-        v, turning, found = self.step * scipy.fft.rfft(through)[..., self.line]
-        mean = 2 * self.step / self.energy * float(both[0] @ (w * slope))
-        return np.stack([1j * self.omega_rad_s * v - turning + mean * self.constant, v, found], 1)
+        v, x = self.coarse_lines(np.stack([velocity, angle]))
+        mean = 2 * self.step / self.energy * float(velocity @ (w * slope))
+        a = 1j * self.omega_rad_s * v - self.coarse_lines(velocity, slope) + mean * self.constant
+        return np.stack([a, v, x], 1)
 
     def in_time(self, lines: Complex) -> Array:
         """Return signals of few samples, shape (..., t).
@@ -175,52 +179,9 @@ class Grid:
         spectrum[..., self.line] = lines
         return np.asarray(scipy.fft.irfft(spectrum, n) * np.sqrt(n / 2))
 
-    def _by_parts(
-        self, values: Array, window: Array, derivatives: int, *, halves: bool = False
-    ) -> list[Complex]:
-        """Return the lines, free of the means of x, x', x'', and half the differences."""
-        w, slope, bend = window
-        x = values - ((values @ (w * w)) / self.energy)[..., None]
-        through = np.stack([part * x for part in window[: derivatives + 1]])
-        turn = 1j * self.omega_rad_s
-        # The mean of a derivative: ∫ w² x' dt = −∫ (w²)' x dt.
-        means = [-2 * (x @ (w * slope)), 2 * (x @ (w * bend + slope * slope))][:derivatives]
-        found = []
-        for spectra, constant in self._spectra(through, halves):
-            lines = [spectra[0]]
-            if derivatives > 0:
-                lines.append(turn * spectra[0] - spectra[1])
-            if derivatives > 1:
-                lines.append(turn**2 * spectra[0] - 2 * turn * spectra[1] + spectra[2])
-            for own, mean in zip(lines[1:], means, strict=True):
-                own -= constant * (mean / self.energy)[..., None]
-            found.append(np.stack(lines))
-        return found
-
-    def _spectra(self, through: Array, halves: bool) -> list[tuple[Complex, Complex | float]]:
-        n, place = through.shape[-1], slice(int(self.line[0]), int(self.line[-1]) + 1)
-        whole = scipy.fft.rfft(through)
-        found: list[tuple[Complex, Complex | float]] = [(whole[..., place], self.constant)]
-        if halves and n % 2 == 0:
-            found.append((whole[..., n // 2 - self.line].conj(), 0.0))
-        elif halves:
-            through = through.copy()
-            through[..., 1::2] *= -1
-            found.append((scipy.fft.rfft(through)[..., place], 0.0))
-        return found
-
     def part(self, lines: slice) -> Grid:
         """Return the grid with some of its lines in a row."""
-        return Grid(
-            self.time_s,
-            self.rate_hz,
-            self.window,
-            self.line[lines],
-            self.energy,
-            self.constant[lines],
-            self.spread,
-            self.step,
-        )
+        return replace(self, line=self.line[lines], constant=self.constant[lines])
 
 
 def grid_of(
@@ -228,7 +189,7 @@ def grid_of(
     band_hz: tuple[float, float],
     taper_s: float,
     holes_s: Sequence[tuple[float, float]] = (),
-    count: Callable[[int, float], int] | None = None,
+    period_s: float | None = None,
 ) -> Grid:
     """Return the grid at the stamps of the first channel, where all overlap.
 
@@ -242,9 +203,9 @@ def grid_of(
     taper_s : float
     holes_s : sequence of (float, float)
         What is left out, on the clock of the channels.
-    count : callable, optional
-        From how many samples there are, and their rate, to how many to use, from the end; otherwise
-        as many as make a fast FFT, from the start.
+    period_s : float, optional
+        As many whole periods as there are, at the end; otherwise as many samples as make a fast
+        FFT, from the start.
 
     Raises
     ------
@@ -252,8 +213,9 @@ def grid_of(
         If the band holds too few lines for three parameters.
     """
     time_s, rate_hz = _even_times(channels)
-    if count is not None:
-        time_s = time_s[time_s.size - count(time_s.size, rate_hz) :]
+    if period_s is not None:
+        periods = int(time_s.size / rate_hz / period_s + 1e-6)
+        time_s = time_s[time_s.size - round(periods * period_s * rate_hz) :]
     elif time_s.size:
         time_s = time_s[: scipy.fft.prev_fast_len(time_s.size, real=True)]
     begin_s = float(time_s[0]) if time_s.size else 0.0
@@ -263,18 +225,20 @@ def grid_of(
 
 
 def _even_times(channels: Sequence[Channel]) -> tuple[Array, float]:
-    first = channels[0]
-    rate_hz = first.rate_hz
+    first, rate_hz = channels[0], channels[0].rate_hz
     near_s = SAME_TIME / rate_hz
-    begin_s = max(float(one.time_s[0]) for one in channels)
-    end_s = min(float(one.time_s[-1]) for one in channels)
-    own = first.time_s[slice(*np.searchsorted(first.time_s, [begin_s - near_s, end_s + near_s]))]
-    if own.size > 1:
-        even = own[0] + np.arange(own.size) * ((own[-1] - own[0]) / (own.size - 1))
-        if np.max(np.abs(own - even)) < near_s:
-            return own, (own.size - 1) / float(own[-1] - own[0])
-    count = int(np.floor((end_s - begin_s) * rate_hz + 1e-6)) + 1 if end_s >= begin_s else 0
-    return np.minimum(begin_s + np.arange(count) / rate_hz, end_s), rate_hz
+    begin_s = max(float(one.time_s[0]) for one in channels) - near_s
+    end_s = min(float(one.time_s[-1]) for one in channels) + near_s
+    own = first.time_s[slice(*np.searchsorted(first.time_s, [begin_s, end_s]))]
+    if own.size > 1 and np.max(np.abs(own - np.linspace(own[0], own[-1], own.size))) < near_s:
+        return own, (own.size - 1) / float(own[-1] - own[0])
+    return uniform_grid(channels, rate_hz), rate_hz
+
+
+def lines_of(band_hz: tuple[float, float], duration_s: float) -> tuple[int, int]:
+    """Return the first line of a band, which is below it, and the one after the last."""
+    low, high = (edge * duration_s for edge in band_hz)
+    return max(int(np.ceil(low - 1e-6)) - 1, 1), int(high + 1e-6) + 1
 
 
 @lru_cache(maxsize=32)
@@ -282,8 +246,7 @@ def _layout(
     n: int, rate_hz: float, band_hz: tuple[float, float], taper_s: float, holes_s: Holes
 ) -> tuple[Array, NDArray[np.intp], float, Complex, float, int]:
     """Return what does not depend on where an epoch begins."""
-    low, high = (edge * n / rate_hz for edge in band_hz)
-    line = np.arange(max(int(np.ceil(low - 1e-6)) - 1, 1), int(high + 1e-6) + 1, dtype=np.intp)
+    line = np.arange(*lines_of(band_hz, n / rate_hz), dtype=np.intp)
     if line.size < FEWEST_LINES:
         raise ValueError(
             f"{n / rate_hz:.3g} s hold {line.size} spectral lines from {band_hz[0]:g} to "
@@ -301,29 +264,18 @@ def _layout(
 
 
 def _window(n: int, rate_hz: float, taper_s: float, holes_s: Holes) -> Array:
-    """Return w, w', w''."""
-    from_start_s = (np.arange(n) + 0.5) / rate_hz
-    rising = from_start_s < n / rate_hz / 2
-    window = _edge(np.where(rising, from_start_s, n / rate_hz - from_start_s), taper_s, rising)
-    at_s = np.arange(n) / rate_hz
-    for begin_s, end_s in holes_s:
+    """Return w, w', w'': the product of raised cosines of the distance from each hole."""
+    at_s, early_s = np.arange(n) / rate_hz, 0.5 / rate_hz
+    window = np.stack([np.ones(n), np.zeros(n), np.zeros(n)])
+    turn = np.pi / max(taper_s, 1e-3 / rate_hz)
+    for begin_s, end_s in [(-np.inf, -early_s), (n / rate_hz - early_s, np.inf), *holes_s]:
         away_s = np.maximum(np.maximum(begin_s - at_s, at_s - end_s), 0.0)
-        f, df, d2f = _edge(away_s, taper_s, at_s > end_s)
+        phase = np.minimum(turn * away_s, np.pi)
+        f, df = 0.5 - 0.5 * np.cos(phase), 0.5 * turn * np.sin(phase) * np.sign(at_s - end_s)
+        d2f = np.where((away_s > 0) & (phase < np.pi), 0.5 * turn**2 * np.cos(phase), 0.0)
         w, dw, d2w = window
-        d2f = np.where(away_s > 0, d2f, 0.0)
         window = np.stack([w * f, dw * f + w * df, d2w * f + 2 * dw * df + w * d2f])
     return window
-
-
-def _edge(away_s: Array, taper_s: float, rising: NDArray[np.bool_]) -> Array:
-    """Return a raised cosine of the distance from an edge, and its derivatives in time."""
-    if not taper_s > 0:
-        return np.stack([np.ones(away_s.size), np.zeros(away_s.size), np.zeros(away_s.size)])
-    turn = np.pi / taper_s
-    phase = np.minimum(turn * away_s, np.pi)
-    slope = 0.5 * turn * np.sin(phase)
-    bend = np.where(phase < np.pi, 0.5 * turn**2 * np.cos(phase), 0.0)
-    return np.stack([0.5 - 0.5 * np.cos(phase), np.where(rising, slope, -slope), bend])
 
 
 @lru_cache(maxsize=8)

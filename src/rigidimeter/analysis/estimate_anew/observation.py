@@ -10,8 +10,8 @@ The perturbation alone causes, from rest and without noise,
     θ = H A P / (1 + L(J, B, K))
 
 with the admittance A and the loop gain L of the settings (`rigidimeter.model.Loop`) and the drive
-H. It carries nothing of what the subject does. A wrong loop makes it a weaker instrument, not a wrong
-one; a loop that would be unstable with the joint was not the one that moved it, and is opened.
+H. It carries nothing of what the subject does. A wrong loop makes it a weaker instrument, not a
+wrong one; a loop that would be unstable with the joint did not move it, and is opened.
 """
 
 from __future__ import annotations
@@ -26,24 +26,37 @@ from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimate_anew.drive import (
     Drive,
+    Sampling,
     TorqueFilter,
     alternatives,
-    behind,
     beyond,
+    passed,
     since_ticks,
+    ticks_hz,
     without_drive,
 )
-from rigidimeter.analysis.estimate_anew.grid import SAME_TIME, Array, Complex, Grid, grid_of
+from rigidimeter.analysis.estimate_anew.grid import (
+    SAME_TIME,
+    Array,
+    Complex,
+    Grid,
+    grid_of,
+    lines_of,
+)
 from rigidimeter.analysis.estimate_anew.signals import (
     angle_at,
+    columns_at,
+    held_at,
     motion_channels,
     sampled,
+    uniform_grid,
+    usable_hz,
     values_at,
     velocity_at,
 )
 from rigidimeter.core.records import Channel, Epoch
-from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE, Settings
-from rigidimeter.model import ON_EDGE, Loop, lowpass, on_circle
+from rigidimeter.core.settings import Settings
+from rigidimeter.model import ON_EDGE, Loop, on_circle
 
 LEAST = np.array([1e-5, 1e-3, 1e-2])
 """Smallest J, B and K that a loop is simulated with, so that it is stable."""
@@ -115,12 +128,10 @@ class Cause:
         turned = float(np.sum(np.angle(around[1:] * around[:-1].conj())))
         command = self.command if turned < -0.5 * np.pi else self.command / around
         motion = scipy.fft.irfft(self.motion * command, self.samples) * self.raising
-        count = self.grid.coarse_time_s.size
         if self.at_s is not None:
-            motion = scipy.interpolate.CubicSpline(self.at_s, motion, axis=1)(
-                self.grid.coarse_time_s
-            )
-        motion = motion[:, :count]
+            spline = scipy.interpolate.CubicSpline(self.at_s, motion, axis=1)
+            motion = spline(self.grid.coarse_time_s)
+        motion = motion[:, : self.grid.coarse_time_s.size]
         return Caused(self.grid.coarse_lines(motion).T, motion[1:])
 
 
@@ -230,9 +241,8 @@ def loop_of(settings: Settings, torque_rate_hz: float, drive: Drive | None) -> L
 
 def torque_filter_of(settings: Settings) -> TorqueFilter | None:
     """Return cutoff in Hz and order of the low-pass that the settings name; None for none."""
-    estimation = settings.estimation
-    cutoff_hz = estimation.torque_lowpass_hz
-    return TorqueFilter(cutoff_hz, estimation.torque_lowpass_order) if cutoff_hz else None
+    cutoff_hz = settings.estimation.torque_lowpass_hz
+    return (cutoff_hz, settings.estimation.torque_lowpass_order) if cutoff_hz else None
 
 
 def observe(
@@ -265,167 +275,110 @@ def observe(
     ValueError
         If the epoch cannot be used so; the text says why.
     """
-    channels = epoch.channels
-    torque, perturbation = channels["torque_nm"], channels.get("perturbation_nm")
-    moving = motion_channels(epoch)
-    caused, periods, count = causes is not None, 1, None
+    torque, estimation = epoch.channels["torque_nm"], settings.estimation
+    perturbation, caused = epoch.channels.get("perturbation_nm"), causes is not None
     if caused and (reason := no_instrument(epoch)):
         raise ValueError(reason)
-    if periodic:
-        assert perturbation is not None  # else there was a reason
-
-        def count(available: int, rate_hz: float) -> int:
-            nonlocal periods
-            periods, samples = _whole_periods(_while(perturbation, torque), rate_hz, available)
-            return samples
-
-    band_hz = _band_hz(epoch, settings, drive, alone=not caused)
-    wide_hz = band_hz
-    if caused and not periodic:
-        highest_hz = _usable_hz(torque, moving, drive)
-        wide_hz = WIDER[0] * band_hz[0], min(WIDER[1] * band_hz[1], highest_hz)
-    used = [torque, *moving, *([perturbation] if perturbation is not None else [])]
-    holes = [one[:2] for one in epoch.left_out]
-    grid = grid_of(used, wide_hz, settings.estimation.trim_s, holes, count)
-    observed = replace(
-        _at_lines(epoch, settings, grid, drive, noise=not caused), loop=loop, periods=periods
-    )
-    if causes is not None:
-        assert perturbation is not None and loop is not None  # instruments need both
-        ticks = _evenly(perturbation)
-        observed = replace(observed, cause=_cause(ticks, loop, grid, causes))
-    if wide_hz == band_hz:
-        return observed
-    low, high = (edge * grid.duration_s for edge in band_hz)
-    first, last = max(int(np.ceil(low - 1e-6)) - 1, 1), int(high + 1e-6)
-    start, stop = np.searchsorted(grid.line, [first, last + 1])
-    return replace(observed.part(slice(int(start), int(stop))), wider=observed)
-
-
-def _band_hz(
-    epoch: Epoch, settings: Settings, drive: Drive | None, *, alone: bool
-) -> tuple[float, float]:
-    """Return the band of the fit; `alone` says whether the motion is its own instrument."""
-    torque, moving = epoch.channels["torque_nm"], motion_channels(epoch)
-    usable_hz, low_hz = _usable_hz(torque, moving, drive), settings.estimation.band_low_hz
-    if alone and drive is None:
+    moving = motion_channels(epoch)
+    usable, low_hz = usable_hz(epoch, drive is not None), estimation.band_low_hz
+    high_hz = min(estimation.band_high_closed_loop_hz, usable)
+    if not caused and drive is None:
         # Higher, noise of the motion that no half of the samples shows would count as motion.
         slowest = min(one.rate_hz for one in (torque, *moving))
-        usable_hz = min(usable_hz, max(slowest / DENSE, NARROWEST * low_hz))
-    return low_hz, min(settings.estimation.band_high_closed_loop_hz, usable_hz)
-
-
-def _usable_hz(torque: Channel, moving: Sequence[Channel], drive: Drive | None) -> float:
-    limiting = [torque] if drive is not None else [torque, *moving]
-    return USABLE_FRACTION_OF_RATE * min(one.rate_hz for one in limiting)
+        high_hz = min(high_hz, max(slowest / DENSE, NARROWEST * low_hz))
+    band_hz = wide_hz = low_hz, high_hz
+    if caused and not periodic:
+        wide_hz = WIDER[0] * low_hz, min(WIDER[1] * high_hz, usable)
+    used = [torque, *moving, *([perturbation] if perturbation is not None else [])]
+    repeats_s = _repeated_s(perturbation, used) if periodic and perturbation else None
+    holes = [one[:2] for one in epoch.left_out]
+    grid = grid_of(used, wide_hz, estimation.trim_s, holes, repeats_s)
+    observed = _at_lines(epoch, settings, grid, drive, loop, noise=not caused)
+    if repeats_s is not None:
+        observed = replace(observed, periods=round(grid.duration_s / repeats_s))
+    if causes is not None and perturbation is not None and loop is not None:
+        observed = replace(observed, cause=_cause(_evenly(perturbation), loop, grid, causes))
+    if wide_hz == band_hz:
+        return observed
+    start, stop = np.searchsorted(grid.line, lines_of(band_hz, grid.duration_s)).tolist()
+    return replace(observed.part(slice(start, stop)), wider=observed)
 
 
 def _at_lines(
-    epoch: Epoch, settings: Settings, grid: Grid, drive: Drive | None, *, noise: bool
+    epoch: Epoch,
+    settings: Settings,
+    grid: Grid,
+    drive: Drive | None,
+    loop: Loop | None,
+    *,
+    noise: bool,
 ) -> Observation:
-    """Return torque and motion at the lines, without loop and cause."""
+    """Return torque and motion at the lines, without a cause."""
     torque, command = epoch.channels["torque_nm"], epoch.channels.get("velocity_command_rad_s")
-    moving, through_filter = motion_channels(epoch), torque_filter_of(settings)
-    own = {
-        one.name: one.values[place]
-        for one in moving
-        if (place := sampled(one, grid.time_s, SAME_TIME)) is not None
-    }
-    recorded = "angle_rad" in own and len(own) == len(moving)
-    through: Complex = np.ones(grid.line.size, dtype=np.complex128)
-    if through_filter is not None:
-        through = lowpass(np.asarray(1j * grid.omega_rad_s), *through_filter)
-    torque_nm = grid.lines(values_at(torque, grid.time_s, SAME_TIME))[0]
-    driven: Array | None = None
+    time_s, channels = grid.time_s, epoch.channels
+    through, recorded, driven, seen = (
+        torque_filter_of(settings),
+        "angle_rad" in channels,
+        None,
+        epoch,
+    )
+    recorded &= all(sampled(one, time_s, SAME_TIME) for one in motion_channels(epoch))
+    lines_rad_s = float(grid.omega_rad_s[0]), float(grid.omega_rad_s[-1]), grid.line.size
+    at = Sampling(lines_rad_s, 1.0 / ticks_hz(settings.rig, torque), through)
     if drive is not None and command is not None:
-        tick, after_s = since_ticks(command, _stamps_s(torque, grid.time_s), 0.0)
-        interval_s = 1.0 / command.mean_rate_hz
+        interval_s = float(f"{1.0 / command.mean_rate_hz:.9g}")
+        at = Sampling(lines_rad_s, interval_s, through, "velocity_rad_s" not in channels)
+        place = sampled(torque, time_s, SAME_TIME)
+        tick, after_s = since_ticks(command, torque.time_s[place] if place else time_s, 0.0)
         recorded &= bool(np.all(np.diff(tick) == 1) and np.ptp(after_s) < 2 * ON_EDGE * interval_s)
         if not recorded:
-            seen = behind(drive, through_filter).motion(command, torque.time_s)
-            driven = np.stack(
-                [
-                    values_at(Channel(torque.name, torque.time_s, one), grid.time_s, SAME_TIME)
-                    for one in seen
-                ]
-            )
-    if recorded:
-        angle, velocity = own["angle_rad"], own.get("velocity_rad_s")
-    else:
-        rest = epoch if driven is None else _without(epoch, drive, command)
-        angle, velocity = angle_at(rest, grid.time_s), velocity_at(rest, grid.time_s)
-    dense = recorded and grid.rate_hz >= DENSE * grid.band_hz[1]
-    motion, apart = _motion_lines(grid, angle, velocity, halves=noise and dense)
-    motion = motion * through[:, None]
-    if velocity is None:
-        velocity = velocity_at(epoch, grid.time_s)
+            caused = drive.behind(through).motion(command, torque.time_s)
+            driven, seen = columns_at(torque, caused, time_s, SAME_TIME), drive.beyond(epoch)
+    angle, velocity = angle_at(seen, time_s, SAME_TIME), velocity_at(seen, time_s, SAME_TIME)
+    angle, passing = angle - np.mean(angle), passed(through, grid.omega_rad_s)[:, None]
+    own = None if recorded and "velocity_rad_s" not in channels else velocity
+    motion, apart = passing * _motion_lines(grid, angle, own), None
+    if noise and recorded and grid.rate_hz >= DENSE * grid.band_hz[1]:
+        # As far below half the rate as the lines are above zero there is noise alone.
+        turned = np.where(np.arange(time_s.size) % 2, -1.0, 1.0)
+        apart = passing * _motion_lines(grid, turned * angle, None if own is None else turned * own)
     if driven is not None:
         motion = motion + grid.lines(driven)[0].T
-        angle, velocity = angle + driven[2], velocity + driven[1]
-    made = Observation(
+        angle, velocity = angle + driven[2] - np.mean(driven[2]), velocity + driven[1]
+    changes = without_drive(motion, settings.rig, at)
+    if drive is not None and command is not None:
+        sent = grid.lines(command.values[tick])[0][:, None]
+        if recorded:
+            motion = motion + sent * beyond(drive.model, at, round(float(np.mean(after_s)), 9))[0]
+        stamped_s = since_ticks(command, torque.time_s, 0.0)[1]
+        changes = alternatives(drive, motion, sent, at, stamped_s)
+    return Observation(
         epoch,
         settings,
         grid,
-        torque_nm,
+        grid.lines(values_at(torque, time_s, SAME_TIME))[0],
         motion,
-        grid.coarse(np.stack([velocity, angle - np.mean(angle)])),
-        None if apart is None else apart * through[:, None],
-        np.empty((0, *motion.shape)),
+        grid.coarse(np.stack([velocity, angle])),
+        apart,
+        changes,
+        loop,
+        drive_known=drive is not None and command is not None,
     )
-    if drive is None or command is None:
-        changes = without_drive(motion, settings.rig, torque, through_filter, grid.omega_rad_s)
-        return replace(made, changes=np.stack(changes))
-    sent = grid.lines(command.values[tick])[0][:, None]
-    alone = "velocity_rad_s" not in epoch.channels
-    if recorded:
-        late_s = float(np.mean(after_s))
-        at = grid.omega_rad_s, interval_s, late_s, through_filter
-        motion = motion + sent * beyond(drive.model, *at, angle_alone=alone)[0]
-    _, stamped_s = since_ticks(command, torque.time_s, 0.0)
-    changes = alternatives(
-        drive, motion, sent, grid.omega_rad_s, interval_s, stamped_s, through_filter, alone
-    )
-    return replace(made, motion=motion, changes=np.stack(changes), drive_known=True)
 
 
-def _stamps_s(torque: Channel, time_s: Array) -> Array:
-    """Return the stamps that the torque has at even times."""
-    place = sampled(torque, time_s, SAME_TIME)
-    return time_s if place is None else torque.time_s[place]
-
-
-def _without(epoch: Epoch, drive: Drive | None, command: Channel | None) -> Epoch:
-    """Return the epoch with what its motion sensors saw beyond what the command causes."""
-    assert drive is not None and command is not None
-    rest = dict(epoch.channels)
-    for one in motion_channels(epoch):
-        row = 2 if one.name == "angle_rad" else 1
-        seen = drive.motion(command, one.time_s)[row]
-        rest[one.name] = Channel(one.name, one.time_s, one.values - seen)
-    return replace(epoch, channels=rest)
-
-
-def _motion_lines(
-    grid: Grid, angle: Array, velocity: Array | None, *, halves: bool
-) -> tuple[Complex, Complex | None]:
-    """Return acceleration, velocity and angle at the lines, and half the differences: (m, 3)."""
-    read = grid.lines_and_noise if halves else lambda *of: (grid.lines(*of),)
+def _motion_lines(grid: Grid, angle: Array, velocity: Array | None) -> Complex:
+    """Return acceleration, velocity and angle at the lines, shape (m, 3)."""
     if velocity is None:
-        found = [part[::-1].T for part in read(angle, 2)]
-    else:
-        parts = zip(read(velocity, 1), read(angle, 0), strict=True)
-        found = [np.concatenate([fast[::-1], slow]).T for fast, slow in parts]
-    return found[0], found[1] if halves else None
+        return grid.lines(angle, 2)[::-1].T
+    return np.concatenate([grid.lines(velocity, 1)[::-1], grid.lines(angle)]).T
 
 
 def _cause(ticks: Channel, loop: Loop, grid: Grid, causes: list[tuple[Array, Cause]]) -> Cause:
     """Return what of the response to a perturbation does not change with the joint."""
     begin_s, rate_hz = float(grid.time_s[0] - ticks.time_s[0]), ticks.mean_rate_hz
-    key = np.array(
-        [round(begin_s * 1e9), round(1e6 * rate_hz), grid.time_s.size, round(1e6 * grid.rate_hz),
-         hash((loop, grid.window[0].tobytes() if np.any(grid.window[0][1:-1] == 0) else 0))]
-    )  # fmt: skip
-    whole = np.concatenate([key.astype(float), ticks.values])
+    holed = grid.window[0].tobytes() if np.any(grid.window[0][1:-1] == 0) else 0
+    key = round(begin_s * 1e9), round(1e6 * rate_hz), round(1e6 * grid.rate_hz), hash((loop, holed))
+    whole = np.concatenate([[float(one) for one in key], [grid.time_s.size], ticks.values])
     for known, made in causes:
         if np.array_equal(known, whole):
             return made
@@ -438,22 +391,21 @@ def _cause(ticks: Channel, loop: Loop, grid: Grid, causes: list[tuple[Array, Cau
     samples, at_s = round(wanted), None
     if abs(wanted - samples) > 1e-6 * samples:
         samples = 4 * samples
-        at_s = begin_s + span_s / samples * np.arange(samples)
+        at_s = grid.time_s[0] + span_s / samples * np.arange(samples)
     held = np.pad(ticks.values, (0, circle.damping.size - len(ticks)))
     bins, ticks_show = int(wanted / 2) + 1, circle.length // 2 + 1
-    passed = _rolled_off(bins) if bins < ticks_show else np.ones(ticks_show)
-    bins = passed.size
+    through = _rolled_off(bins) if bins < ticks_show else np.ones(ticks_show)
+    bins = through.size
     shift = np.exp(2j * np.pi * begin_s / span_s * np.arange(bins)) * (samples / circle.length)
     decay_1_s = -float(np.log(circle.damping[1])) * rate_hz
-    raising = np.exp(decay_1_s * (begin_s + span_s / samples * np.arange(samples)))
     made = Cause(
         grid,
         (circle.to(held) * circle.loop.admittance)[:bins],
         (circle.loop.forward * circle.loop.read)[:, :bins],
-        circle.loop.sensed[:, :bins] * (passed * shift),
+        circle.loop.sensed[:, :bins] * (through * shift),
         samples,
-        raising,
-        None if at_s is None else np.asarray(at_s + float(ticks.time_s[0])),
+        np.exp(decay_1_s * (begin_s + span_s / samples * np.arange(samples))),
+        at_s,
     )
     causes.append((whole, made))
     return made
@@ -469,22 +421,14 @@ def _rolled_off(bins: int) -> Array:
     return np.asarray(x**4 * (35 - 84 * x + 70 * x**2 - 20 * x**3))
 
 
-def _while(perturbation: Channel, torque: Channel) -> Channel:
-    """Return the perturbation while the torque was sampled: elsewhere it may not be known."""
-    early, late = np.searchsorted(perturbation.time_s, torque.time_s[[0, -1]])
-    rows = slice(int(early), int(late) + 1)
-    return Channel(perturbation.name, perturbation.time_s[rows], perturbation.values[rows])
-
-
 def _evenly(perturbation: Channel) -> Channel:
     """Return the perturbation at every tick: the last level is held where ticks are missing."""
-    interval_s, spacing_s = 1.0 / perturbation.rate_hz, np.diff(perturbation.time_s)
-    if np.ptp(spacing_s) < 0.5 * interval_s:
+    interval_s = 1.0 / perturbation.rate_hz
+    if np.ptp(np.diff(perturbation.time_s)) < 0.5 * interval_s:
         return perturbation
     count = int((perturbation.time_s[-1] - perturbation.time_s[0]) / interval_s + 0.5) + 1
     time_s = perturbation.time_s[0] + interval_s * np.arange(count)
-    last = np.searchsorted(perturbation.time_s, time_s + 0.5 * interval_s, side="right") - 1
-    return Channel(perturbation.name, time_s, perturbation.values[np.maximum(last, 0)])
+    return Channel(perturbation.name, time_s, held_at(perturbation, time_s + 0.5 * interval_s))
 
 
 def period_s(perturbation: Channel) -> float | None:
@@ -505,20 +449,23 @@ def period_s(perturbation: Channel) -> float | None:
     return float(first + np.argmax(correlation[first : first + 3])) / perturbation.mean_rate_hz
 
 
-def _whole_periods(perturbation: Channel, rate_hz: float, samples: int) -> tuple[int, int]:
-    """Return how many whole periods there are in so many samples, and how many samples they are."""
-    period = period_s(perturbation)
-    periods = 0 if period is None else int(samples / rate_hz / period + 1e-6)
-    if period is None or periods < 2:
-        long_s = samples / rate_hz
+def _repeated_s(perturbation: Channel, used: Sequence[Channel]) -> float:
+    """Return the period of a perturbation that is there twice or more while all is sampled."""
+    torque, sent_s = used[0], perturbation.time_s
+    # Before and after it the perturbation may not be known.
+    rows = (sent_s >= torque.time_s[0]) & (sent_s <= torque.time_s[-1])
+    known = Channel(perturbation.name, sent_s[rows], perturbation.values[rows])
+    period, times_s = period_s(known), uniform_grid(used, torque.rate_hz)
+    long_s = times_s.size / torque.rate_hz
+    if period is not None and long_s / period + 1e-6 >= 2:
+        return period
+    shown = f"no period of the perturbation is twice in the {long_s:.3g} s in a row"
+    if period is not None:
         shown = (
-            f"no period of the perturbation is twice in the {long_s:.3g} s in a row"
-            if period is None
-            else f"the perturbation repeats every {period:.3g} s, and of the {2 * period:.3g} s of "
+            f"the perturbation repeats every {period:.3g} s, and of the {2 * period:.3g} s of "
             f"two periods there are {long_s:.3g} s in a row"
         )
-        raise ValueError(
-            f"{shown} that can be used; the spectral method needs two whole periods with nothing "
-            "left out between; use --method iv, which needs none and allows for what is left out"
-        )
-    return periods, round(periods * period * rate_hz)
+    raise ValueError(
+        f"{shown} that can be used; the spectral method needs two whole periods with nothing "
+        "left out between; use --method iv, which needs none and allows for what is left out"
+    )

@@ -93,9 +93,12 @@ def joined(parts: Sequence[Signals]) -> Signals:
     return replace(parts[0], **columns)
 
 
-def usable_hz(epoch: Epoch) -> float:
-    """Return up to which frequency torque and motion were sampled densely enough to be fitted."""
-    used = [epoch.channels["torque_nm"], *motion_channels(epoch)]
+def usable_hz(epoch: Epoch, drive_known: bool = False) -> float:
+    """Return up to which frequency torque and motion were sampled densely enough to be fitted.
+
+    Where the drive is known the motion between its samples is, too.
+    """
+    used = [epoch.channels["torque_nm"], *([] if drive_known else motion_channels(epoch))]
     return USABLE_FRACTION_OF_RATE * min(channel.rate_hz for channel in used)
 
 
@@ -190,19 +193,19 @@ def kinematics(epoch: Epoch, time_s: Array) -> Array:
     return np.stack([slope(time_s), found, angle_at(epoch, time_s)])
 
 
-def angle_at(epoch: Epoch, time_s: Array) -> Array:
+def angle_at(epoch: Epoch, time_s: Array, share: float = AS_SAMPLED) -> Array:
     """Return the angle of `kinematics` alone."""
     if "angle_rad" in epoch.channels:
-        return values_at(epoch.channels["angle_rad"], time_s)
+        return values_at(epoch.channels["angle_rad"], time_s, share)
     velocity = epoch.channels["velocity_rad_s"]
     integral = scipy.interpolate.CubicSpline(velocity.time_s, velocity.values).antiderivative()
     return np.asarray(integral(time_s) - integral(time_s[:1]))
 
 
-def velocity_at(epoch: Epoch, time_s: Array) -> Array:
+def velocity_at(epoch: Epoch, time_s: Array, share: float = AS_SAMPLED) -> Array:
     """Return the velocity of `kinematics` alone."""
     if "velocity_rad_s" in epoch.channels:
-        return values_at(epoch.channels["velocity_rad_s"], time_s)
+        return values_at(epoch.channels["velocity_rad_s"], time_s, share)
     angle = epoch.channels["angle_rad"]
     slope = scipy.interpolate.CubicSpline(angle.time_s, angle.values).derivative()
     return np.asarray(slope(time_s))

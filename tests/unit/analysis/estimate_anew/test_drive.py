@@ -6,6 +6,7 @@ import pytest
 
 from rigidimeter.analysis.estimate_anew.drive import (
     Drive,
+    Sampling,
     alternatives,
     beyond,
     find_drive,
@@ -155,8 +156,8 @@ def test_the_last_tick_before_a_time_is_found_however_the_ticks_came(jitter_s):
 def test_a_drive_of_second_order_hides_the_square_of_its_bandwidth_times_the_tick():
     """At low frequency the torque at the ticks does not see (ω_n T)²/12 of the acceleration."""
     rig, slow = RigSettings(tick_rate_hz=1000.0, drive_bandwidth_hz=50.0), 2 * math.pi * 0.1
-    motion, torque = np.ones((1, 3), dtype=complex), sent(100, 1000.0)
-    none, hidden = without_drive(motion, rig, torque, None, np.array([slow]))
+    motion = np.ones((1, 3), dtype=complex)
+    none, hidden = without_drive(motion, rig, Sampling((slow, slow, 1), 1e-3))
     assert not np.any(none)
     assert (hidden[0, 0] / (1j * slow)).real == pytest.approx(
         -((2 * math.pi * 50.0 / 1000.0) ** 2) / 12, abs=2e-4
@@ -164,13 +165,13 @@ def test_a_drive_of_second_order_hides_the_square_of_its_bandwidth_times_the_tic
 
 
 def test_motion_that_the_command_causes_changes_by_other_drives_alone():
-    omega, command = 2 * math.pi * np.arange(1.0, 30.0), np.ones((29, 1), dtype=complex)
-    seen, velocity = beyond(PI, omega, 1e-3, 0.0)
+    at = Sampling((2 * math.pi, 2 * math.pi * 29, 29), 1e-3)
+    command, (seen, velocity) = np.ones((29, 1), dtype=complex), beyond(PI, at, 0.0)
     motion = np.repeat(velocity * command, 3, axis=1)
     rival = DriveModel.second_order(50.0, 0.7)
-    changes = alternatives(Drive(PI, (rival,)), motion, command, omega, 1e-3, np.zeros(500))
+    changes = alternatives(Drive(PI, (rival,)), motion, command, at, np.zeros(500))
     none, share, other, beside = changes
     np.testing.assert_array_equal(none, -seen * command)
     np.testing.assert_allclose(share, 0.005 * none)
-    np.testing.assert_allclose(other, (beyond(rival, omega, 1e-3, 0.0)[0] - seen) * command)
+    np.testing.assert_allclose(other, (beyond(rival, at, 0.0)[0] - seen) * command)
     np.testing.assert_allclose(beside, 0.0, atol=1e-12 * np.max(np.abs(seen)))
