@@ -67,7 +67,6 @@ from rigidimeter.core.findings import Fact, Finding, found_between
 from rigidimeter.core.records import Analysis, Axis, BandEstimate, Delay, Epoch, Fit, Outcome, Task
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.words import short_names
-from rigidimeter.model import Loop
 
 PUBLISHED = Method(
     name="published",
@@ -92,18 +91,15 @@ Check = Callable[[Observation, Fit, Pull], list[Finding]]
 """From an epoch, its fit, and what torque of the subject does to that, to findings."""
 
 CHECKS: list[Check] = [
-    lambda seen, fit, _: sensors.sensors(seen.epoch, seen.settings, seen.drive_known),
-    lambda seen, fit, _: sensors.velocity(seen.epoch, fit, seen.settings),
+    sensors.sensors,
+    sensors.velocity,
     excitation.excitation,
-    lambda seen, fit, _: sensors.static_torque(seen.epoch, seen.settings),
+    of_fit.following,
+    sensors.static_torque,
     of_fit.residual,
     of_fit.least_squares,
-    lambda seen, fit, pull: motion.pushing(seen, fit, seen.settings, pull),
-    lambda seen, fit, pull: motion.tremor(seen, fit, seen.settings, pull),
-    lambda seen, fit, pull: of_fit.parameters(seen.epoch, fit, pull, seen.settings.diagnostics),
-    lambda seen, fit, pull: of_fit.controller(
-        seen.epoch, fit, pull, seen.settings, of_fit.controller_shown(seen.epoch, seen.settings)
-    ),
+    motion.own_torque,
+    of_fit.parameters,
 ]
 """Every check of an epoch. Code from outside the package may append its own."""
 
@@ -279,13 +275,11 @@ def _observation(
     if ready.obstacle:
         raise ValueError(ready.obstacle)
     epoch, settings, drive = ready.epoch, ready.settings, ready.drive
-    loop: Loop | None = loop_of(settings, epoch.channels["torque_nm"].rate_hz, drive)
-    if causes is None:
-        shown = of_fit.controller_shown(epoch, settings)
-        loop = of_fit.loop_shown(epoch, settings, drive, shown)
+    loop = loop_of(settings, epoch.channels["torque_nm"].rate_hz, drive)
     # A window with a hole would spread excited lines over those between them.
     part = longest_part(epoch) if periodic else epoch
-    return observe(part, settings, drive, loop, causes, periodic=periodic)
+    seen = observe(part, settings, drive, loop, causes, periodic=periodic)
+    return seen if causes is not None else replace(seen, loop=of_fit.loop_shown(seen, drive))
 
 
 def _observed(

@@ -267,12 +267,24 @@ def _spectral_peak(time_s: Array, angle: Array) -> tuple[float, LineShares]:
     """Return the frequency of the strongest line and its share of the power."""
     rate_hz = 1.0 / float(time_s[1] - time_s[0])
     frequency_hz, power = power_lines(angle, rate_hz, tapered=True, longer=4)
+    return strongest_line(frequency_hz, power, 1.0 / float(time_s[-1] - time_s[0]))
+
+
+def strongest_line(frequency_hz: Array, power: Array, line_hz: float) -> tuple[float, LineShares]:
+    """Return the frequency of the angle's strongest line, and its shares of the power.
+
+    Parameters
+    ----------
+    frequency_hz, power : arrays, shape (m,)
+        Of the angle.
+    line_hz : float
+        From one line to the next, one over the duration.
+    """
     inside = (frequency_hz >= LOWEST_HZ) & (frequency_hz <= HIGHEST_HZ)
     if not np.any(power[inside] > 0):
         raise ValueError("the joint does not move")
     peak_hz = float(frequency_hz[inside][np.argmax(power[inside])])
-    resolution_hz = 2.0 / float(time_s[-1] - time_s[0])
-    near = np.abs(frequency_hz - peak_hz) <= max(0.19 * peak_hz, resolution_hz)
+    near = np.abs(frequency_hz - peak_hz) <= max(0.19 * peak_hz, 2.0 * line_hz)
     of_velocity = power * frequency_hz**2 * (frequency_hz <= HIGHEST_HZ)
     shares = (float(one[near].sum() / one.sum()) for one in (power, of_velocity))
     return peak_hz, LineShares(*shares)

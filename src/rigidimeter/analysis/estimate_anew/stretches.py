@@ -22,7 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigidimeter.core.records import Channel, Epoch, LeftOut, Outcome
-from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE, EstimationSettings, Settings
+from rigidimeter.core.settings import (
+    USABLE_FRACTION_OF_RATE,
+    DiagnosticsSettings,
+    EstimationSettings,
+    Settings,
+)
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -73,8 +78,8 @@ def moves(channel: Channel | None) -> bool:
 def sound(epoch: Epoch, time_s: Array, margin_s: float = 0.0) -> NDArray[np.bool_]:
     """Return at which times nothing within `margin_s` is left out."""
     kept = np.ones(time_s.size, dtype=np.bool_)
-    for stretch in epoch.left_out:
-        kept &= (time_s < stretch.start_s - margin_s) | (time_s > stretch.stop_s + margin_s)
+    for start_s, stop_s, *_ in epoch.left_out:
+        kept &= (time_s < start_s - margin_s) | (time_s > stop_s + margin_s)
     return kept
 
 
@@ -84,8 +89,9 @@ def screened(epoch: Epoch, settings: Settings) -> Epoch:
     They stay in where their check is not set to ``exclude``, and where too little would be left:
     then the check speaks of the whole epoch.
     """
-    epoch, levels = bridged(epoch), settings.diagnostics.levels
-    found = [one for one in _bad(epoch, settings) if levels.of(one.check) == "exclude"]
+    epoch, checks = bridged(epoch), settings.diagnostics
+    bad = unmeasured(epoch, checks)
+    found = [one for one in bad if checks.levels.of(one.check) == "exclude"]
     return leaving_out(epoch, found, settings)[0]
 
 
@@ -99,14 +105,11 @@ def leaving_out(epoch: Epoch, found: Sequence[LeftOut], settings: Settings) -> t
         return epoch, ""
     without = replace(epoch, left_out=(*epoch.left_out, *sorted(found)))
     trim_s, most_percent = settings.estimation.trim_s, settings.diagnostics.max_left_out_percent
-    before_s, left_s = used_s(epoch, trim_s), used_s(without, trim_s)
-    taken_percent = 100.0 * (before_s - left_s) / before_s if before_s > 0 else 100.0
-    why = too_little(without, settings.estimation)
+    left = used_s(without, trim_s) / max(used_s(epoch, trim_s), 1e-9)
+    why, taken_percent = too_little(without, settings.estimation), 100.0 * (1.0 - left)
     if taken_percent > most_percent:
-        why = (
-            f"with {trim_s:g} s on each side that would take {taken_percent:.0f} % of the epoch "
-            f"(at most {most_percent:g} %)"
-        )
+        taken = f"{taken_percent:.0f} % of the epoch (at most {most_percent:g} %)"
+        why = f"with {trim_s:g} s on each side that would take {taken}"
     return (epoch, why) if why else (bridged(without), "")
 
 
@@ -137,13 +140,10 @@ def _evenly(channel: Channel, lost: Sequence[LeftOut]) -> Channel:
     if not lost or len(channel) < 2:
         return channel
     steps_s = np.diff(channel.time_s)
-    wide = steps_s >= GAP / channel.mean_rate_hz
-    if not np.any(wide):
-        return channel
     middle_s = channel.time_s[:-1] + 0.5 * steps_s
-    wide &= np.any([(one.start_s < middle_s) & (middle_s < one.stop_s) for one in lost], axis=0)
-    more = np.maximum(np.rint(steps_s * channel.rate_hz) - 1, 0)
-    pieces = np.where(wide, more, 0).astype(np.intp) + 1
+    within = np.any([(one.start_s < middle_s) & (middle_s < one.stop_s) for one in lost], axis=0)
+    within &= steps_s >= GAP / channel.mean_rate_hz
+    pieces = np.maximum(np.rint(steps_s * channel.rate_hz * within).astype(np.intp), 1)
     if np.all(pieces == 1):
         return channel
     rows = np.arange(len(channel))
@@ -163,15 +163,11 @@ def longest_part(epoch: Epoch) -> Epoch:
     if not epoch.left_out:
         return epoch
     start_s, stop_s = _span(epoch)
-    parts, at_s = [], start_s
-    for stretch in (*sorted(epoch.left_out), LeftOut(stop_s, stop_s)):
-        parts.append((at_s, stretch.start_s))
-        at_s = max(at_s, stretch.stop_s)
     if epoch.motion is not None:
         start_s = epoch.motion.start_s
         stop_s = start_s + epoch.motion.duration_s
     # The first of those that are equally long.
-    low_s, high_s = max(parts, key=lambda part: min(part[1], stop_s) - max(part[0], start_s))
+    low_s, high_s = max(_parts(epoch), key=lambda one: min(one[1], stop_s) - max(one[0], start_s))
     channels = dict(epoch.channels)
     for one in fitted_channels(epoch):
         # The ends of a stretch are left out with it.
@@ -180,20 +176,19 @@ def longest_part(epoch: Epoch) -> Epoch:
     return replace(epoch, channels=channels, left_out=())
 
 
+def _parts(epoch: Epoch, margin_s: float = 0.0) -> list[tuple[float, float]]:
+    """Return from when to when nothing is left out, so much further from ends and what is out."""
+    at_s, stop_s = _span(epoch)
+    parts = []
+    for stretch in (*sorted(epoch.left_out), LeftOut(stop_s, stop_s)):
+        parts.append((at_s + margin_s, min(stretch.start_s, stop_s) - margin_s))
+        at_s = max(at_s, stretch.stop_s)
+    return parts
+
+
 def used_s(epoch: Epoch, trim_s: float) -> float:
     """Return for how long an epoch can be used, so much further from its ends and what is out."""
-    at_s, stop_s = _span(epoch)
-    left_s, at_s = 0.0, at_s + trim_s
-    for stretch in (*sorted(epoch.left_out), LeftOut(stop_s, stop_s)):
-        left_s += max(min(stretch.start_s, stop_s) - trim_s - at_s, 0.0)
-        at_s = max(at_s, stretch.stop_s + trim_s)
-    return left_s
-
-
-def left_out_s(epoch: Epoch) -> float:
-    """Return for how long something is left out, without the margins."""
-    start_s, stop_s = _span(epoch)
-    return stop_s - start_s - used_s(epoch, 0.0)
+    return sum(max(stop_s - start_s, 0.0) for start_s, stop_s in _parts(epoch, trim_s))
 
 
 def too_little(epoch: Epoch, settings: EstimationSettings) -> str:
@@ -202,10 +197,8 @@ def too_little(epoch: Epoch, settings: EstimationSettings) -> str:
     least_s = max(settings.min_epoch_s - 2 * trim_s, LEAST_USED_S)
     if not epoch.left_out or (left_s := used_s(epoch, trim_s)) >= least_s * (1 - 1e-3):
         return ""
-    return (
-        f"what is left out, with {trim_s:g} s at each side of it, leaves {left_s:.3g} s; "
-        f"at least {least_s:g} s are needed"
-    )
+    out = f"what is left out, with {trim_s:g} s at each side of it,"
+    return f"{out} leaves {left_s:.3g} s; at least {least_s:g} s are needed"
 
 
 def _span(epoch: Epoch) -> tuple[float, float]:
@@ -214,58 +207,39 @@ def _span(epoch: Epoch) -> tuple[float, float]:
     return start_s, min(float(channel.time_s[-1]) for channel in used)
 
 
-def repeated(epoch: Epoch, channel: Channel, most_s: float, *, extreme: bool = False) -> Rows:
-    """Return the first and last row of runs of one value that neither joint nor command explain.
+def unmeasured(epoch: Epoch, settings: DiagnosticsSettings) -> list[LeftOut]:
+    """Return where a channel hung, or was at the end of its range if it was so too often.
 
-    Runs within what is left out do not count.
-
-    Parameters
-    ----------
-    epoch : Epoch
-    channel : Channel
-    most_s : float
-        Of shorter runs it is not asked why, unless they are extreme.
-    extreme : bool
-        Those of the channel's largest or smallest value alone, `FEWEST_AT_EXTREME` rows or more.
-
-    Returns
-    -------
-    array of int, shape (k, 2)
+    It repeats a value there that neither joint nor command explain. Within what is left out that
+    does not count.
     """
-    values = channel.values
-    edges = np.flatnonzero(np.diff(np.diff(values) == 0, prepend=False, append=False))
-    runs = edges.reshape(-1, 2)
-    if epoch.left_out:
-        before = np.concatenate(([0], np.cumsum(sound(epoch, channel.time_s))))
-        runs = runs[before[runs[:, 1] + 1] > before[runs[:, 0]]]
-    if extreme:
-        runs = runs[np.ptp(runs, axis=1) >= FEWEST_AT_EXTREME - 1]
-        runs = runs[np.isin(values[runs[:, 0]], (np.max(values), np.min(values)))]
-    asked = extreme | (np.ptp(channel.time_s[runs], axis=1) > most_s)
-    kept = np.ones(asked.size, dtype=np.bool_)
-    for place in np.flatnonzero(asked):
-        run = runs[place]
-        told = _as_told(epoch, channel, run, most_s)
-        kept[place] = not (told or _as_the_angle(epoch, channel, run))
-    return runs[kept]
-
-
-def at_extremes_percent(channel: Channel, runs: Rows) -> float:
-    """Return in which share of its samples a channel is in runs."""
-    return 100.0 * float(np.sum(np.ptp(runs, axis=1) + 1)) / len(channel)
-
-
-def _bad(epoch: Epoch, settings: Settings) -> list[LeftOut]:
-    """Return where a channel hung, or was at the end of its range if it was so too often."""
-    most_s, found = settings.diagnostics.max_frozen_s, []
+    found, most_s = [], settings.max_frozen_s
     for one in fitted_channels(epoch):
-        spans_s = one.time_s[repeated(epoch, one, most_s)]
-        long = spans_s[np.ptp(spans_s, axis=1) > most_s].tolist()
-        found += [LeftOut(a, b, f"{one.name} repeats one value", "frozen") for a, b in long]
-        runs = repeated(epoch, one, most_s, extreme=True)
-        if at_extremes_percent(one, runs) > settings.diagnostics.max_saturated_percent:
-            text, spans = f"{one.name} repeats an extreme value", one.time_s[runs].tolist()
-            found += [LeftOut(a, b, text, "saturation") for a, b in spans]
+        values, time_s = one.values, one.time_s
+        same = np.concatenate(([False], values[1:] == values[:-1], [False]))
+        runs = np.flatnonzero(same[1:] != same[:-1]).reshape(-1, 2)
+        if epoch.left_out:
+            before = np.concatenate(([0], np.cumsum(sound(epoch, time_s))))
+            runs = runs[before[runs[:, 1] + 1] > before[runs[:, 0]]]
+        hung = np.diff(time_s[runs], axis=1)[:, 0] > most_s
+        rows = np.diff(runs, axis=1)[:, 0] + 1
+        level = values[runs[:, 0]]
+        extreme = (level == np.max(values)) | (level == np.min(values))
+        extreme &= rows >= FEWEST_AT_EXTREME
+        for place in np.flatnonzero(hung | extreme):
+            run = runs[place]
+            if _as_told(epoch, one, run, most_s) or _as_the_angle(epoch, one, run):
+                hung[place] = extreme[place] = False
+        if 100.0 * np.sum(rows[extreme]) <= settings.max_saturated_percent * len(one):
+            extreme[:] = False
+        text = f"{one.name} repeats "
+        found += [
+            LeftOut(a, b, text + "one value", "frozen") for a, b in time_s[runs[hung]].tolist()
+        ]
+        found += [
+            LeftOut(a, b, text + "an extreme value", "saturation")
+            for a, b in time_s[runs[extreme]].tolist()
+        ]
     return found
 
 
@@ -288,7 +262,6 @@ def _as_told(epoch: Epoch, channel: Channel, run: Rows, most_s: float) -> bool:
     The motion begins and ends later than its command, by the delay of the drive.
     """
     start_s, stop_s = channel.time_s[run].tolist()
-    other_most_s = min(most_s, 0.5 * (stop_s - start_s))
 
     def inside(cause: Channel) -> Array:
         first = np.searchsorted(cause.time_s, start_s)
@@ -297,18 +270,17 @@ def _as_told(epoch: Epoch, channel: Channel, run: Rows, most_s: float) -> bool:
     def keeps(cause: Channel, level: float) -> bool:
         other = np.abs(inside(cause) - level) > ZERO * np.max(np.abs(cause.values))
         other_s = np.count_nonzero(other) / cause.mean_rate_hz
-        return other.size > 0 and bool(other_s <= other_most_s)
+        return other.size > 0 and bool(other_s <= min(most_s, 0.5 * (stop_s - start_s)))
 
-    causes = [epoch.channels[name] for name in CAUSES if name in epoch.channels]
-    if not causes or causes[0].name != CAUSES[0]:
+    command, perturbation = (epoch.channels.get(name) for name in CAUSES)
+    if command is None:
         return False
-    if all(keeps(cause, 0.0) for cause in causes):
+    if keeps(command, 0.0) and (perturbation is None or keeps(perturbation, 0.0)):
         return True
-    if channel.name != "velocity_rad_s" or inside(causes[0]).size == 0:
+    if channel.name != MOTION[0] or inside(command).size == 0:
         return False
-    told, near = np.median(inside(causes[0])), NEAR * np.max(np.abs(causes[0].values))
-    obeyed = abs(channel.values[run[0]] - told) <= near < abs(told)
-    return bool(obeyed) and keeps(causes[0], float(told))
+    told, near = float(np.median(inside(command))), NEAR * float(np.max(np.abs(command.values)))
+    return bool(abs(channel.values[run[0]] - told) <= near < abs(told)) and keeps(command, told)
 
 
 def obstacle(epoch: Epoch, settings: EstimationSettings) -> str:
@@ -323,12 +295,10 @@ def obstacle(epoch: Epoch, settings: EstimationSettings) -> str:
     for one in (*measured, *(one for one in sent if len(one) > 1)):
         if len(one) < 2:
             return f"{one.name} holds {len(one)} sample(s)"
-        if not np.isfinite([np.min(one.values), np.max(one.values)]).all():
-            bad = int(np.argmin(np.isfinite(one.values)))
-            return (
-                f"{one.name} is {one.values[bad]} at {one.time_s[bad]:.4g} s; "
-                "samples must be finite numbers"
-            )
+        bad = int(np.argmin(np.isfinite(one.values)))
+        if not np.isfinite(one.values[bad]):
+            value = f"{one.values[bad]} at {one.time_s[bad]:.4g} s"
+            return f"{one.name} is {value}; samples must be finite numbers"
     slowest = min(measured, key=lambda channel: channel.rate_hz)
     if USABLE_FRACTION_OF_RATE * slowest.rate_hz < LEAST_BAND_RATIO * settings.band_low_hz:
         return (
@@ -342,15 +312,11 @@ def obstacle(epoch: Epoch, settings: EstimationSettings) -> str:
         spans_s = [float(one.time_s[-1] - one.time_s[0]) for one in measured]
         short = min(spans_s) - both_s < 0.1 and max(spans_s) < settings.min_epoch_s
         length = "this part is {:.3g} s long" if short else "torque and motion overlap for {:.3g} s"
-        return (
-            f"{length.format(max(both_s, 0.0))}; at least {settings.min_epoch_s:g} s are "
-            "needed (estimation.min_epoch_s)"
-        )
+        needed = f"at least {settings.min_epoch_s:g} s are needed (estimation.min_epoch_s)"
+        return f"{length.format(max(both_s, 0.0))}; {needed}"
     if both_s < 2 * settings.trim_s + 1:
-        return (
-            f"it lasts {both_s:.3g} s, which leaves less than 1 s after trimming "
-            f"{settings.trim_s:g} s at each end (estimation.trim_s)"
-        )
+        trimmed = f"trimming {settings.trim_s:g} s at each end (estimation.trim_s)"
+        return f"it lasts {both_s:.3g} s, which leaves less than 1 s after {trimmed}"
     if reason := too_little(epoch, settings):
         return reason
     for one in measured:
@@ -382,11 +348,9 @@ def after_fit(
         least = "zero" if least_r_squared == 0 else f"{least_r_squared:g}"
         return Outcome("excluded", f"R² is {r_squared:.3g}, below {least}")
     if condition_number > LARGEST_CONDITION_NUMBER:
-        return Outcome(
-            "excluded",
-            f"the motion cannot distinguish J, B and K (condition number {condition_number:.3g}, "
-            f"limit {LARGEST_CONDITION_NUMBER:g}); a perturbation with more frequencies is needed",
-        )
+        shown = f"condition number {condition_number:.3g}, limit {LARGEST_CONDITION_NUMBER:g}"
+        why = f"the motion cannot distinguish J, B and K ({shown})"
+        return Outcome("excluded", f"{why}; a perturbation with more frequencies is needed")
     return Outcome()
 
 

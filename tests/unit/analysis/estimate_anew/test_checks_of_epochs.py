@@ -9,11 +9,16 @@ import numpy as np
 import pytest
 
 from rigidimeter.analysis.estimate_anew.activity import bursts, follows_motion, joined
-from rigidimeter.analysis.estimate_anew.checks import Pull, found, motion, sensors
+from rigidimeter.analysis.estimate_anew.checks import (
+    Pull,
+    found,
+    in_half_intervals,
+    motion,
+    sensors,
+)
 from rigidimeter.analysis.estimate_anew.observation import observe
 from rigidimeter.analysis.estimate_anew.stretches import (
     bridged,
-    left_out_s,
     longest_part,
     obstacle,
     screened,
@@ -56,12 +61,13 @@ def a_fit(method="bandlimited"):
     return Fit("made", "1", "OFF", method, Outcome(), JOINT, half / 2, JOINT - half, JOINT + half)
 
 
+def seen(epoch):
+    return observe(epoch, SETTINGS, None, None)
+
+
 def moved(epoch, pull=NO_PULL):
     """Return what is found of the subject's own torque, by name."""
-    seen = observe(epoch, SETTINGS, None, None)
-    every = motion.pushing(seen, a_fit(), SETTINGS, pull)
-    every += motion.tremor(seen, a_fit(), SETTINGS, pull)
-    return {one.name: one for one in every}
+    return {one.name: one for one in motion.own_torque(seen(epoch), a_fit(), pull)}
 
 
 def sine(frequency_hz, amplitude_nm):
@@ -82,7 +88,8 @@ def test_a_torque_that_hung_is_left_out_and_bridged_by_a_line():
     torque = left.channels["torque_nm"]
     inside = (torque.time_s > 8.0) & (torque.time_s < 9.0)
     assert np.ptp(np.diff(torque.values[inside])) < 1e-12
-    (finding,) = sensors.sensors(left, SETTINGS, False)
+    found_in = sensors.sensors(seen(left), a_fit(), NO_PULL)
+    (finding,) = in_half_intervals(replace(a_fit(), findings=tuple(found_in))).findings
     assert (finding.level, finding.condition) == ("note", "OFF")
     assert finding.facts["used_s"] == pytest.approx(finding.facts["length_s"] - 1.0, abs=0.01)
 
@@ -105,7 +112,7 @@ def test_lost_samples_come_back_evenly_and_a_perturbation_keeps_its_level():
 def test_what_is_left_is_counted_with_margins_and_the_longest_part_is_an_epoch():
     epoch = replace(an_epoch(), left_out=(LeftOut(4.0, 5.0), LeftOut(16.0, 16.5)))
     last_s = epoch.channels["torque_nm"].time_s[-1]
-    assert left_out_s(epoch) == pytest.approx(1.5)
+    assert used_s(epoch, 0.0) == pytest.approx(last_s - 1.5)
     assert used_s(epoch, 1.0) == pytest.approx(2.0 + 9.0 + last_s - 1.0 - 17.5)
     part = longest_part(epoch).channels["torque_nm"].time_s
     assert (part[0], part[-1]) == pytest.approx((5.0, 16.0), abs=0.01)
@@ -128,12 +135,17 @@ def scaled_and_late(scale, late_s):
 
 
 def test_scale_and_delay_of_the_velocity_are_told():
-    scale, delay_s = sensors.velocity_fit(an_epoch(velocity_rad_s=scaled_and_late(1.2, 0.002)))
+    scale, delay_s = sensors.velocity_fit(
+        seen(an_epoch(velocity_rad_s=scaled_and_late(1.2, 0.002)))
+    )
     assert scale == pytest.approx(1.2, rel=1e-3)
     assert delay_s / scale == pytest.approx(0.002, rel=0.02)
-    assert sensors.velocity(an_epoch(), a_fit(), SETTINGS) == []
+    assert sensors.velocity(seen(an_epoch()), a_fit(), NO_PULL) == []
     late, wrong = (
-        {one.name for one in sensors.velocity(an_epoch(velocity_rad_s=made), a_fit(), SETTINGS)}
+        {
+            one.name
+            for one in sensors.velocity(seen(an_epoch(velocity_rad_s=made)), a_fit(), NO_PULL)
+        }
         for made in (scaled_and_late(1.0, 0.008), scaled_and_late(1.2, 0.0))
     )
     assert late == {"velocity_delay"}
@@ -155,16 +167,16 @@ def test_a_ripple_has_its_share_and_the_torque_says_in_which_motion(worse, gap_s
     epoch = an_epoch(**{name: rippled})
     if gap_s:
         epoch = bridged(replace(epoch, left_out=(LeftOut(8.0, 8.0 + gap_s),)))
-    (finding,) = sensors.velocity_shape(epoch, SETTINGS)
+    (finding,) = sensors.velocity_shape(seen(epoch))
     assert finding.value == pytest.approx(15.0, rel=0.05)
     assert finding.facts["variant"] == worse
 
 
 def test_a_torque_that_is_a_function_of_the_angle_is_no_torque_of_a_joint():
     of_angle = an_epoch(torque_nm=lambda t, values: 1.8 * values["angle_rad"])
-    (finding,) = sensors.static_torque(of_angle, SETTINGS)
+    (finding,) = sensors.static_torque(seen(of_angle), a_fit(), NO_PULL)
     assert finding.value < 0.1
-    assert sensors.static_torque(an_epoch(), SETTINGS) == []
+    assert sensors.static_torque(seen(an_epoch()), a_fit(), NO_PULL) == []
     (finding,) = sensors.computed_torque(of_angle, SETTINGS.diagnostics)
     assert finding.facts["origin"] == "the motion"
     assert sensors.computed_torque(an_epoch(), SETTINGS.diagnostics) == []
@@ -184,8 +196,8 @@ def test_a_push_is_found_with_its_power_and_its_seconds():
     """0.3 N·m at 1.1 Hz, in the second half alone."""
     push = lambda t: np.where(t >= 10.0, sine(1.1, 0.3)(t), 0.0)  # noqa: E731
     epoch = an_epoch(push=push)
-    seen = moved(epoch)
-    share, active = seen["voluntary_torque"], seen["active_movement"]
+    told = moved(epoch)
+    share, active = told["voluntary_torque"], told["active_movement"]
     assert share.facts["sd_nm"] == pytest.approx(0.15, rel=0.05)
     torque_nm = np.std(epoch.channels["torque_nm"].values)
     assert share.value == pytest.approx(100 * (0.15 / torque_nm) ** 2, rel=0.1)
@@ -199,9 +211,9 @@ def test_a_push_is_found_with_its_power_and_its_seconds():
 def test_a_tremor_is_a_line_that_stands_out(rate_hz):
     """At 100 samples/s too, where a fit without instruments ends at 6 Hz."""
     channels = {"velocity_rad_s": lambda t, _: None} if rate_hz < 200 else {}
-    seen = moved(an_epoch(rate_hz, push=sine(7.4, 0.1), **channels))
-    assert seen.keys() == {"tremor"}
-    facts = seen["tremor"].facts
+    told = moved(an_epoch(rate_hz, push=sine(7.4, 0.1), **channels))
+    assert told.keys() == {"tremor"}
+    facts = told["tremor"].facts
     assert facts["frequency_hz"] == pytest.approx(7.4, abs=0.03)
     assert facts["amplitude_nm"] == pytest.approx(0.1, rel=0.05)
 

@@ -50,10 +50,8 @@ def names(findings):
 
 def test_a_sound_epoch_shows_nothing_but_the_colour_of_its_residual(epoch):
     lines = seen(epoch)
-    found = motion.excitation(lines, FIT, INSTRUMENTS) + of_fit.residual(lines, FIT, INSTRUMENTS)
-    found += of_fit.parameters(epoch, FIT, INSTRUMENTS, CHECKS)
-    shown = of_fit.controller_shown(epoch, SETTINGS)
-    found += of_fit.controller(epoch, FIT, INSTRUMENTS, SETTINGS, shown)
+    every = (motion.excitation, of_fit.following, of_fit.residual, of_fit.parameters)
+    found = [one for check in every for one in check(lines, FIT, INSTRUMENTS)]
     assert set(names(found)) <= {"residual_whiteness"}
 
 
@@ -77,7 +75,7 @@ def test_a_narrow_motion_cannot_tell_inertia_from_stiffness(band_hz, pair):
     noise = np.random.default_rng(3).normal(size=4000)
     sos = signal.butter(4, band_hz, "bandpass", fs=200.0, output="sos")
     lines = motion.checked_lines(seen(moved_by(0.1 * signal.sosfiltfilt(sos, noise))))
-    found = motion.conditioning(lines, CHECKS)
+    found = motion.conditioning(lines)
     if pair is None:
         assert found == []
     else:
@@ -88,9 +86,9 @@ def test_a_narrow_motion_cannot_tell_inertia_from_stiffness(band_hz, pair):
 def test_a_motion_at_rest_and_a_sinusoid_are_told():
     t = np.arange(4000) / 200.0
     sine = moved_by(0.3 * np.sin(2 * np.pi * t))
-    assert names(motion.imposed_sinusoid(sine, CHECKS)) == ["imposed_sinusoid"]
     lines = seen(sine)
-    still = motion.conditioning(replace(lines, motion=0 * lines.motion), CHECKS)
+    assert names(motion.imposed_sinusoid(lines)) == ["imposed_sinusoid"]
+    still = motion.conditioning(replace(lines, motion=0 * lines.motion))
     assert math.isinf(still[0].value)
     assert still[0].facts["variant"] == "at_rest"
 
@@ -102,11 +100,12 @@ def test_coherence_is_the_share_that_follows(epoch):
         .values[: len(epoch.channels["perturbation_nm"])]
     )
     lines = motion.checked_lines(seen(with_values(epoch, perturbation_nm=np.roll(other, 3777))))
-    (found,) = motion.coherence(lines, FIT, INSTRUMENTS)
+    cause = motion.perturbation_lines(lines)
+    (found,) = motion.coherence(lines, cause, FIT, INSTRUMENTS)
     assert found.value < 0.35
     assert found.facts["percent"] == 100 * found.value
     assert (found.level, found.facts["variant"]) == ("note", "instrument")
-    assert motion.coherence(lines, FIT, Pull())[0].level == "caution"
+    assert motion.coherence(lines, cause, FIT, Pull())[0].level == "caution"
 
 
 def test_power_outside_the_band_is_told_and_white_noise_is_none(epoch):
@@ -115,7 +114,7 @@ def test_power_outside_the_band_is_told_and_white_noise_is_none(epoch):
     drift, hum = (3.0 * np.std(torque) * np.sin(2 * np.pi * f * t) for f in (0.05, 60.0))
     for added, told in ((noise, False), (drift, True), (hum, True)):
         spoiled = with_values(epoch, torque_nm=torque + added)
-        found = motion.band_share(spoiled, SETTINGS.estimation, CHECKS)
+        found = motion.band_share(seen(spoiled))
         assert [one.facts["signal"] for one in found] == ["torque"] * told
 
 
@@ -125,16 +124,17 @@ def test_what_follows_the_perturbation_and_is_not_explained_has_its_size_and_lag
     late_s, share = 0.1, 0.3
     shift = round(late_s * epoch.channels["perturbation_nm"].rate_hz)
     echo = np.interp(torque.time_s, epoch.channels["perturbation_nm"].time_s, np.roll(p, shift))
-    clean = motion.shown(motion.checked_lines(seen(epoch)))
-    added = motion.shown(motion.checked_lines(seen(with_values(epoch, torque_nm=echo))))
-    echo *= share * np.std(clean.torque_nm) / np.std(added.torque_nm)
+    clean = motion.checked_lines(seen(epoch))
+    added = motion.checked_lines(seen(with_values(epoch, torque_nm=echo)))
+    echo *= share * np.linalg.norm(clean.torque_nm) / np.linalg.norm(added.torque_nm)
     lines = motion.checked_lines(seen(with_values(epoch, torque_nm=torque.values + echo)))
-    (found,) = of_fit.residual_perturbation(lines, FIT, INSTRUMENTS)
+    cause = motion.gain(lines.grid, (0.15, 10.0)) * motion.perturbation_lines(lines)
+    (found,) = motion.residual_perturbation(lines, cause, FIT, INSTRUMENTS)
     assert found.value == pytest.approx(100 * share / math.hypot(1, share), rel=0.2)
     assert found.facts["lag_s"] == pytest.approx(late_s, abs=0.01)
     assert (found.level, found.facts["variant"]) == ("note", "chance")
-    assert of_fit.residual_perturbation(lines, FIT, Pull())[0].level == "caution"
-    assert of_fit.residual_perturbation(motion.checked_lines(seen(epoch)), FIT, Pull()) == []
+    assert motion.residual_perturbation(lines, cause, FIT, Pull())[0].level == "caution"
+    assert motion.residual_perturbation(clean, cause, FIT, Pull()) == []
 
 
 def test_a_joint_that_turns_round_half_way_is_not_predicted(epoch):
@@ -176,7 +176,7 @@ def test_the_flatness_of_a_residual_is_that_of_its_spectrum(epoch):
 )
 def test_numbers_that_no_joint_has_are_told(epoch, factors, high, name, shown):
     fit = replace(FIT, value=TRUTH * factors, high=high * TRUTH)
-    found = of_fit.parameters(epoch, fit, INSTRUMENTS, CHECKS)
+    found = of_fit.parameters(seen(epoch), fit, INSTRUMENTS)
     assert names(found) == [name]
     assert {key: found[0].facts[key] for key in shown} == shown
     assert (found[0].level == "exclude") == (shown.get("variant") == "reaction")
@@ -216,7 +216,8 @@ def test_the_pull_of_the_loop_is_told_by_what_is_known_of_it():
 def test_the_controller_that_a_recording_shows(epoch, given, variant):
     said = {"subject": {"OFF": {"voluntary_sd_nm": 0.0}}, "controller": given}
     settings = parse_settings(said if given else {"subject": said["subject"]})
-    shown = of_fit.controller_shown(epoch, settings)
+    lines = seen(epoch, settings)
+    shown = of_fit.controller_shown(lines)
     found = of_fit.controller_misfit(FIT, INSTRUMENTS, settings, shown)
     if variant is None:
         assert found == []
@@ -226,7 +227,7 @@ def test_the_controller_that_a_recording_shows(epoch, given, variant):
         true = SETTINGS.controller
         assert shown.controller.inertia_kg_m2 == pytest.approx(true.inertia_kg_m2, rel=0.02)
         assert shown.controller.damping_nm_s_rad == pytest.approx(true.damping_nm_s_rad, rel=0.02)
-        assert of_fit.loop_shown(epoch, settings, None, shown).controller == shown.controller
+        assert of_fit.loop_shown(lines, None).controller == shown.controller
 
 
 def test_a_loop_that_would_be_unstable_did_not_move_the_joint(epoch):
@@ -239,7 +240,7 @@ def test_a_loop_that_would_be_unstable_did_not_move_the_joint(epoch):
 def test_a_loop_is_known_if_it_was_recorded_or_stated():
     alone = moved_by(np.random.default_rng(0).normal(size=4000))
     stated = parse_settings({"controller": {"inertia_kg_m2": 0.05}})
-    known = [of_fit.loop_shown(alone, one, None, of_fit.Shown()) for one in (Settings(), stated)]
+    known = [of_fit.loop_shown(seen(alone, one), None) for one in (Settings(), stated)]
     assert [one is not None for one in known] == [False, True]
 
 

@@ -13,13 +13,11 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigidimeter.analysis.estimate_anew.grid import Array
 from rigidimeter.core.findings import KINDS, UNKNOWN_EFFECT, Effect, Fact, Finding, default_level
 from rigidimeter.core.records import Fit
 from rigidimeter.core.settings import DiagnosticsSettings
-
-Array = NDArray[np.float64]
 
 UNKNOWN_WIDTH = 0.1
 """The share of a parameter that stands for half its interval where a method gives none."""
@@ -79,12 +77,12 @@ class Pull(NamedTuple):
         # Torque that shows no joint is not the joint's.
         return ("in_interval" if np.all(np.abs(fit.value) > half) else ""), {}
 
-    def effect(self, fit: Fit) -> Effect:
-        """Return what it does to the estimate, as far as that is known."""
-        if self.instruments:
-            return Effect((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        bias = self.bias
-        return UNKNOWN_EFFECT if bias is None else Effect.of(bias, fit.value, half_widths(fit))
+    def told(self, fit: Fit, settings: DiagnosticsSettings, **facts: Fact) -> dict[str, Any]:
+        """Return what a finding says of such torque: its harm, its effect, and facts."""
+        harmless, why = self.harmless(fit, settings)
+        bias = np.zeros(3) if self.instruments else self.bias
+        effect = UNKNOWN_EFFECT if bias is None else Effect.of(bias, fit.value, half_widths(fit))
+        return {"harmless": harmless, "effect": effect, "facts": facts | why}
 
 
 def found(
@@ -93,14 +91,12 @@ def found(
     value: float,
     limit: float = math.nan,
     *,
-    p: float = math.nan,
-    epochs: tuple[str, ...] = (),
-    condition: str = "",
     effect: Effect = UNKNOWN_EFFECT,
     facts: Mapping[str, Fact] | None = None,
     variant: str = "",
     harmless: str = "",
     excludes: bool = False,
+    **more: Any,
 ) -> Finding:
     """Return a finding with the level of the settings.
 
@@ -111,7 +107,7 @@ def found(
     ----------
     name : str
     settings : DiagnosticsSettings
-    value, limit, p, epochs, condition, effect, facts
+    value, limit, effect, facts
         As for `Finding`.
     variant : str
         Of the wording.
@@ -120,6 +116,8 @@ def found(
         where it does.
     excludes : bool
         The numbers mean nothing: by default the epoch is excluded.
+    **more
+        What else a `Finding` has.
     """
     level = settings.levels.of(name)
     if level == default_level(name):
@@ -129,7 +127,7 @@ def found(
     named = " ".join(filter(None, (variant, harmless)))
     shown = {**(facts or {}), **({"variant": named} if named else {})}
     unit = KINDS[name].unit if name in KINDS else ""
-    return Finding(name, level, value, limit, unit, p, epochs, condition, effect, shown)
+    return Finding(name, level, value, limit, unit, effect=effect, facts=shown, **more)
 
 
 def at_most(
@@ -147,9 +145,13 @@ def at_least(
 
 
 def in_half_intervals(fit: Fit) -> Fit:
-    """Return the fit with the effects of its findings in half intervals as well."""
+    """Return the fit with its findings as they are told of it.
+
+    Each has the condition of the fit, and the effect that it has in % in half intervals as well.
+    """
 
     def completed(one: Finding) -> Finding:
+        one = replace(one, condition=one.condition or fit.condition)
         percent, of_half = one.effect
         if not any(map(math.isfinite, percent)) or any(map(math.isfinite, of_half)):
             return one

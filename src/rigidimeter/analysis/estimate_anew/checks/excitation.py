@@ -1,4 +1,4 @@
-"""Whether the joint moved in a way that can tell J, B and K apart.
+"""Whether the joint moved in a way that can tell J, B and K apart, and by the perturbation.
 
 Acceleration and angle of a motion at a single frequency ω are in proportion, θ'' = −ω² θ, so J and
 K trade against each other; of a drift, or of a push in one direction, velocity and angle
@@ -7,38 +7,29 @@ scaled to unit length: it is 1 where nothing, and infinite where everything is s
 
 Coherence is the share of a signal's power, line by line, that follows the perturbation linearly.
 
-All but the shares of power are made of the lines of the epoch, weighted as `signals.band_hz` and
-`zero_phase_band` would have them; `shown` are they in time, in N·m, rad and s, of few samples.
+Checks see the lines of the epoch through the band that signals in time pass (`signals.band_hz`,
+`zero_phase_band`), and signals in time of few samples, where the window is whole.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import scipy
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimate_anew.checks import Pull, at_least, at_most, found
-from rigidimeter.analysis.estimate_anew.grid import SAME_TIME, Array, Complex
+from rigidimeter.analysis.estimate_anew.drive import since_ticks
+from rigidimeter.analysis.estimate_anew.grid import SAME_TIME, Array, Complex, Grid
 from rigidimeter.analysis.estimate_anew.observation import Observation
-from rigidimeter.analysis.estimate_anew.scores import line_shares
-from rigidimeter.analysis.estimate_anew.signals import (
-    Signals,
-    band_hz,
-    grid_rate_hz,
-    held_at,
-    lines_inside,
-    power_lines,
-    uniform_grid,
-    values_at,
-)
-from rigidimeter.analysis.estimate_anew.stretches import motion_channels, moves
+from rigidimeter.analysis.estimate_anew.scores import strongest_line
+from rigidimeter.analysis.estimate_anew.signals import band_hz, sampled, values_at
+from rigidimeter.analysis.estimate_anew.stretches import motion_channels
 from rigidimeter.core.findings import Fact, Finding
-from rigidimeter.core.records import Epoch, Fit
-from rigidimeter.core.settings import DiagnosticsSettings, EstimationSettings
+from rigidimeter.core.records import Channel, Fit
 
 OUTSIDE = 0.05
 """Half of 10 %: the middle of the velocity's power is between what is left at both ends."""
@@ -52,84 +43,72 @@ SEGMENTS = 8
 Signals that have nothing to do with each other then still show about 0.2.
 """
 
+LONGEST_LAG_S, POINTS_PER_CYCLE = 1.0, 8
+"""Of residual and perturbation; points of their correlation to a cycle of the highest line."""
+
 WHOLE = 0.999
 """Of the window: what is below is an end, or beside what is left out."""
 
 
-def excitation(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
-    """Return what an epoch shows of the motion that J, B and K are made of.
-
-    Parameters
-    ----------
-    observation : Observation
-        The epoch at its lines.
-    fit : Fit
-    pull : Pull
-        What torque of the subject does to the fit.
-    """
-    epoch, settings = observation.epoch, observation.settings
-    checks, seen = settings.diagnostics, checked_lines(observation)
-    findings = conditioning(seen, checks) + imposed_sinusoid(epoch, checks)
-    findings += band_share(epoch, settings.estimation, checks)
-    if moves(epoch.channels.get("perturbation_nm")):
-        findings += coherence(seen, fit, pull)
-    return [replace(one, condition=epoch.condition) for one in findings]
+def hertz(grid: Grid) -> Array:
+    """Return the frequencies of the lines."""
+    return np.asarray(grid.line / grid.duration_s)
 
 
-def checked_lines(observation: Observation) -> Observation:
-    """Return torque and motion at the lines through the band that signals in time pass."""
-    _, high_hz = _band_hz(observation)
-    most = 2 * high_hz * observation.grid.duration_s
-    part = observation.part(slice(int(np.searchsorted(observation.grid.line, most))))
-    share = gain(part)
+def gain(grid: Grid, band: tuple[float, float]) -> Array:
+    """Return that of `signals.zero_phase_band` at the lines."""
+    low, high = (edge / hertz(grid) for edge in band)
+    return np.asarray(1.0 / ((1.0 + low**4) * (1.0 + high**-8.0)))
+
+
+def checked_lines(seen: Observation) -> Observation:
+    """Return torque and motion through the band of the checks, as far as that passes anything."""
+    band = band_hz(seen.epoch, seen.settings.estimation)
+    part = seen.part(slice(int(np.searchsorted(hertz(seen.grid), 2.0 * band[1]))))
+    share = gain(part.grid, band)
     return replace(part, torque_nm=share * part.torque_nm, motion=share[:, None] * part.motion)
 
 
-def _band_hz(seen: Observation) -> tuple[float, float]:
-    """Return the band for signals in time, as far as there are lines."""
+def in_band(seen: Observation, frequency_hz: Array) -> NDArray[np.bool_]:
+    """Return which frequencies are in the band of the checks, as far as there are lines."""
     low_hz, high_hz = band_hz(seen.epoch, seen.settings.estimation)
-    return low_hz, min(high_hz, seen.grid.band_hz[1])
+    most_hz = min(high_hz, seen.grid.band_hz[1])
+    return np.asarray((frequency_hz >= low_hz) & (frequency_hz <= most_hz))
 
 
-def gain(seen: Observation) -> Array:
-    """Return that of `signals.zero_phase_band`, shape (m,)."""
-    low_hz, high_hz = band_hz(seen.epoch, seen.settings.estimation)
-    frequency_hz = seen.grid.line / seen.grid.duration_s
-    return 1 / ((1 + (low_hz / frequency_hz) ** 4) * (1 + (frequency_hz / high_hz) ** 8))
-
-
-def in_time(seen: Observation, lines: Complex) -> tuple[Array, float]:
-    """Return signals of lines, shape (k, m), where the window is whole: (k, n), and their rate."""
-    few = seen.grid.in_time(lines)
-    count, samples = few.shape[-1], seen.grid.time_s.size
+def in_time(grid: Grid, lines: Complex) -> tuple[Array, Array, float]:
+    """Return signals of lines, shape (k, m), where the window is whole: times, (k, n), rate."""
+    few = grid.in_time(lines)
+    count, samples = few.shape[-1], grid.time_s.size
     place = (np.arange(count) * (samples / count)).astype(np.intp)
-    kept = seen.grid.window[0][place] > WHOLE
-    return few[:, kept] * (math.sqrt(2 * count) / samples), count / seen.grid.duration_s
+    place, kept = grid.time_s[place], grid.window[0][place] > WHOLE
+    return place[kept], few[:, kept] * (math.sqrt(2 * count) / samples), count / grid.duration_s
 
 
-def shown(seen: Observation) -> Signals:
-    """Return torque and motion of an epoch in time, of few samples."""
-    lines = np.concatenate([seen.torque_nm[None], seen.motion.T])
-    (torque, a, v, x), rate_hz = in_time(seen, lines)
-    return Signals(np.arange(torque.size) / rate_hz, torque, a, v, x, rate_hz, _band_hz(seen))
+def held_lines(channel: Channel, grid: Grid) -> tuple[Complex, float]:
+    """Return what was held from one tick to the next at the lines, and its mean age in s."""
+    place = sampled(channel, grid.time_s, SAME_TIME)
+    if place is not None:
+        return np.asarray(grid.lines(channel.values[place])[0]), 0.0
+    tick, after_s = since_ticks(channel, grid.time_s, 0.0)
+    return np.asarray(grid.lines(channel.values[tick])[0]), float(np.mean(after_s))
 
 
-def perturbation_lines(observation: Observation) -> Complex:
-    """Return the perturbation, held from one tick to the next, at the lines."""
-    held = held_at(observation.epoch.channels["perturbation_nm"], observation.grid.time_s)
-    return np.asarray(observation.grid.lines(held)[0])
+def perturbation_lines(seen: Observation) -> Complex:
+    """Return the perturbation at the lines."""
+    return held_lines(seen.epoch.channels["perturbation_nm"], seen.grid)[0]
 
 
-def by_push(fit: Fit, pull: Pull, settings: DiagnosticsSettings, **facts: Fact) -> dict[str, Any]:
-    """Return what a finding says of torque of the subject's own: its harm, effect and facts."""
-    harmless, why = pull.harmless(fit, settings)
-    return {"harmless": harmless, "effect": pull.effect(fit), "facts": facts | why}
+def excitation(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
+    """Return what the motion that J, B and K are made of shows of itself."""
+    findings = conditioning(checked_lines(observation))
+    return findings + imposed_sinusoid(observation) + band_share(observation)
 
 
-def conditioning(seen: Observation, settings: DiagnosticsSettings) -> list[Finding]:
+def conditioning(seen: Observation) -> list[Finding]:
     """Return whether the regressors can be told apart, and if not which two and because of what."""
-    most, gram = settings.max_condition_number, (seen.motion.conj().T @ seen.motion).real
-    lengths = np.sqrt(np.diag(gram))
+    settings, gram = seen.settings.diagnostics, (seen.motion.conj().T @ seen.motion).real
+    lengths, most = np.sqrt(np.diag(gram)), settings.max_condition_number
     if not np.all(lengths > 0):
         return [found("conditioning", settings, math.inf, most, variant="at_rest")]
     power, directions = np.linalg.eigh(gram / np.outer(lengths, lengths))
@@ -137,72 +116,118 @@ def conditioning(seen: Observation, settings: DiagnosticsSettings) -> list[Findi
     first, second = sorted(np.argsort(np.abs(directions[:, 0]))[-2:])
     running = np.cumsum(np.abs(seen.motion[:, 1]) ** 2)
     ends = np.searchsorted(running / running[-1], [OUTSIDE, 1.0 - OUTSIDE])
-    low_hz, high_hz = (seen.grid.line[ends] / seen.grid.duration_s).tolist()
+    low_hz, high_hz = hertz(seen.grid)[ends].tolist()
     facts: dict[str, Fact] = {"first": "JBK"[first], "second": "JBK"[second]}
     facts |= {"low_hz": low_hz, "high_hz": high_hz}
     value = math.sqrt(power[-1] / power[0]) if power[0] > 0 else math.inf
     return at_most("conditioning", settings, value, most, facts=facts)
 
 
-def coherence(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
+def coherence(seen: Observation, cause: Complex, fit: Fit, pull: Pull) -> list[Finding]:
     """Return how far torque and velocity follow the perturbation, by Welch's method.
 
     The value is the median over the lines of the band, for the weaker of the two.
     """
     settings = seen.settings.diagnostics
-    lines = np.stack([perturbation_lines(seen), seen.torque_nm, seen.motion[:, 1]])
-    few, rate_hz = in_time(seen, lines)
+    _, few, rate_hz = in_time(seen.grid, np.stack([cause, seen.torque_nm, seen.motion[:, 1]]))
     length = scipy.fft.prev_fast_len(max(2 * few.shape[1] // (SEGMENTS + 1), 8), real=True)
     parts = sliding_window_view(few, length, axis=1)[:, :: length - length // 2]
     parts = (parts - np.mean(parts, axis=2, keepdims=True)) * scipy.signal.windows.hann(length)
-    inside = lines_inside(scipy.fft.rfftfreq(length, 1.0 / rate_hz), _band_hz(seen))
-    cause, *effects = scipy.fft.rfft(parts)[:, :, inside]
-    of_cause, *power = (np.mean(np.abs(one) ** 2, axis=0) for one in (cause, *effects))
-    both = (np.mean(cause.conj() * one, axis=0) for one in effects)
-    medians = [
-        float(np.median(np.abs(one) ** 2 / (of_cause * own)))
-        for one, own in zip(both, power, strict=True)
-    ]
-    value, weaker = min(zip(medians, ("torque", "velocity"), strict=True))
-    more = by_push(fit, pull, settings, signal=weaker, percent=100.0 * value)
+    inside = in_band(seen, scipy.fft.rfftfreq(length, 1.0 / rate_hz))
+    spectra = scipy.fft.rfft(parts)[:, :, inside]
+    power = np.mean(np.abs(spectra) ** 2, axis=1)
+    both = np.abs(np.mean(spectra[:1].conj() * spectra[1:], axis=1)) ** 2
+    medians = np.median(both / (power[0] * power[1:]), axis=1)
+    weaker = int(np.argmin(medians))
+    value, signal = float(medians[weaker]), ("torque", "velocity")[weaker]
+    more = pull.told(fit, settings, signal=signal, percent=100.0 * value)
     return at_least("coherence", settings, value, settings.min_coherence, **more)
 
 
-def band_share(
-    epoch: Epoch, estimation: EstimationSettings, settings: DiagnosticsSettings
-) -> list[Finding]:
+def residual_perturbation(seen: Observation, cause: Complex, fit: Fit, pull: Pull) -> list[Finding]:
+    """Return whether torque follows the perturbation that is not explained.
+
+    The largest correlation of residual and perturbation, at any lag up to 1 s either way, times the
+    residual's share of the torque: in % of the torque's standard deviation. A correlation that two
+    independent signals of these spectra reach in one of 20 epochs is none: they correlate with
+    variance c Σ P_a P_b / (2 Σ P_a Σ P_b) over the lines (Bartlett 1935), and as the lag runs, a
+    Gaussian correlation of rms frequency ν passes ±u standard deviations 2 ν T exp(−u²/2) times on
+    average (Rice 1944), which is set to 1/20.
+
+    What the perturbation causes beyond J, B and K biases every method, so nothing is claimed of
+    them where torque of the subject does not: a single epoch is no proof.
+    """
+    settings, grid = seen.settings.diagnostics, seen.grid
+    left = seen.torque_nm - seen.motion @ fit.value
+    a, b, of_torque = (np.abs(lines) ** 2 for lines in (left, cause, seen.torque_nm))
+    power, size = a * b, math.sqrt(np.sum(a) * np.sum(b))
+    if size == 0.0 or not np.any(of_torque):
+        return []
+    n = scipy.fft.next_fast_len(POINTS_PER_CYCLE * int(grid.line[-1]), real=True)
+    lags = np.arange(n) - n // 2
+    lags = lags[np.abs(lags) <= LONGEST_LAG_S * n / grid.duration_s]
+    spectrum = np.zeros(n // 2 + 1, dtype=np.complex128)
+    spectrum[grid.line] = left * cause.conj()
+    together = scipy.fft.irfft(spectrum, n)[lags] * (n / 2 / size)
+    at = int(np.argmax(np.abs(together)))
+    r, lag_s = float(abs(together[at])), float(lags[at] * grid.duration_s / n)
+    deviation = math.sqrt(0.5 * grid.spread * float(np.sum(power))) / size
+    rms_hz = math.sqrt(float(np.average(hertz(grid) ** 2, weights=power)))
+    crossings = max(4.0 * rms_hz * LONGEST_LAG_S, 0.1)
+    chance = deviation * math.sqrt(2.0 * math.log(crossings / 0.05))
+    value = 100.0 * r * math.sqrt(float(np.sum(a) / np.sum(of_torque)))
+    if r <= chance:
+        return []
+    facts = {"correlation": r, "lag_s": lag_s, "chance": chance}
+    more = {"facts": facts, "harmless": "chance" if pull.harmless(fit, settings)[0] else ""}
+    most = settings.max_residual_perturbation_percent
+    return at_most("residual_perturbation", settings, value, most, **more)
+
+
+def band_share(seen: Observation) -> list[Finding]:
     """Return how much of the recorded torque and velocity lies in the band of the fit.
 
     Of an angle alone the differences are looked at. White noise of the samples is left out: its
     power is that above a quarter of the rate, of which lines of noise, exponentially distributed,
     have a median of ln 2 times their mean. Hum, a few of the lines, does not move that.
 
-    The first line of a perturbation may lie less than a line above the lower edge: what the taper
-    does not tell from the band is not outside it.
+    The window is Hann's too, which is half a line less a quarter of each of its neighbours. The
+    first line of a perturbation may lie less than a line above the lower edge: what the taper does
+    not tell from the band is not outside it.
     """
-    low_hz, high_hz = band_hz(epoch, estimation)
-    torque, moving = epoch.channels["torque_nm"], motion_channels(epoch)
-    rate_hz = grid_rate_hz([torque, *moving], high_hz)
-    time_s = uniform_grid([torque, *moving], rate_hz)
+    settings, time_s = seen.settings.diagnostics, seen.grid.time_s
+    low_hz, high_hz = band_hz(seen.epoch, seen.settings.estimation)
+    frequency_hz = np.arange(1, time_s.size // 2) / seen.grid.duration_s
+    noise = int(np.searchsorted(frequency_hz, seen.grid.rate_hz / 4))
+    reach_hz = TAPERED_LINES / 2 / seen.grid.duration_s
+    first, stop = np.searchsorted(frequency_hz, [low_hz - reach_hz, high_hz + reach_hz])
     shares = {}
-    for name, one in (("torque", torque), ("velocity", moving[0])):
-        frequency, power = power_lines(values_at(one, time_s, SAME_TIME), rate_hz, tapered=True)
-        power = power - np.median(power[frequency > rate_hz / 4]) / np.log(2.0)
+    for name, one in (
+        ("torque", seen.epoch.channels["torque_nm"]),
+        ("velocity", motion_channels(seen.epoch)[0]),
+    ):
+        values = values_at(one, time_s, SAME_TIME)
+        lines = scipy.fft.rfft((values - np.mean(values)) * seen.grid.window[0])
+        lines = (lines[1:-1] - (lines[:-2] + lines[2:]) / 2)[: frequency_hz.size]
+        power = lines.real**2 + lines.imag**2
+        power -= np.median(power[noise:]) / np.log(2.0)
         if one.name == "angle_rad":
-            power = power * np.sin(2 * np.pi * frequency / rate_hz) ** 2
-        reach_hz, total = TAPERED_LINES / 2 * float(frequency[1]), float(np.sum(power[1:]))
-        inside = lines_inside(frequency, (low_hz - reach_hz, high_hz + reach_hz))
-        shares[name] = min(float(np.sum(power[inside])) / total, 1.0) if total > 0 else 0.0
+            power *= np.sin(2 * np.pi * frequency_hz / seen.grid.rate_hz) ** 2
+        total = float(np.sum(power))
+        shares[name] = min(float(np.sum(power[first:stop])) / total, 1.0) if total > 0 else 0.0
     weaker = min(shares, key=lambda name: shares[name])
     facts: dict[str, Fact] = {"signal": weaker, "low_hz": low_hz, "high_hz": high_hz}
     least, value = settings.min_band_share_percent, 100.0 * shares[weaker]
     return at_least("band_share", settings, value, least, facts=facts)
 
 
-def imposed_sinusoid(epoch: Epoch, settings: DiagnosticsSettings) -> list[Finding]:
+def imposed_sinusoid(seen: Observation) -> list[Finding]:
     """Return whether the motion is a single sinusoid, which no fit of three parameters can use."""
-    shares, most = line_shares(epoch), settings.max_single_frequency_percent
+    settings, power = seen.settings.diagnostics, np.abs(seen.motion[:, 2]) ** 2
+    if not np.any(power):
+        return []
+    _, shares = strongest_line(hertz(seen.grid), power, 1.0 / seen.grid.duration_s)
+    most, facts = settings.max_single_frequency_percent, {"velocity": 100.0 * shares.velocity}
     if not shares.single(most / 100.0):
         return []
-    facts = {"velocity": 100.0 * shares.velocity}
     return [found("imposed_sinusoid", settings, 100.0 * shares.angle, most, facts=facts)]

@@ -55,18 +55,22 @@ from rigidimeter.analysis.estimate_anew.checks import (
     too_biased,
 )
 from rigidimeter.analysis.estimate_anew.checks.excitation import (
-    by_push,
     checked_lines,
+    coherence,
     gain,
+    held_lines,
+    hertz,
+    in_band,
+    in_time,
     perturbation_lines,
-    shown,
+    residual_perturbation,
 )
 from rigidimeter.analysis.estimate_anew.drive import Drive
-from rigidimeter.analysis.estimate_anew.grid import Array
+from rigidimeter.analysis.estimate_anew.grid import Complex
 from rigidimeter.analysis.estimate_anew.methods import direct, loop_pull
 from rigidimeter.analysis.estimate_anew.observation import Observation, loop_of
 from rigidimeter.analysis.estimate_anew.published import acceleration_seen
-from rigidimeter.analysis.estimate_anew.signals import lines_inside, power_lines
+from rigidimeter.analysis.estimate_anew.signals import band_hz
 from rigidimeter.analysis.estimate_anew.solve import (
     LineNoise,
     inverse_of,
@@ -89,7 +93,7 @@ from rigidimeter.model import (
     spectral_radius,
 )
 
-LINES_TOGETHER, LONGEST_LAG_S = 8, 1.0
+LINES_TOGETHER = 8
 
 STANDARD_ERRORS, PULL_SHARE = 4.0, 0.5
 """So far may the two solutions be apart by chance, of whichever of J, B and K; and by this share of
@@ -108,9 +112,6 @@ LINE_BINS, LEAST_LEFT = 2, 0.01
 """Half the width of a line in the window. Where less of the command's power is beside the line in
 which the two differ most, that line is compared too."""
 
-FORGOTTEN_S = 1.0
-"""So long after a stretch that is left out the comparison counts in full again."""
-
 LATE = 0.1
 """A drive of first order is ruled out where the torque is late by less than this share of a tick.
 On rigs of 200 to 1000 ticks/s it was .34 to .50 late with velocity PI drives, with drives of second
@@ -121,28 +122,16 @@ LITTLE = 0.02
 
 
 def residual(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
-    """Return what the torque that J, B and K leave says of the model.
-
-    Parameters
-    ----------
-    observation : Observation
-        The epoch at its lines.
-    fit : Fit
-    pull : Pull
-        What torque of the subject does to the fit.
-    """
+    """Return what the torque that J, B and K leave says of the model."""
     seen = checked_lines(observation)
-    findings = residual_whiteness(seen, fit, pull)
-    if moves(seen.epoch.channels.get("perturbation_nm")):
-        findings += residual_perturbation(seen, fit, pull)
-    return _of(fit, findings + held_out_vaf(seen, fit, pull))
+    return residual_whiteness(seen, fit, pull) + held_out_vaf(seen, fit, pull)
 
 
-def parameters(epoch: Epoch, fit: Fit, pull: Pull, settings: DiagnosticsSettings) -> list[Finding]:
+def parameters(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
     """Return what J, B and K, and R², say by themselves."""
-    findings = gravity(epoch, fit, settings) + r_squared(fit, pull, settings)
-    findings += negative_parameters(fit, settings) + implausible_parameters(fit, settings)
-    return _of(fit, findings)
+    settings = seen.settings.diagnostics
+    findings = gravity(seen.epoch, fit, settings) + r_squared(fit, pull, settings)
+    return findings + negative_parameters(fit, settings) + implausible_parameters(fit, settings)
 
 
 def least_squares(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
@@ -150,13 +139,9 @@ def least_squares(observation: Observation, fit: Fit, pull: Pull) -> list[Findin
     if pull.instruments:
         return []
     findings = loop_bias(fit, pull, observation.settings.diagnostics)
-    if pull.in_interval:
-        findings += unweighted_fit(observation, fit) + noise_of_motion(observation, fit)
-    return _of(fit, findings)
-
-
-def _of(fit: Fit, findings: Sequence[Finding]) -> list[Finding]:
-    return [replace(one, condition=fit.condition) for one in findings]
+    if not pull.in_interval:
+        return findings
+    return findings + unweighted_fit(observation, fit) + noise_of_motion(observation, fit)
 
 
 def residual_whiteness(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
@@ -165,70 +150,28 @@ def residual_whiteness(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]
     The geometric over the arithmetic mean of the power, lines taken eight together; their mean
     logarithm is that of white noise less ln 8 − ψ(8), which is made up for.
     """
-    settings, signals = seen.settings.diagnostics, shown(seen)
-    frequency, power = power_lines(signals.unexplained_nm(fit.value), signals.rate_hz)
-    power = power[lines_inside(frequency, signals.band_hz)]
+    settings = seen.settings.diagnostics
+    power = np.abs(seen.torque_nm - seen.motion @ fit.value)[in_band(seen, hertz(seen.grid))] ** 2
     groups = max(power.size // LINES_TOGETHER, 1)
     means = power[: groups * LINES_TOGETHER].reshape(groups, -1).mean(axis=1)
     value = math.nan
     if np.all(means > 0):
         made_up = math.log(LINES_TOGETHER) - float(scipy.special.digamma(LINES_TOGETHER))
         value = min(float(np.exp(np.mean(np.log(means)) + made_up) / np.mean(means)), 1.0)
-    least, more = settings.min_residual_flatness, by_push(fit, pull, settings)
+    least, more = settings.min_residual_flatness, pull.told(fit, settings)
     return at_least("residual_whiteness", settings, value, least, **more)
-
-
-def residual_perturbation(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
-    """Return whether torque follows the perturbation that is not explained.
-
-    The largest correlation of residual and perturbation, at any lag up to 1 s either way, times the
-    residual's share of the torque: in % of the torque's standard deviation. A correlation that two
-    independent signals of these spectra reach in one of 20 epochs is none: they correlate with
-    variance c Σ P_a P_b / (2 Σ P_a Σ P_b) over the lines (Bartlett 1935), and as the lag runs, a
-    Gaussian correlation of rms frequency ν passes ±u standard deviations 2 ν T exp(−u²/2) times on
-    average (Rice 1944), which is set to 1/20.
-
-    What the perturbation causes beyond J, B and K biases every method, so nothing is claimed of
-    them where torque of the subject does not: a single epoch is no proof.
-    """
-    settings, grid = seen.settings.diagnostics, seen.grid
-    left, cause = seen.torque_nm - seen.motion @ fit.value, gain(seen) * perturbation_lines(seen)
-    a, b = np.abs(left) ** 2, np.abs(cause) ** 2
-    size, total = math.sqrt(np.sum(a) * np.sum(b)), float(np.sum(np.abs(seen.torque_nm) ** 2))
-    if size == 0.0 or total == 0.0:
-        return []
-    lag, n = round(LONGEST_LAG_S * grid.rate_hz), grid.time_s.size
-    spectrum = np.zeros(n // 2 + 1, dtype=np.complex128)
-    spectrum[grid.line] = left * cause.conj()
-    lags = np.arange(-lag, lag + 1)
-    together = scipy.fft.irfft(spectrum, n)[lags] * (n / 2 / size)
-    at = int(np.argmax(np.abs(together)))
-    r = float(abs(together[at]))
-    power = a * b
-    deviation = math.sqrt(0.5 * grid.spread * float(np.sum(power))) / size
-    rms_hz = math.sqrt(float(np.sum(grid.omega_rad_s**2 * power) / np.sum(power))) / (2 * math.pi)
-    crossings = max(2.0 * rms_hz * 2.0 * LONGEST_LAG_S, 0.1)
-    chance = deviation * math.sqrt(2.0 * math.log(crossings / 0.05))
-    value = 100.0 * r * math.sqrt(float(np.sum(a)) / total)
-    most = settings.max_residual_perturbation_percent
-    if value <= most or r <= chance:
-        return []
-    facts = {"correlation": r, "lag_s": float(lags[at] / grid.rate_hz), "chance": chance}
-    harmless = "chance" if pull.harmless(fit, settings)[0] else ""
-    name = "residual_perturbation"
-    return [found(name, settings, value, most, facts=facts, harmless=harmless)]
 
 
 def held_out_vaf(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
     """Return whether J, B and K of the first half explain the second half's torque."""
-    settings, signals = seen.settings.diagnostics, shown(seen)
-    half = signals.time_s.size // 2
-    first, second = signals.part(slice(half)), signals.part(slice(half, None))
-    values = shortest(first.motion.T @ first.motion, first.motion.T @ first.torque_nm)
-    variance = float(np.var(second.torque_nm))
-    left = float(np.var(second.unexplained_nm(values)))
-    value = 100.0 * (1.0 - left / variance) if variance > 0 else math.nan
-    least, more = settings.min_held_out_vaf_percent, by_push(fit, pull, settings)
+    settings = seen.settings.diagnostics
+    _, (torque, *columns), _ = in_time(seen.grid, np.stack([seen.torque_nm, *seen.motion.T]))
+    half, motion = torque.size // 2, np.stack(columns, axis=1)
+    first, second = motion[:half], motion[half:]
+    values = shortest(first.T @ first, first.T @ torque[:half])
+    variance, left = np.var(torque[half:]), np.var(torque[half:] - second @ values)
+    value = float(100.0 * (1.0 - left / variance)) if variance > 0 else math.nan
+    least, more = settings.min_held_out_vaf_percent, pull.told(fit, settings)
     return at_least("held_out_vaf", settings, value, least, **more)
 
 
@@ -237,7 +180,7 @@ def r_squared(fit: Fit, pull: Pull, settings: DiagnosticsSettings) -> list[Findi
 
     It does not matter to a method that weights torque beyond the model away.
     """
-    more = by_push(fit, pull, settings)
+    more = pull.told(fit, settings)
     if not (pull.instruments or pull.in_interval):
         more = {"effect": more["effect"]}
     return at_least("r_squared", settings, fit.r_squared, settings.min_r_squared, **more)
@@ -397,34 +340,43 @@ class Shown(NamedTuple):
     controller: ControllerSettings | None = None
 
 
-def controller_shown(epoch: Epoch, settings: Settings) -> Shown:
+def controller_shown(seen: Observation, cause: Complex | None = None) -> Shown:
     """Return what the recorded command says of the controller of the settings.
 
     Nothing where command or perturbation were not recorded, or ticks are missing.
+
+    Parameters
+    ----------
+    seen : Observation
+    cause : complex array, shape (m,), optional
+        The perturbation at its lines, where that is known already.
     """
+    epoch, settings, grid = seen.epoch, seen.settings, seen.grid
     command = epoch.channels.get("velocity_command_rad_s")
     if command is None or "perturbation_nm" not in epoch.channels or len(command) < 2:
         return Shown()
-    rate_hz, n = command.mean_rate_hz, len(command)
-    if np.ptp(np.diff(command.time_s)) > 0.5 / rate_hz:
+    rate_hz, frequency_hz = command.mean_rate_hz, hertz(grid)
+    used = (frequency_hz >= COMPARED_HZ[0]) & (frequency_hz <= COMPARED_HZ[1])
+    if np.ptp(np.diff(command.time_s)) > 0.5 / rate_hz or not np.any(used):
         return Shown()
-    window = np.hanning(n)
-    for stretch in epoch.left_out:  # there neither torque nor, where samples are lost, command is
-        before_s, after_s = stretch.start_s - command.time_s, command.time_s - stretch.stop_s
-        away = np.clip(np.maximum(before_s, after_s) / FORGOTTEN_S, 0.0, 1.0)
-        window = window * (0.5 - 0.5 * np.cos(np.pi * away))
-    asked_nm = _asked_nm(epoch, settings, command.time_s)
-    step_rad_s = np.diff(command.values, prepend=command.values[0])
-    compared = slice(*(int(edge * n / rate_hz) + k for k, edge in enumerate(COMPARED_HZ)))
-    both = np.stack([command.values, step_rad_s, asked_nm])
-    sent, step, asked = scipy.fft.rfft(both * window)[:, compared]
+    sent, age_s = held_lines(command, grid)
+    turn = 1j * grid.omega_rad_s[used]
+    z = np.exp(turn / rate_hz)
+    # The newest sample at a tick is half an interval old on average, beside the latency.
+    torque_hz, cutoff_hz = epoch.channels["torque_nm"].rate_hz, settings.controller.torque_cutoff_hz
+    late_s = age_s + settings.rig.torque.latency_s + max(0.5 / torque_hz - 0.5 / rate_hz, 0.0)
+    read = seen.torque_nm[used] * np.exp(-turn * late_s)
+    if cutoff_hz < rate_hz / 2:
+        b0, b1, b2, a1, a2 = butterworth_lowpass(cutoff_hz, rate_hz)
+        read *= np.polyval((b0, b1, b2), z) / np.polyval((1.0, a1, a2), z)
+    cause = perturbation_lines(seen) if cause is None else cause
+    sent, asked = sent[used], cause[used] - read
 
     def compare(controller: ControllerSettings) -> tuple[float, float, NDArray[np.bool_]]:
         """Return misfit in %, factor, and which lines were compared."""
         J, B = controller.inertia_kg_m2, controller.damping_nm_s_rad
         decay, gain = admittance(J, B, 1.0 / rate_hz)
-        made_rad_s = scipy.signal.lfilter([gain], [1.0, -decay], asked_nm)
-        made = scipy.fft.rfft(made_rad_s * window)[compared]
+        made = asked * gain / (1.0 - decay / z)
         apart, power = np.abs(sent - made), np.abs(sent) ** 2
         kept = np.abs(np.arange(sent.size) - np.argmax(apart)) > LINE_BINS
         if not np.sum(power[kept]) > LEAST_LEFT * np.sum(power):
@@ -437,10 +389,10 @@ def controller_shown(epoch: Epoch, settings: Settings) -> Shown:
     most = settings.diagnostics.max_controller_misfit_percent
     if not percent > most:
         return Shown(percent, factor)
-    columns = np.stack([sent, step], axis=1)[kept]
-    stacked = np.concatenate([columns.real, columns.imag])
-    found, *_ = np.linalg.lstsq(stacked, np.concatenate([asked.real[kept], asked.imag[kept]]))
-    damping, beta = found.tolist()
+    columns = np.stack([sent, sent * (1.0 - 1.0 / z)], axis=1)[kept]
+    damping, beta = shortest(
+        *((columns.conj().T @ y).real for y in (columns, asked[kept]))
+    ).tolist()
     if not beta > 0:
         return Shown(percent, factor)
     bent = damping / beta / math.log1p(damping / beta) if damping > 0 else 1.0
@@ -449,60 +401,46 @@ def controller_shown(epoch: Epoch, settings: Settings) -> Shown:
     return Shown(percent, factor, None if compare(other)[0] > most else other)
 
 
-def _asked_nm(epoch: Epoch, settings: Settings, ticks_s: Array) -> Array:
-    """Return perturbation less the torque as the loop read and filtered it, at each tick."""
-    perturbation, torque = epoch.channels["perturbation_nm"], epoch.channels["torque_nm"]
-    rate_hz = (ticks_s.size - 1) / float(ticks_s[-1] - ticks_s[0])
-    held = np.searchsorted(perturbation.time_s, ticks_s + 0.01 / rate_hz, side="right") - 1
-    # The newest sample at a tick is half an interval old on average, beside the latency.
-    late_s = settings.rig.torque.latency_s + max(0.5 / torque.rate_hz - 0.5 / rate_hz, 0.0)
-    read = np.interp(ticks_s - late_s, torque.time_s, torque.values)
-    cutoff_hz = settings.controller.torque_cutoff_hz
-    if cutoff_hz < rate_hz / 2:
-        b0, b1, b2, a1, a2 = butterworth_lowpass(cutoff_hz, rate_hz)
-        read = scipy.signal.lfilter([b0, b1, b2], [1.0, a1, a2], read)
-    return np.asarray(perturbation.values[np.maximum(held, 0)] - read)
-
-
-def loop_shown(epoch: Epoch, settings: Settings, drive: Drive | None, shown: Shown) -> Loop | None:
+def loop_shown(seen: Observation, drive: Drive | None) -> Loop | None:
     """Return the loop that an epoch ran in, for least squares: recorded, or stated in the settings.
 
     None where it is neither: the defaults of the controller are the paper's, which are no reason to
     think that a robot gave way.
     """
-    recorded = ("perturbation_nm", "velocity_command_rad_s")
+    channels, settings = seen.epoch.channels, seen.settings
     stated = "controller" in settings.model_fields_set
-    if not stated and not any(name in epoch.channels for name in recorded):
+    if not stated and not {"perturbation_nm", "velocity_command_rad_s"} & channels.keys():
         return None
-    loop = loop_of(settings, epoch.channels["torque_nm"].rate_hz, drive)
-    return loop if shown.controller is None else replace(loop, controller=shown.controller)
+    loop = loop_of(settings, channels["torque_nm"].rate_hz, drive)
+    return replace(loop, controller=controller_shown(seen).controller or loop.controller)
 
 
-def controller(
-    epoch: Epoch, fit: Fit, pull: Pull, settings: Settings, shown: Shown
-) -> list[Finding]:
-    """Return what contradicts the controller of the settings: the command, or the joint."""
+def following(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
+    """Return what does not follow the perturbation as motion, torque and command should."""
+    epoch, settings = observation.epoch, observation.settings
     if not moves(epoch.channels.get("perturbation_nm")):
         return []
-    misfit = controller_misfit(fit, pull, settings, shown)
-    return _of(fit, misfit + unstable_loop(epoch, fit, pull, settings))
+    seen, cause = checked_lines(observation), perturbation_lines(observation)
+    part = cause[: seen.grid.line.size] * gain(seen.grid, band_hz(epoch, settings.estimation))
+    findings = coherence(seen, part, fit, pull) + residual_perturbation(seen, part, fit, pull)
+    findings += controller_misfit(fit, pull, settings, controller_shown(observation, cause))
+    return findings + unstable_loop(epoch, fit, pull, settings)
 
 
 def controller_misfit(fit: Fit, pull: Pull, settings: Settings, shown: Shown) -> list[Finding]:
     """Return how far the command is from what the controller makes of perturbation and torque."""
-    other, value, checks = shown.controller, shown.misfit_percent, settings.diagnostics
-    if not value > checks.max_controller_misfit_percent:
+    checks, other, variant = settings.diagnostics, shown.controller, ""
+    if not shown.misfit_percent > checks.max_controller_misfit_percent:
         return []
-    more = by_push(fit, pull, checks, factor=shown.factor)
-    facts, harmless, variant = more["facts"], more["harmless"], ""
+    harmless, facts = pull.harmless(fit, checks)
     if other is not None:
         variant = _how_shown(settings.controller, other)
-        facts["shown_inertia"] = other.inertia_kg_m2
-        facts["shown_damping"] = other.damping_nm_s_rad
+        facts |= {"shown_inertia": other.inertia_kg_m2, "shown_damping": other.damping_nm_s_rad}
     elif not pull.instruments:  # of a loop that is not known the bias cannot be told
-        facts, harmless = {"factor": shown.factor}, ""
-    name, most = "controller_misfit", checks.max_controller_misfit_percent
-    return [found(name, checks, value, most, facts=facts, variant=variant, harmless=harmless)]
+        facts, harmless = {}, ""
+    more = {"facts": facts | {"factor": shown.factor}, "variant": variant, "harmless": harmless}
+    most = checks.max_controller_misfit_percent
+    return at_most("controller_misfit", checks, shown.misfit_percent, most, **more)
 
 
 def _how_shown(given: ControllerSettings, other: ControllerSettings) -> str:
@@ -523,8 +461,8 @@ def unstable_loop(epoch: Epoch, fit: Fit, pull: Pull, settings: Settings) -> lis
     if not np.all(fit.value >= 0):
         return []  # no such joint
     rig = loop_of(settings, epoch.channels["torque_nm"].rate_hz, None).rig
-    looped = Settings().model_copy(update={"controller": settings.controller, "rig": rig})
-    radius = spectral_radius(looped, JointDynamics(*fit.value.tolist()))
+    joint = JointDynamics(*fit.value.tolist())
+    radius = spectral_radius(settings.model_copy(update={"rig": rig}), joint)
     value = math.log(max(radius, 1e-12)) * rig.tick_rate_hz
     harmless, why = pull.harmless(fit, settings.diagnostics)
     return at_most("unstable_loop", settings.diagnostics, value, 0.0, harmless=harmless, facts=why)
@@ -570,10 +508,10 @@ def between_samples(
         effect = Effect((-100.0 * (1.0 - seen), math.nan, math.nan))
         value = 100.0 * (1.0 / seen - 1.0)
         more = {"facts": facts, "variant": "unknown_drive", "effect": effect}
-        return _of(fit, at_most(name, checks, value, most, **more))
+        return at_most(name, checks, value, most, **more)
     said = any(one.name == name for one in fit.findings)
     little = any("of_drive" in str(one.facts.get("variant")).split() for one in missing)
     if pull.instruments or command is not None or said or not little:
         return []
     facts = {"little": 100 * LITTLE}
-    return _of(fit, [found(name, checks, math.nan, most, facts=facts, variant="friction")])
+    return [found(name, checks, math.nan, most, facts=facts, variant="friction")]

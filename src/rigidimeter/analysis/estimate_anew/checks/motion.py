@@ -16,17 +16,27 @@ K are freed first of the part that least squares takes for the joint.
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from rigidimeter.analysis.estimate_anew.activity import CHECK
-from rigidimeter.analysis.estimate_anew.checks import Array, Pull, at_most, found, half_widths
+from rigidimeter.analysis.estimate_anew.checks import Pull, at_most, found, half_widths
+from rigidimeter.analysis.estimate_anew.checks.excitation import (
+    checked_lines,
+    gain,
+    hertz,
+    in_time,
+)
 from rigidimeter.analysis.estimate_anew.checks.sensors import rest_of
-from rigidimeter.analysis.estimate_anew.grid import SAME_TIME, Complex, Grid, grid_of
+from rigidimeter.analysis.estimate_anew.grid import SAME_TIME, Array, Complex, Grid, grid_of
 from rigidimeter.analysis.estimate_anew.observation import Observation
 from rigidimeter.analysis.estimate_anew.signals import band_hz, kinematics, values_at
+from rigidimeter.analysis.estimate_anew.solve import shortest
 from rigidimeter.analysis.estimate_anew.stretches import fitted_channels
 from rigidimeter.core.findings import UNKNOWN_EFFECT, Effect, Fact, Finding
 from rigidimeter.core.records import PARAMETERS, Activity, Epoch, Fit
@@ -34,8 +44,6 @@ from rigidimeter.core.settings import Settings
 from rigidimeter.core.words import number
 
 WINDOW_S = 1.0
-WHOLE = 1.0 - 1e-9
-"""Of the window: where it does not fall to an end."""
 
 COURSE = 3
 """Degree of the polynomial in time that is no movement, but where the joint went to rest."""
@@ -45,7 +53,20 @@ STANDS_OUT = 3.0
 """The power of the line over that 1 Hz beside it, and over the median, at least."""
 
 
-def pushing(observation: Observation, fit: Fit, settings: Settings, pull: Pull) -> list[Finding]:
+def own_torque(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
+    """Return what the torque holds that is the subject's own."""
+    seen = checked_lines(_to_tremor(observation))
+    settings, bias = seen.settings.diagnostics, pull.bias
+    free = 0.0 if bias is None or not np.all(np.isfinite(bias)) else bias
+    own, freed = _steady(seen, np.stack([fit.value, fit.value - free]))
+    torque_sd_nm = math.sqrt(np.sum(_power(seen.grid, seen.torque_nm)))
+    told = pull.told(fit, settings)
+    return pushing(seen, own, torque_sd_nm, told) + tremor(seen, freed, torque_sd_nm, told)
+
+
+def pushing(
+    seen: Observation, own: Complex, torque_sd_nm: float, told: Mapping[str, Any]
+) -> list[Finding]:
     """Return how much of the torque is the subject's own, in the voluntary band, and how often.
 
     A second is active if the SD of M_sub in it is above `active_torque_nm` and above
@@ -54,76 +75,69 @@ def pushing(observation: Observation, fit: Fit, settings: Settings, pull: Pull) 
 
     Parameters
     ----------
-    observation : Observation
-    fit : Fit
-        Its J, B and K.
-    settings : Settings
-    pull : Pull
-        What torque of the subject does to them.
+    seen : Observation
+        At the lines of the checks.
+    own : complex array, shape (m,)
+        M_sub.
+    torque_sd_nm : float
+    told : mapping
+        What torque of the subject does to J, B and K.
     """
-    checks, torque_sd_nm = settings.diagnostics, _torque_sd_nm(observation)
-    grid, own = _own_torque(observation, fit.value)
-    low_hz, high_hz = checks.voluntary_low_hz, checks.voluntary_high_hz
-    frequency_hz = grid.line / grid.duration_s
+    checks, power, frequency_hz = (
+        seen.settings.diagnostics,
+        _power(seen.grid, own),
+        hertz(seen.grid),
+    )
+    band = low_hz, high_hz = checks.voluntary_low_hz, checks.voluntary_high_hz
     inside = (frequency_hz >= low_hz) & (frequency_hz <= high_hz)
-    why, shown = pull.harmless(fit, checks)
-    more = {"condition": fit.condition, "effect": pull.effect(fit), "harmless": why}
-
-    share = _sd_nm(grid, own[inside]) / torque_sd_nm if torque_sd_nm > 0 else math.nan
-    value, most = 100.0 * share**2, checks.max_voluntary_share_percent
-    facts = {"sd_nm": _sd_nm(grid, own), "low_hz": low_hz, "high_hz": high_hz, **shown}
-    results = at_most("voluntary_torque", checks, value, most, facts=facts, **more)
-
-    start_s, sd_nm = active_seconds(grid, own * _gain(grid, (low_hz, high_hz)))
+    value = 100.0 * float(np.sum(power[inside])) / torque_sd_nm**2 if torque_sd_nm else math.nan
+    facts = {"sd_nm": math.sqrt(np.sum(power)), "low_hz": low_hz, "high_hz": high_hz}
+    more = {**told, "facts": facts | told["facts"]}
+    results = at_most("voluntary_torque", checks, value, checks.max_voluntary_share_percent, **more)
+    # The SD is that about zero, not about the second's mean: a push of a second is no offset.
+    time_s, (values,), rate_hz = in_time(seen.grid, (own * gain(seen.grid, band))[None])
+    length = max(round(WINDOW_S * rate_hz), 1)
+    whole = values.size // length * length
+    sd_nm = np.sqrt(np.mean(values[:whole].reshape(-1, length) ** 2, axis=1))
     above_nm = max(checks.active_torque_nm, checks.active_share_percent / 100.0 * torque_sd_nm)
     active = sd_nm > above_nm
     value = 100.0 * float(np.mean(active)) if active.size else math.nan
-    first_s = float(start_s[active][0]) if np.any(active) else math.nan
-    facts = {"above_nm": above_nm, "first_s": first_s, **shown}
-    most = checks.max_active_percent
-    return results + at_most("active_movement", checks, value, most, facts=facts, **more)
+    first_s = float(time_s[:whole:length][np.argmax(active)]) if np.any(active) else math.nan
+    more = {**told, "facts": {"above_nm": above_nm, "first_s": first_s, **told["facts"]}}
+    return results + at_most("active_movement", checks, value, checks.max_active_percent, **more)
 
 
-def _own_torque(observation: Observation, values: Array) -> tuple[Grid, Complex]:
-    """Return M_sub in the band of the checks, at lines beyond those of tremor where they are known.
+def _to_tremor(observation: Observation) -> Observation:
+    """Return an epoch at lines beyond those of tremor where they are known.
 
     Without drive and instruments the fit ends where the samples no longer show the noise of the
     motion. That is too low for a tremor in 100 samples/s.
     """
-    seen, settings = observation.wider or observation, observation.settings
-    epoch, (low_hz, high_hz) = seen.epoch, band_hz(seen.epoch, settings.estimation)
-    grid, motion, torque_nm = seen.grid, seen.motion, seen.torque_nm
+    epoch, settings, grid = observation.epoch, observation.settings, observation.grid
+    low_hz, high_hz = band_hz(epoch, settings.estimation)
     beyond_hz = min(settings.diagnostics.tremor_high_hz + WIDTH_HZ, high_hz)
-    if grid.band_hz[1] < beyond_hz - 1.0 / grid.duration_s and not seen.drive_known:
-        channels, holes_s = fitted_channels(epoch), [one[:2] for one in epoch.left_out]
-        grid = grid_of(channels, (low_hz, beyond_hz), settings.estimation.trim_s, holes_s)
-        motion = grid.lines(kinematics(epoch, grid.time_s))[0].T
-        torque_nm = grid.lines(values_at(channels[0], grid.time_s, SAME_TIME))[0]
-    return grid, _steady(grid, motion @ values - torque_nm) * _gain(grid, (low_hz, high_hz))
+    if observation.drive_known or grid.band_hz[1] >= beyond_hz - 1.0 / grid.duration_s:
+        return observation
+    channels, holes_s = fitted_channels(epoch), [one[:2] for one in epoch.left_out]
+    grid = grid_of(channels, (low_hz, beyond_hz), settings.estimation.trim_s, holes_s)
+    motion = grid.lines(kinematics(epoch, grid.time_s))[0].T
+    torque_nm = grid.lines(values_at(channels[0], grid.time_s, SAME_TIME))[0]
+    return replace(observation, grid=grid, motion=motion, torque_nm=torque_nm)
 
 
-def _torque_sd_nm(observation: Observation) -> float:
-    """Return the SD of the torque in the band of the checks, whatever that of the fit."""
-    epoch, grid = observation.epoch, observation.grid
-    whole = replace(grid, line=np.arange(1, grid.time_s.size // 2))
-    torque_nm = whole.lines(values_at(epoch.channels["torque_nm"], grid.time_s, SAME_TIME))[0]
-    gain = _gain(whole, band_hz(epoch, observation.settings.estimation))
-    return _sd_nm(whole, torque_nm * gain)
+def _steady(seen: Observation, values: Array) -> Complex:
+    """Return M_sub of each J, B and K, shape (k, m), without a slow course below the band.
 
-
-def _steady(grid: Grid, lines: Complex) -> Complex:
-    """Return the lines without a slow course below the band, which the window spreads over them."""
+    The window spreads that over the lines.
+    """
+    grid = seen.grid
     x = np.linspace(-1.0, 1.0, grid.coarse_time_s.size)
     powers = np.asarray(np.polynomial.legendre.legvander(x, COURSE)[:, 1:].T, dtype=np.float64)
-    course = grid.coarse_lines(powers)
-    columns, target = (np.concatenate([z.real, z.imag], axis=-1) for z in (course, lines))
-    return np.asarray(lines - np.linalg.lstsq(columns.T, target, rcond=None)[0] @ course)
-
-
-def _gain(grid: Grid, band: tuple[float, float]) -> Array:
-    """Return what `signals.zero_phase_band` makes of the lines."""
-    low, high = (edge * grid.duration_s for edge in band)
-    return np.asarray(1.0 / (1.0 + (low / grid.line) ** 4) / (1.0 + (grid.line / high) ** 8))
+    course = grid.coarse_lines(powers).T
+    course *= gain(grid, band_hz(seen.epoch, seen.settings.estimation))[:, None]
+    left = (seen.motion @ values.T).T - seen.torque_nm
+    gram, moments = ((lines @ course.conj()).real for lines in (course.T, left))
+    return np.asarray(left - shortest(gram, moments) @ course.T)
 
 
 def _power(grid: Grid, lines: Complex) -> Array:
@@ -131,45 +145,18 @@ def _power(grid: Grid, lines: Complex) -> Array:
     return np.asarray(2.0 / (grid.time_s.size * grid.energy) * np.abs(lines) ** 2)
 
 
-def _sd_nm(grid: Grid, lines: Complex) -> float:
-    return math.sqrt(float(np.sum(_power(grid, lines))))
-
-
-def active_seconds(grid: Grid, lines: Complex) -> tuple[Array, Array]:
-    """Return the SD of a signal second by second, where the window is 1.
-
-    It is that about zero, not about the second's mean: a push of a second is no offset.
-
-    Returns
-    -------
-    start_s : array, shape (k,)
-        When each whole second begins, on the epoch's clock.
-    sd : array, shape (k,)
-    """
-    few = grid.in_time(lines)
-    place = np.arange(few.size) * (grid.time_s.size / few.size)
-    whole = np.interp(place, np.arange(grid.time_s.size), grid.window[0]) > WHOLE
-    values = few[whole] * (math.sqrt(2.0 * few.size) / grid.time_s.size)
-    length = max(round(WINDOW_S * few.size / grid.duration_s), 1)
-    count = values.size // length
-    seconds = values[: count * length].reshape(count, length)
-    start_s = grid.time_s[0] + place[whole][: count * length : length] / grid.rate_hz
-    return start_s, np.sqrt(np.mean(seconds**2, axis=1))
-
-
-def tremor(observation: Observation, fit: Fit, settings: Settings, pull: Pull) -> list[Finding]:
+def tremor(
+    seen: Observation, own: Complex, torque_sd_nm: float, told: Mapping[str, Any]
+) -> list[Finding]:
     """Return the strongest line of M_sub in the tremor band, if it stands out.
 
     Nothing is said where the band of the checks ends below the tremor. Parameters are those of
-    `pushing`.
+    `pushing`; M_sub is that of a joint freed of the pull.
     """
-    checks, bias = settings.diagnostics, pull.bias
-    free = 0.0 if bias is None or not np.all(np.isfinite(bias)) else bias
-    grid, own = _own_torque(observation, fit.value - free)
-    frequency_hz, power = grid.line / grid.duration_s, _power(grid, own)
-    width = max(round(WIDTH_HZ * grid.duration_s), 1)
+    checks, frequency_hz = seen.settings.diagnostics, hertz(seen.grid)
+    power, width = _power(seen.grid, own), max(round(WIDTH_HZ * seen.grid.duration_s), 1)
     running = np.convolve(power, np.ones(width), "same")
-    highest_hz = band_hz(observation.epoch, settings.estimation)[1] - WIDTH_HZ / 2
+    highest_hz = band_hz(seen.epoch, seen.settings.estimation)[1] - WIDTH_HZ / 2
     high_hz = min(checks.tremor_high_hz, highest_hz)
     inside = np.flatnonzero((frequency_hz >= checks.tremor_low_hz) & (frequency_hz <= high_hz))
     if inside.size < 3 * width:
@@ -177,22 +164,18 @@ def tremor(observation: Observation, fit: Fit, settings: Settings, pull: Pull) -
     at = int(inside[np.argmax(running[inside])])
     # The end of a push at low frequency has no valley on its other side.
     beside = running[[max(at - width, 0), min(at + width, running.size - 1)]]
-    background = max(*beside, np.median(running[inside]), 1e-300)
-    stands_out, torque_sd_nm = float(running[at] / background), _torque_sd_nm(observation)
-    share = float(running[at]) / torque_sd_nm**2 if torque_sd_nm > 0 else math.nan
+    stands_out = float(running[at] / max(*beside, np.median(running[inside]), 1e-300))
+    if stands_out < STANDS_OUT:
+        return []
     near = slice(max(at - width // 2, 0), at + width // 2 + 1)
-    why, shown = pull.harmless(fit, checks)
     facts: dict[str, Fact] = {
         "frequency_hz": float(np.average(frequency_hz[near], weights=power[near] + 1e-300)),
         "amplitude_nm": math.sqrt(2.0 * running[at]),
         "stands_out": stands_out,
-        **shown,
     }
-    if stands_out < STANDS_OUT:
-        return []
-    more = {"condition": fit.condition, "effect": pull.effect(fit), "harmless": why}
-    most = checks.max_tremor_share_percent
-    return at_most("tremor", checks, 100.0 * share, most, facts=facts, **more)
+    value = 100.0 * float(running[at]) / torque_sd_nm**2 if torque_sd_nm else math.nan
+    more = {**told, "facts": facts | told["facts"]}
+    return at_most("tremor", checks, value, checks.max_tremor_share_percent, **more)
 
 
 def emg_activity(
@@ -220,47 +203,33 @@ def emg_activity(
     """
     if activity is None:
         return []
-    checks, condition = settings.diagnostics, fit.condition
+    checks, variant = settings.diagnostics, ""
     value, most = activity.active_percent, checks.max_emg_active_percent
     active = (epoch.channels[one.channel] for one in activity.stretches)
     muscles = dict.fromkeys(one.spoken or one.name for one in active)
+    more = pull.told(fit, checks)
     facts: dict[str, Fact] = {"channel": " and ".join(muscles)}
-    effect, variant, why = pull.effect(fit), "", "left_out"
     out = [one for one in epoch.left_out if one.check == CHECK]
     if out:
-        facts |= rest_of(epoch, out)
+        facts, more["harmless"] = facts | rest_of(epoch, out), "left_out"
         if with_active is not None:
             change, half = with_active.value - fit.value, half_widths(with_active)
-            effect = Effect.of(change, with_active.value, half)
-            both = ", ".join(
+            more["effect"] = Effect.of(change, with_active.value, half)
+            both = [
                 f"{p.symbol} {number(one)} with them and {number(other)} without"
-                for p, one, other, shown in zip(
-                    PARAMETERS, with_active.value, fit.value, np.abs(change) > half, strict=True
-                )
-                if shown
-            )
-            if both:
-                facts["both"], variant, why = both, "moved", ""
+                for p, one, other in zip(PARAMETERS, with_active.value, fit.value, strict=True)
+            ]
+            if np.any(moved := np.abs(change) > half):
+                facts["both"] = ", ".join(itertools.compress(both, moved))
+                more["harmless"], variant = "", "moved"
     elif activity.stretches and all(one.locked for one in activity.stretches):
-        why = "locked"
+        more["harmless"] = "locked"
     elif activity.kept:
         # What the joint was while the muscle pulled no method can tell.
-        facts["why"], effect, variant, why = activity.kept, UNKNOWN_EFFECT, "too_much", ""
+        facts["why"], variant = activity.kept, "too_much"
+        more |= {"harmless": "", "effect": UNKNOWN_EFFECT}
     elif value <= most:
         return []
     else:
-        why, more = pull.harmless(fit, checks)
-        facts |= more
-    return [
-        found(
-            CHECK,
-            checks,
-            value,
-            most,
-            condition=condition,
-            effect=effect,
-            facts=facts,
-            variant=variant,
-            harmless=why,
-        )
-    ]
+        facts |= more["facts"]
+    return [found(CHECK, checks, value, most, **{**more, "facts": facts, "variant": variant})]

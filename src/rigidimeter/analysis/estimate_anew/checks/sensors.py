@@ -30,30 +30,35 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy
 
-from rigidimeter.analysis.estimate_anew.checks import Array, at_least, at_most, found, half_widths
-from rigidimeter.analysis.estimate_anew.grid import Complex, grid_of
+from rigidimeter.analysis.estimate_anew.checks import (
+    Pull,
+    at_least,
+    at_most,
+    found,
+    half_widths,
+)
+from rigidimeter.analysis.estimate_anew.checks.excitation import WHOLE, hertz
+from rigidimeter.analysis.estimate_anew.grid import SAME_TIME, Array, Complex
+from rigidimeter.analysis.estimate_anew.observation import Observation
 from rigidimeter.analysis.estimate_anew.signals import (
     angle_at,
     band_hz,
-    grid_rate_hz,
     held_at,
-    uniform_grid,
     values_at,
+    velocity_at,
 )
+from rigidimeter.analysis.estimate_anew.solve import shortest
 from rigidimeter.analysis.estimate_anew.stretches import (
-    at_extremes_percent,
-    fitted_channels,
-    left_out_s,
     motion_channels,
     moves,
-    repeated,
     sound,
+    unmeasured,
+    used_s,
 )
 from rigidimeter.core.findings import Effect, Fact, Finding
 from rigidimeter.core.records import LOST_SAMPLES, Channel, Epoch, Fit, LeftOut
-from rigidimeter.core.settings import DiagnosticsSettings, Settings
+from rigidimeter.core.settings import DiagnosticsSettings
 from rigidimeter.core.units import rad_from_deg
 
 MOST_SHOWN = 3
@@ -74,26 +79,14 @@ CLEARLY = 1.25
 """So many times as much of the torque must the worse motion leave unexplained to be called it."""
 
 
-def sensors(epoch: Epoch, settings: Settings, followed: bool) -> list[Finding]:
+def sensors(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
     """Return what sensors, loop and guard show of an epoch alone.
 
     A torque that was computed comes before channels: a binary one repeats its extremes too.
-
-    Parameters
-    ----------
-    epoch : Epoch
-        As fitted.
-    settings : Settings
-    followed : bool
-        Whether the method knows how the drive carries out a command that it holds.
     """
-    checks = settings.diagnostics
-    alone = computed_torque(epoch, checks) + repeating(epoch, checks) + left_out(epoch, checks)
-    return _of(epoch, alone + loop(epoch, settings, followed))
-
-
-def _of(epoch: Epoch, findings: Sequence[Finding]) -> list[Finding]:
-    return [replace(one, condition=epoch.condition) for one in findings]
+    epoch, checks = seen.epoch, seen.settings.diagnostics
+    findings = computed_torque(epoch, checks) + repeating(epoch, checks) + left_out(epoch, checks)
+    return findings + loop(seen)
 
 
 def computed_torque(epoch: Epoch, settings: DiagnosticsSettings) -> list[Finding]:
@@ -103,13 +96,12 @@ def computed_torque(epoch: Epoch, settings: DiagnosticsSettings) -> list[Finding
     """
     if epoch.virtual:
         return []
-    sent = [epoch.channels[name] for name in ("perturbation_nm",) if name in epoch.channels]
+    sent = [one for name, one in epoch.channels.items() if name == "perturbation_nm"]
     causes = {"the motion": motion_channels(epoch), "the perturbation": sent}
     shares = {name: 100.0 * _not_a_sum(epoch, channels) for name, channels in causes.items()}
     origin = min(shares, key=lambda name: shares[name])
+    # Infinite where there is nothing to compare it with.
     value, least = shares[origin], settings.min_computed_torque_percent
-    if math.isinf(value):
-        return []  # nothing to compare it with
     return at_least("computed_torque", settings, value, least, facts={"origin": origin})
 
 
@@ -145,30 +137,28 @@ def _left(regressors: Array, target: Array) -> Array:
 
 def repeating(epoch: Epoch, settings: DiagnosticsSettings) -> list[Finding]:
     """Return whether a channel was at the end of its range, or hung."""
-
-    def seen(one: Channel, extreme: bool) -> tuple[float, dict[str, Fact]]:
-        runs = repeated(epoch, one, settings.max_frozen_s, extreme=extreme)
-        if extreme:
-            return at_extremes_percent(one, runs), {"channel": one.name}
-        spans_s = np.vstack([one.time_s[[0, 0]], one.time_s[runs]])
-        start_s, stop_s = spans_s[np.argmax(np.ptp(spans_s, axis=1))].tolist()
-        return stop_s - start_s, {"channel": one.name, "start_s": start_s}
-
     results: list[Finding] = []
-    limits = {"saturation": settings.max_saturated_percent, "frozen": settings.max_frozen_s}
-    for name, most in limits.items():
-        extreme = name == "saturation"
-        if out := [one for one in epoch.left_out if one.check == name]:
-            value = max(one.stop_s - one.start_s for one in out)
-            value = 100.0 * _seconds(out) / _length_s(epoch) if extreme else value
-            # The reason of a stretch begins with its channel.
-            said = " and ".join(dict.fromkeys(one.reason.split()[0] for one in out))
-            facts = {"channel": said, **rest_of(epoch, out)}
-            results.append(found(name, settings, value, most, facts=facts, harmless="left_out"))
-        else:
-            each = [seen(one, extreme) for one in fitted_channels(epoch)]
-            value, facts = max(each, key=lambda one: one[0])
-            results += at_most(name, settings, value, most, facts=facts)
+    inside, interval_s = unmeasured(epoch, settings), 1.0 / epoch.channels["torque_nm"].rate_hz
+    for name in ("saturation", "frozen"):
+        out = [one for one in epoch.left_out if one.check == name]
+        spans = out or [one for one in inside if one.check == name]
+        if not spans:
+            continue
+        # The reason of a stretch begins with its channel.
+        names = dict.fromkeys(one.reason.split()[0] for one in spans)
+        facts: dict[str, Fact] = {"channel": " and ".join(names)}
+        longest_s, first_s = max((one.stop_s - one.start_s, one.start_s) for one in spans)
+        value, most = longest_s, settings.max_frozen_s
+        if name == "saturation":
+            most = settings.max_saturated_percent
+            repeated_s = (_seconds(spans) + len(spans) * interval_s) / len(names)
+            value = 100.0 * repeated_s / _length_s(epoch)
+        elif not out:
+            facts["start_s"] = first_s
+        if out:
+            facts |= rest_of(epoch, out)
+        harmless = "left_out" if out else ""
+        results.append(found(name, settings, value, most, facts=facts, harmless=harmless))
     return results
 
 
@@ -201,40 +191,42 @@ def _length_s(epoch: Epoch) -> float:
 def rest_of(epoch: Epoch, stretches: Sequence[LeftOut]) -> dict[str, Fact]:
     """Return which parts are left out, and how much of the epoch is used."""
     spans = [f"from {s.start_s:.4g} to {s.stop_s:.4g} s" for s in stretches[:MOST_SHOWN]]
-    more, length_s = len(stretches) - MOST_SHOWN, _length_s(epoch)
+    more = len(stretches) - MOST_SHOWN
     shown = " and ".join(spans) + (f" and {more} more" if more > 0 else "")
-    return {"spans": shown, "used_s": length_s - left_out_s(epoch), "length_s": length_s}
+    return {"spans": shown, "used_s": used_s(epoch, 0.0), "length_s": _length_s(epoch)}
 
 
-def loop(epoch: Epoch, settings: Settings, followed: bool) -> list[Finding]:
+def loop(seen: Observation) -> list[Finding]:
     """Return ticks that never ran, commands that the guard changed, and the position limit."""
-    ticks, checks = epoch.ticks, settings.diagnostics
+    epoch, ticks, checks = seen.epoch, seen.epoch.ticks, seen.settings.diagnostics
     results: list[Finding] = []
-    if ticks is not None and "velocity_command_rad_s" in epoch.channels:
-        value, most = ticks.missed_percent, checks.max_missed_ticks_percent
-        facts = {"missed": ticks.missed, "ticks": ticks.ran + ticks.missed, "late": ticks.late}
-        why = "followed" if followed else ""
-        results += at_most("missed_ticks", checks, value, most, facts=facts, harmless=why)
     if ticks is not None:
+        if "velocity_command_rad_s" in epoch.channels:
+            value, most = ticks.missed_percent, checks.max_missed_ticks_percent
+            facts = {"missed": ticks.missed, "ticks": ticks.ran + ticks.missed, "late": ticks.late}
+            more = {"facts": facts, "harmless": "followed" if seen.drive_known else ""}
+            results += at_most("missed_ticks", checks, value, most, **more)
         value, most = 100.0 * ticks.limited / ticks.ran, checks.max_limited_percent
         results += at_most("guard_limited", checks, value, most)
     angle = epoch.channels.get("angle_rad")
     if angle is not None and epoch.excitation_hz is not None:  # of a session
-        limit_deg, most = settings.guard.position_limit_deg, checks.max_position_percent
+        limit_deg, most = seen.settings.guard.position_limit_deg, checks.max_position_percent
         value = 100.0 * float(np.max(np.abs(angle.values))) / rad_from_deg(limit_deg)
         results += at_most("position_limit", checks, value, most, facts={"limit_deg": limit_deg})
     return results
 
 
-def velocity(epoch: Epoch, fit: Fit, settings: Settings) -> list[Finding]:
+def velocity(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
     """Return whether the velocity has the scale of the angle, its time, and its shape.
 
     With the torque in time with the velocity B is K τ too low, which half its interval must hold.
     """
-    scale, delay_s = velocity_fit(epoch)
+    if not {"angle_rad", "velocity_rad_s"} <= seen.epoch.channels.keys():
+        return []
+    scale, delay_s = velocity_fit(seen)
     if not np.isfinite([scale, delay_s]).all():
         return []  # what does not move is found by other checks
-    checks, late_ms, half = settings.diagnostics, 1e3 * delay_s / scale, half_widths(fit)
+    checks, late_ms, half = seen.settings.diagnostics, 1e3 * delay_s / scale, half_widths(fit)
     value, most = 100.0 * abs(scale - 1.0), checks.max_velocity_scale_percent
     results = at_most("velocity_scale", checks, value, most, facts={"scale": scale})
     bias = np.array([0.0, -1e-3 * fit.value[2] * late_ms, 0.0])
@@ -243,66 +235,52 @@ def velocity(epoch: Epoch, fit: Fit, settings: Settings) -> list[Finding]:
     if not abs(late_ms) <= most:
         effect = Effect.of(bias, fit.value, half)
         results.append(found("velocity_delay", checks, late_ms, most, effect=effect))
-    return _of(epoch, results + velocity_shape(epoch, settings))
+    return results + velocity_shape(seen)
 
 
-def velocity_fit(epoch: Epoch) -> tuple[float, float]:
+def velocity_fit(seen: Observation) -> tuple[float, float]:
     """Return the scale g and the delay τ in s of the velocity against the angle.
 
-    NaN where one is missing, or the epoch does not move or is too short.
+    NaN where the epoch does not move or is too short.
     """
-    angle, velocity = epoch.channels.get("angle_rad"), epoch.channels.get("velocity_rad_s")
-    if angle is None or velocity is None:
-        return math.nan, math.nan
-    low_s = max(angle.time_s[0], velocity.time_s[0])
-    high_s = min(angle.time_s[-1], velocity.time_s[-1]) - STRETCH_S
-    starts_s = angle.time_s[(angle.time_s >= low_s) & (angle.time_s <= high_s)]
+    time_s, (v, x) = seen.grid.coarse_time_s, seen.coarse
+    travelled = np.append(0.0, np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(time_s)))
+    n = max(round(STRETCH_S * seen.grid.rate_hz / seen.grid.step), 1)
     # Neither a stretch that is left out nor one that reaches into it.
-    starts_s = starts_s[sound(epoch, starts_s, STRETCH_S)]
-    time_s, values = velocity.time_s, velocity.values
-    travelled = np.append(0.0, np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time_s)))
-    pairs = (time_s, travelled), (time_s, values), (angle.time_s, angle.values)
-    steps = [np.interp(starts_s + STRETCH_S, *one) - np.interp(starts_s, *one) for one in pairs]
-    regressors = np.column_stack(steps[:2])
-    lengths = np.linalg.norm(regressors, axis=0)
-    if starts_s.size < 3 or not lengths.all():
+    kept, signals = sound(seen.epoch, time_s[:-n], STRETCH_S), np.stack([travelled, v, x])
+    steps = (signals[:, n:] - signals[:, :-n])[:, kept]
+    products = steps @ steps.T
+    if steps.shape[1] < 3 or not np.all(np.diag(products)[:2] > 0):
         return math.nan, math.nan
-    scale, delay_s = np.linalg.lstsq(regressors / lengths, steps[2])[0] / lengths
-    return float(scale), float(delay_s)
+    scale, delay_s = shortest(products[:2, :2], products[:2, 2]).tolist()
+    return scale, delay_s
 
 
-def velocity_shape(epoch: Epoch, settings: Settings) -> list[Finding]:
+def velocity_shape(seen: Observation) -> list[Finding]:
     """Return whether the velocity follows the angle's derivative up to 10 Hz."""
-    wanted, checks = ("torque_nm", "angle_rad", "velocity_rad_s"), settings.diagnostics
-    channels = [epoch.channels[name] for name in wanted if name in epoch.channels]
-    band = band_hz(epoch, settings.estimation)
-    highest_hz = min(band[1], SHAPE_HIGH_HZ)
-    if len(channels) < len(wanted) or highest_hz <= 2 * band[0]:
-        return []
-    holes_s = [one[:2] for one in epoch.left_out]
-    try:
-        grid = grid_of(channels, band, settings.estimation.trim_s, holes_s)
-    except ValueError:
-        return []  # too few lines
-    torque, angle, velocity = (values_at(one, grid.time_s) for one in channels)
-    by_angle, by_velocity = grid.lines(angle, 2), grid.lines(velocity, 1)
-    slow = grid.line <= highest_hz * grid.duration_s
-    follows = _r_squared(by_velocity[:, slow], by_angle[1, slow])
-    value, most = 100.0 * math.sqrt(1.0 - follows), checks.max_velocity_shape_percent
-    if not value > most:
+    epoch, grid, checks = seen.epoch, seen.grid, seen.settings.diagnostics
+    low_hz, high_hz = band_hz(epoch, seen.settings.estimation)
+    highest_hz, (v, x) = min(high_hz, SHAPE_HIGH_HZ), seen.coarse
+    slow, used = (hertz(grid) <= most_hz for most_hz in (highest_hz, high_hz))
+    slope, own = grid.coarse_motion(x, v)[slow, 0], grid.coarse_motion(v, x)[slow, :2]
+    value = 100.0 * math.sqrt(1.0 - _r_squared(own.T, slope))
+    most = checks.max_velocity_shape_percent
+    if highest_hz <= 2 * low_hz or not value > most:
         return []
     rest = {name: one for name, one in epoch.channels.items() if name != "angle_rad"}
     integral = angle_at(replace(epoch, channels=rest), grid.time_s)
     # It drifts, and does not know how far the joint went in what is left out.
-    drifts = [grid.time_s - grid.time_s[0], *(grid.time_s > stop_s for _, stop_s in holes_s)]
-    integrals, (target,) = grid.lines(np.stack([integral, *drifts]))[0], grid.lines(torque)
-    shares = {
-        "by_angle": _r_squared(by_angle, target),
-        "by_velocity": _r_squared(np.concatenate([by_velocity, integrals]), target),
-    }
-    less, more = sorted(1.0 - share for share in shares.values())
-    worse = "velocity" if shares["by_angle"] > shares["by_velocity"] else "angle"
-    facts = {"low_hz": band[0], "high_hz": highest_hz, **shares}
+    drifts = [grid.time_s - grid.time_s[0], *(grid.time_s > one.stop_s for one in epoch.left_out)]
+    by_angle = grid.lines(angle_at(epoch, grid.time_s), 2)
+    by_velocity = grid.lines(velocity_at(epoch, grid.time_s), 1)
+    by_velocity = np.concatenate([by_velocity, grid.lines(np.stack([integral, *drifts]))[0]])
+    of_angle, of_velocity = (
+        _r_squared(lines[:, used], seen.torque_nm[used]) for lines in (by_angle, by_velocity)
+    )
+    less, more = sorted((1.0 - of_angle, 1.0 - of_velocity))
+    worse = "velocity" if of_angle > of_velocity else "angle"
+    facts: dict[str, Fact] = {"by_angle": of_angle, "by_velocity": of_velocity}
+    facts |= {"low_hz": low_hz, "high_hz": highest_hz}
     variant = worse if more > CLEARLY * less else ""
     return [found("velocity_shape", checks, value, most, facts=facts, variant=variant)]
 
@@ -315,24 +293,20 @@ def _r_squared(regressors: Complex, target: Complex) -> float:
     return 1.0 - float(left @ left) / power if power > 0 else math.nan
 
 
-def static_torque(epoch: Epoch, settings: Settings) -> list[Finding]:
+def static_torque(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
     """Return whether the torque is a function of the angle."""
-    angle, torque = epoch.channels.get("angle_rad"), epoch.channels["torque_nm"]
-    if angle is None:
+    channels, grid, checks = seen.epoch.channels, seen.grid, seen.settings.diagnostics
+    if "angle_rad" not in channels:
         return []
-    highest_hz, trim_s = band_hz(epoch, settings.estimation)[1], settings.estimation.trim_s
-    used = [torque, *motion_channels(epoch)]
-    rate_hz = grid_rate_hz(used, highest_hz)
-    time_s = uniform_grid(used, rate_hz)
-    inside = (time_s >= time_s[0] + trim_s) & (time_s <= time_s[-1] - trim_s)
-    time_s = time_s[inside & sound(epoch, time_s, trim_s)]
-    # Noise above the band is nobody's torque. A filter without overshoot keeps the function.
-    length = max(round(rate_hz / (2.0 * highest_hz)), 1)
+    # Noise above the band is nobody's torque. Means without overshoot keep the function.
+    highest_hz, kept = band_hz(seen.epoch, seen.settings.estimation)[1], grid.window[0] > WHOLE
+    length = max(round(grid.rate_hz / (2.0 * highest_hz)), 1)
+    blocks = np.count_nonzero(kept) // length
     posture, values = (
-        scipy.ndimage.uniform_filter1d(np.interp(time_s, one.time_s, one.values), length)
-        for one in (angle, torque)
+        values_at(one, grid.time_s, SAME_TIME)[kept][: blocks * length].reshape(blocks, length)
+        for one in (channels["angle_rad"], channels["torque_nm"])
     )
-    steps, variance = np.diff(values[np.argsort(posture, kind="stable")]), float(np.var(values))
-    value = 100.0 * float(np.mean(steps**2)) / (2.0 * variance) if variance > 0 else math.nan
-    least = settings.diagnostics.min_static_torque_percent
-    return _of(epoch, at_least("static_torque", settings.diagnostics, value, least))
+    values = values.mean(axis=1)[np.argsort(posture.mean(axis=1), kind="stable")]
+    variance = float(np.var(values))
+    value = 50.0 * float(np.mean(np.diff(values) ** 2)) / variance if variance > 0 else math.nan
+    return at_least("static_torque", checks, value, checks.min_static_torque_percent)
