@@ -521,12 +521,14 @@ def _gains(
     for term in sure:
         one = tested.scores[term.name]
         gain, inner = one.explained - 2 * len(tested.model.tested[term.name]), term.first[0]
+        resists = not term.resists or one.values[0] > 0
         if len(term.inner) > 1:
             looked = _instruments(case, state, [(term, term.inner)], len(term.inner))
             each = by.explained(looked, tested.fit)
+            each = each if term.resists else np.abs(each)
             gain, inner = float(np.max(each)) - 4, term.inner[int(np.argmax(each))]
-        # Of several kernels the first may be negative though their sum resists.
-        if not (term.resists and len(term.first) == 1 and one.values[0] <= 0):
+            resists = gain > 0
+        if resists:
             found[term.name] = gain, inner
     return found
 

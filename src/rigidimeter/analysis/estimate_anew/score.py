@@ -206,7 +206,10 @@ def _of_places(blocks: Sequence[Array], places: Sequence[Place]) -> Array:
 
 
 def explained(instruments: Sequence[Complex], fit: Fitted) -> Array:
-    """Return χ² beside a base of each of many single instruments, shape (k, m) an epoch."""
+    """Return χ² beside a base of each of many single instruments, shape (k, m) an epoch.
+
+    It has the sign of the coefficient.
+    """
     b = [column for column, epoch in fit.base if epoch == EVERY]
     total = [np.zeros(()) for _ in range(6)]
     for D, part, left in zip(instruments, fit.parts, fit.left, strict=True):
@@ -217,7 +220,7 @@ def explained(instruments: Sequence[Complex], fit: Fitted) -> Array:
     g, cross, own, gram, within, size = total
     through = cross @ np.linalg.inv(gram)
     beside = size - 2 * np.sum(through * own, axis=1) + np.sum(through @ within * through, axis=1)
-    return np.asarray(2 * g[:, 0] ** 2 / np.maximum(beside, ALIKE * size + TINY))
+    return np.asarray(2 * g[:, 0] * np.abs(g[:, 0]) / np.maximum(beside, ALIKE * size + TINY))
 
 
 def chance(of_blocks: Array) -> float:
