@@ -172,8 +172,6 @@ class Found(NamedTuple):
         Of the values.
     inner, inner_half : array, shape (d,)
         NaN where it was not fitted.
-    effect : array, shape (3,)
-        What leaving it out adds to J, B and K.
     """
 
     term: Term
@@ -184,7 +182,6 @@ class Found(NamedTuple):
     covariance: Array = NONE
     inner: Array = NONE
     inner_half: Array = NONE
-    effect: Array = NONE
 
 
 class Answer(NamedTuple):
@@ -276,7 +273,7 @@ def answer(
             state = settled(case, state.beside(Taken(of.FINER[term.name])))
         gone = {term.name, *NOT_BESIDE.get(term.name, ())}
         offered = [one for one in offered if one.name not in gone]
-    return _answered(case, state, tested, solution, found, first, nameless)
+    return _answered(case, state, tested, found, first, nameless)
 
 
 def case_of(problems: Sequence[Problem]) -> Case:
@@ -679,7 +676,6 @@ def _answered(
     case: Case,
     state: State,
     tested: _Tested,
-    solution: Solution,
     found: Sequence[Found],
     p: dict[str, float],
     nameless: Score,
@@ -714,21 +710,15 @@ def _answered(
     if any(one.term.name in _LATE for one in found):
         half = half + unsure_s(case) * np.append(np.abs(joint[1:]), 0.0)
     told = []
-    for i, (one, own, slopes) in enumerate(
-        zip(state.taken, model.of_terms, model.of_slopes, strict=True)
-    ):
+    for one, own, slopes in zip(state.taken, model.of_terms, model.of_slopes, strict=True):
         if one.term.name not in named:
             continue
-        without = solution.values
-        if len(found) > 1:
-            rest = (*state.taken[:i], *state.taken[i + 1 :])
-            without = settled(case, state._replace(taken=rest), 3).joint
         inner_half = np.full(one.inner.size, np.nan)
         inner_half[one.moving] = half_of_all[slopes]
         values = one.inner[: own.stop - own.start] if one.term.bent else fit.values[own]
         told.append(named[one.term.name]._replace(
             values=values, half=half_of_all[own], covariance=covariance[own, own],
-            inner=one.inner, inner_half=inner_half, effect=without - joint,
+            inner=one.inner, inner_half=inner_half,
         ))  # fmt: skip
     return Answer(
         joint, half, of_joint, tuple(told), p, remains, left, change, answered, case, state
@@ -797,9 +787,7 @@ def beside(found: Answer) -> list[Problem]:
     return problems
 
 
-def findings_of(
-    found: Answer, solution: Solution, settings: Settings, *, stands: bool
-) -> tuple[Finding, ...]:
+def findings_of(found: Answer, settings: Settings, *, stands: bool) -> tuple[Finding, ...]:
     """Return the findings of an answer, one for each kind.
 
     What was answered is a note where J, B and K beside it stand in the fit, and nothing that is
@@ -808,8 +796,6 @@ def findings_of(
     Parameters
     ----------
     found : Answer
-    solution : Solution
-        J, B and K without terms.
     settings : Settings
     stands : bool
         Whether the fits give J, B and K beside the terms.
@@ -821,7 +807,7 @@ def findings_of(
         own = [one for one, its in zip(found.found, kinds, strict=True) if its == kind]
         if kind == "varying_between_epochs":
             continue  # told with the fits of single epochs
-        added = np.sum([one.effect for one in own], axis=0)
+        added = _without(found, {one.term.name for one in own}) - found.joint
         value, limit, facts, variant = _told(kind, own, added, found, limits)
         how = "" if not stands else "answered" if tested else "beside"
         if not found.answered:
@@ -852,6 +838,13 @@ def findings_of(
     return tuple(told)
 
 
+def _without(found: Answer, names: set[str]) -> Array:
+    """Return J, B and K if these terms are left out."""
+    state = found.state
+    rest = tuple(one for one in state.taken if one.term.name.removesuffix(", finer") not in names)
+    return settled(found.case, state._replace(taken=rest), 3).joint
+
+
 def _kind(term: Term, case: Case) -> str:
     """Return the kind of a term's finding: within a small range the angle is not what counts."""
     if term.finding == "varying_with_angle":
@@ -877,7 +870,11 @@ def _told(
         does = "do" if len(ranges) > 2 else "does"
         facts = {**ranges[0][1], "others": f"; so {does} {others}" if others else ""}
         return ranges[0][0], limits.max_varying_percent, facts, ""
-    asked = ["inertia", "damping", "stiffness", *(one.term.asked for one in own)]
+    asked = ["inertia", "damping", "stiffness"]
+    for one in own:
+        slow = one.term.muscle and one.inner[1] > 0
+        more = "reflex-second-order" if slow else "reflex"
+        asked.append(one.term.asked.replace("reflex", more))
     if "directional-damping" in asked:
         asked.remove("damping")  # the whole and its two halves are one too many
     sizes = []

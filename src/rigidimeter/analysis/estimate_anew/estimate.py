@@ -795,9 +795,7 @@ def _together(
             bands += band_estimates(seen, one.values, pool if method.uses_perturbation else None)
         found_in[one.condition] = [
             replace(finding, condition=one.condition, epochs=one.labels)
-            for finding in findings_of(
-                one.answer, one.solution, seen[0].settings, stands=bool(one.problems)
-            )
+            for finding in findings_of(one.answer, seen[0].settings, stands=bool(one.problems))
         ]
 
     def with_shared(fit: Fit, more: Sequence[Finding], settings: Settings) -> Fit:

@@ -204,7 +204,8 @@ def test_a_reflex_beside_torque_of_the_subject_is_answered(perturbation: bool) -
     assert found.answered
     assert np.all(np.abs(found.joint - truth) < 2 * found.half)
     assert abs(solution.values[1] - truth[1]) > 0.1 * truth[1]
-    (told,) = findings_of(found, solution, solution.problems[0].observation.settings)
+    settings = solution.problems[0].observation.settings
+    (told,) = findings_of(found, settings, stands=True)
     assert told.name == "missing_term"
     assert told.facts["late_ms"] == pytest.approx(58, abs=1)
     assert not [one for one in answer(solution, person=False).found if one.term.muscle]
@@ -216,7 +217,8 @@ def test_nothing_is_found_where_nothing_is() -> None:
     assert not found.found
     assert found.answered
     assert found.joint == pytest.approx(solution.values, rel=1e-3)
-    assert findings_of(found, solution, solution.problems[0].observation.settings) == ()
+    settings = solution.problems[0].observation.settings
+    assert findings_of(found, settings, stands=False) == ()
     case = case_of(solution.problems)
     assert case.caused
 
