@@ -58,11 +58,10 @@ _SERIES: Mapping[str, tuple[str, str, str, str]] = {
     "lateness_s": (
         "acquisition", "ControlLoopLateness", "s", "How late each tick of the loop was.",
     ),
+    # Only a column with its standard name is EMG without being named by the user.
     **{
-        name: (
-            "acquisition", f"EMG{k}" if k > 1 else "EMG", "V", "Raw electromyogram of one muscle.",
-        )
-        for k, name in enumerate(EMG_CHANNELS, start=1)
+        name: ("acquisition", name, "V", "Raw electromyogram of one muscle.")
+        for name in EMG_CHANNELS
     },
     "perturbation_nm": (
         "stimulus", "TorquePerturbation", "N·m", "Torque that the perturbation commanded.",
