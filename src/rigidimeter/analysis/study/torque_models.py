@@ -126,7 +126,9 @@ def model_recording(
         except ValueError as error:
             found.append(ModelledEpoch(ready.epoch, None, str(error), compare))
             continue
-        of_epoch = EpochModels(seen[0].grid.band_hz, compared, fit.findings)
+        low_hz, upper_hz = seen[0].grid.band_hz
+        band_hz = (low_hz if high_hz is None else 0.0, upper_hz)
+        of_epoch = EpochModels(band_hz, compared, fit.findings)
         found.append(ModelledEpoch(ready.epoch, of_epoch, "", compare, clock))
     if not found:
         raise UserError("every epoch is an imposed sinusoid; a model needs a perturbed one")

@@ -122,17 +122,6 @@ headline: No estimate: the torque holds more than {terms}
 meaning: <more>
 remedy: <repeat>
 
-== differs_from_estimate | caution | % |
-checks: by rigidimeter model: J, B and K alone, by the least squares that fits the terms, less those
-    of rigidimeter estimate in the same band; the largest of the three, in % of half its interval
-headline: Least squares gives {changes} against `estimate`
-measured: J, B and K alone, fitted as the terms are, differ from `estimate` in the same band (method
-    {method}) by {value:.3g} % of half its interval (at most {limit:g} %).
-meaning: The fit of terms uses neither the perturbation nor the motion between samples, so all its
-    coefficients may be as wrong.
-remedy: Where J, B and K explain the torque, take them from `rigidimeter estimate`.
-example: {"value": 660.0, "limit": 100.0, "percent_of": [-0.84, 0.1, 0.0]}
-
 == controller_misfit | caution | % | max_controller_misfit_percent
 checks: difference of the recorded velocity command from what the controller of the settings makes
     of perturbation and torque, 0.5 to 10 Hz but for the line at which they differ most, in % of the

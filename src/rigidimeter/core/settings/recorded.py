@@ -54,7 +54,10 @@ _RENAMED: Mapping[str, Mapping[str, str]] = {
 }
 """By table, the name that a key had and the one that it has."""
 
-_REMOVED = {"estimation": ("intervals", "bootstrap_draws")}
+_REMOVED = {
+    "estimation": ("intervals", "bootstrap_draws"),
+    "levels": ("differs_from_estimate",),
+}
 _LEVELS = {"doubt": "caution"}
 
 
@@ -81,6 +84,7 @@ def with_new_names(values: Any) -> Any:
     diagnostics = renamed.get("diagnostics")
     if isinstance(diagnostics, Mapping) and isinstance(diagnostics.get("levels"), Mapping):
         levels = diagnostics["levels"]
-        kept = {k: _LEVELS.get(v, v) if isinstance(v, str) else v for k, v in levels.items()}
+        found = {k: v for k, v in levels.items() if k not in _REMOVED["levels"]}
+        kept = {k: _LEVELS.get(v, v) if isinstance(v, str) else v for k, v in found.items()}
         renamed["diagnostics"] = {**diagnostics, "levels": kept}
     return renamed

@@ -189,7 +189,9 @@ def _solution(perturbation: bool = True, **changes: dict) -> tuple[Solution, np.
     causes = [] if perturbation else None
     loop = loop_of(settings, made.epochs[0].channels["torque_nm"].rate_hz, drive)
     seen = [observe(one, settings, drive, loop, causes) for one in made.epochs]
-    return solve(seen, instrumental if perturbation else direct, start_of(seen)), np.mean(made.truth, axis=0)
+    return solve(seen, instrumental if perturbation else direct, start_of(seen)), np.mean(
+        made.truth, axis=0
+    )
 
 
 @pytest.mark.parametrize("perturbation", [True, False])

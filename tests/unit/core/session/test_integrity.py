@@ -272,7 +272,7 @@ def test_a_session_with_older_names_of_settings_is_read(recorded, version):
         key: level.replace("caution", "doubt") for key, level in diagnostics["levels"].items()
     }
     assert "doubt" in levels.values()
-    diagnostics["levels"] = levels
+    diagnostics["levels"] = {**levels, "differs_from_estimate": "note"}
     manifest["settings"]["estimation"]["bootstrap_draws"] = 200
     manifest["settings"]["guard"]["least_inertia_kg_m2"] = manifest["settings"]["guard"].pop(
         "min_inertia_kg_m2"
