@@ -40,6 +40,7 @@ from rigidimeter.analysis.estimate_anew.signals import (
     Signals,
     angle_range_rad,
     bandlimited_signals,
+    butterworth,
     held_at,
     joined,
     lines_inside,
@@ -104,9 +105,8 @@ def least_squares(columns: Array, target: Array, names: Sequence[str] = ()) -> S
         names them.
     """
     lengths = np.linalg.norm(columns, axis=0)
-    left, singular, right = np.linalg.svd(
-        columns / np.where(lengths > 0, lengths, 1.0), full_matrices=False
-    )
+    scaled = columns / np.where(lengths > 0, lengths, 1.0)
+    left, singular, right = np.linalg.svd(scaled, full_matrices=False)
     for name, length in zip(names, lengths, strict=bool(names)):
         if not length > 0:
             raise ValueError(f"{name} is zero throughout: this motion holds no information on it")
@@ -149,8 +149,8 @@ def fit_inertia_damping_stiffness(signals: Signals, inertia_kg_m2: float | None 
     torque = target = signals.torque_nm
     regressors = signals.motion
     if inertia_kg_m2 is not None:
+        target = torque - inertia_kg_m2 * regressors[:, 0]
         regressors = np.ascontiguousarray(regressors[:, 1:])
-        target = torque - inertia_kg_m2 * signals.acceleration_rad_s2
     solved = least_squares(regressors, target)
     if not np.all(solved.lengths > 0):
         raise ValueError("a regressor is zero throughout")
@@ -214,17 +214,16 @@ def published_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
     time_s = uniform_grid([torque, *others], rate_hz)
     velocity = velocity_at(epoch, time_s) if command is None else held_at(command, time_s)
     dt = 1.0 / rate_hz
-    acceleration = np.diff(velocity) / dt
     # The sum starts from θ(0) = 0, so the first velocity does not enter it.
     angle = np.concatenate(([0.0], np.cumsum(velocity[1:]) * dt))
     order, edge_hz = settings.published_highpass_order, settings.published_highpass_hz
-    highpass = scipy.signal.butter(order, edge_hz, "highpass", fs=rate_hz, output="sos")
-    angle = scipy.signal.sosfilt(highpass, angle)
-    n = acceleration.size  # the last sample has no forward difference
-    keep = sound(epoch, time_s[:n], settings.trim_s)
-    motion = acceleration[keep], velocity[:n][keep], angle[:n][keep]
-    torque_nm = np.interp(time_s[:n][keep], torque.time_s, torque.values)
-    return Signals(time_s[:n][keep], torque_nm, *motion, rate_hz, (0.0, rate_hz / 2))
+    angle = scipy.signal.sosfilt(butterworth(order, edge_hz, "highpass", rate_hz), angle)
+    # The last sample has no forward difference.
+    keep = np.flatnonzero(sound(epoch, time_s[:-1], settings.trim_s))
+    torque_nm = np.interp(time_s[keep], torque.time_s, torque.values)
+    acceleration = np.diff(velocity)[keep] / dt
+    motion = acceleration, velocity[keep], angle[keep]
+    return Signals(time_s[keep], torque_nm, *motion, rate_hz, (0.0, rate_hz / 2))
 
 
 def fit_published(epochs: Sequence[Ready], inertia_kg_m2: float | None = None) -> Fit:
@@ -236,41 +235,31 @@ def fit_published(epochs: Sequence[Ready], inertia_kg_m2: float | None = None) -
         If the motion cannot distinguish the parameters.
     """
     parts = [published_signals(one.epoch, one.settings.estimation) for one in epochs]
+    both, whole = list(zip(epochs, parts, strict=True)), joined(parts)
     power = sum(one.time_s.size * float(np.var(one.angle_rad)) for one in parts)
-    ranges_rad = [
-        angle_range_rad(ready.epoch, one.time_s) for ready, one in zip(epochs, parts, strict=True)
-    ]
+    ranges_rad = [angle_range_rad(ready.epoch, one.time_s) for ready, one in both]
     return replace(
-        fit_inertia_damping_stiffness(joined(parts), inertia_kg_m2),
+        fit_inertia_damping_stiffness(whole, inertia_kg_m2),
         findings=_as_they_are(epochs[0]) if inertia_kg_m2 is None else (),
-        angle_rms_rad=math.sqrt(power / sum(one.time_s.size for one in parts)),
-        angle_range_rad=max((r for r in ranges_rad if math.isfinite(r)), default=math.nan),
+        angle_rms_rad=math.sqrt(power / whole.time_s.size),
+        angle_range_rad=float(np.fmax.reduce(ranges_rad)),
     )
 
 
 def _as_they_are(ready: Ready) -> tuple[Finding, ...]:
     """Return the finding if the drive shows that J comes out wrong from the samples as they are."""
-    epoch, settings = ready.epoch, ready.settings.diagnostics
-    command = epoch.channels.get("velocity_command_rad_s")
+    channels, settings = ready.epoch.channels, ready.settings.diagnostics
+    command = channels.get("velocity_command_rad_s")
     if ready.drive is None or command is None:
         return ()
-    interval_s = 1.0 / command.mean_rate_hz
-    _, after_s = since_ticks(command, epoch.channels["torque_nm"].time_s, 0.0)
-    seen = acceleration_seen(ready.drive.model, interval_s, after_s)
+    after_s = since_ticks(command, channels["torque_nm"].time_s, 0.0)[1]
+    seen = acceleration_seen(ready.drive.model, 1.0 / command.mean_rate_hz, after_s)
     percent, most = 100.0 * abs(1.0 - seen), settings.max_between_samples_percent
     if not percent > most:
         return ()
-    return (
-        found(
-            "between_samples",
-            settings,
-            percent,
-            most,
-            condition=epoch.condition,
-            facts={"seen": 100.0 * seen, "side": "small" if seen < 1 else "large"},
-            variant="as_sampled",
-        ),
-    )
+    facts = {"seen": 100.0 * seen, "side": "small" if seen < 1 else "large"}
+    told = found("between_samples", settings, percent, most, facts=facts, variant="as_sampled")
+    return (replace(told, condition=ready.epoch.condition),)
 
 
 def acceleration_seen(drive: DriveModel, interval_s: float, after_s: Array) -> float:

@@ -14,15 +14,16 @@ which also lets the cycles begin and end between samples.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import scipy
+from scipy.interpolate import CubicSpline
 
 from rigidimeter.analysis.estimate_anew.signals import (
     Array,
     angle_at,
+    butterworth,
     grid_rate_hz,
     power_lines,
     uniform_grid,
@@ -95,7 +96,8 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
     rate_hz = grid_rate_hz(used, settings.band_high_hz)
     grid = uniform_grid(used, rate_hz)
     both = np.stack([values_at(used[0], grid), angle_at(epoch, grid)])
-    bandpass = _bandpass(settings.band_low_hz, settings.band_high_hz, rate_hz)
+    band = settings.band_low_hz, settings.band_high_hz
+    bandpass = butterworth(2, band, "bandpass", rate_hz)
     _, response = scipy.signal.sosfreqz(bandpass, [motion.frequency_hz], fs=rate_hz)
     gain = float(np.abs(response[0]) ** 2)  # once forwards and once backwards
     if gain < LEAST_GAIN:
@@ -112,20 +114,13 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
             f"the {motion.frequency_hz:.3g} Hz motion of {motion.duration_s:.3g} s holds no whole "
             f"cycle once {settings.discard_s:g} s at each end are discarded"
         )
-    points = n_cycles * POINTS_PER_CYCLE
-    fine = start + np.arange(points + 1) / (POINTS_PER_CYCLE * motion.frequency_hz)
+    points = np.arange(n_cycles * POINTS_PER_CYCLE + 1)
+    fine = start + points / (POINTS_PER_CYCLE * motion.frequency_hz)
     centred = both - np.mean(both, axis=1, keepdims=True)
     padded, before = _continued(grid, centred, motion.frequency_hz, padding_s)
     filtered = scipy.signal.sosfiltfilt(bandpass, padded)[:, before : before + grid.size]
-    torque, angle = scipy.interpolate.CubicSpline(grid, filtered / gain, axis=1)(fine)
+    torque, angle = CubicSpline(grid, filtered / gain, axis=1)(fine)
     return Cycles(fine, torque, angle, motion.frequency_hz, n_cycles)
-
-
-@lru_cache(maxsize=16)
-def _bandpass(low_hz: float, high_hz: float, rate_hz: float) -> Array:
-    """Return the filter of the scores; to design it takes as long as to filter with it."""
-    sections = scipy.signal.butter(2, [low_hz, high_hz], "bandpass", fs=rate_hz, output="sos")
-    return np.asarray(sections)
 
 
 def _continued(
@@ -139,31 +134,25 @@ def _continued(
     end, one at rest with its last value; a filter that started from a mirror image instead would
     take seconds to forget it, longer than the second that is discarded.
     """
-    interval_s = float(grid[1] - grid[0])
-    n = round(padding_s / interval_s)
-    steps = np.arange(1, n + 1) * interval_s
-    cycle_s = 1.0 / frequency_hz
-    back = (-steps) % cycle_s  # how far into the first cycle, for each time before it
-    early, late = np.repeat(values[:, :1], n, axis=1), np.repeat(values[:, -1:], n, axis=1)
-    cycle, full = round(cycle_s / interval_s), SAME_AMPLITUDE * float(np.ptp(values[-1]))
-    moving = [float(np.ptp(end)) > full for end in (values[-1, :cycle], values[-1, -cycle:])]
-    if any(moving):
-        motion = scipy.interpolate.CubicSpline(grid, values, axis=1)
-        early = motion(grid[0] + back) if moving[0] else early
-        late = motion(grid[-1] - back) if moving[1] else late
-    return np.concatenate([early[:, ::-1], values, late], axis=1), n
+    interval_s, cycle_s = float(grid[1] - grid[0]), 1.0 / frequency_hz
+    n, cycle = round(padding_s / interval_s), round(cycle_s / interval_s)
+    # How far into the first cycle, for each time before it, from the last on.
+    back = (-np.arange(1, n + 1) * interval_s) % cycle_s
+    full, motion = SAME_AMPLITUDE * float(np.ptp(values[-1])), CubicSpline(grid, values, axis=1)
+    early, late = (float(np.ptp(end)) > full for end in (values[-1, :cycle], values[-1, -cycle:]))
+    before, after = motion(grid[0] + early * back), motion(grid[-1] - late * back)
+    return np.concatenate([before[:, ::-1], values, after], axis=1), n
 
 
 def score_epoch(epoch: Epoch, settings: ScoreSettings, screening: EstimationSettings) -> Score:
     """Return impulse and work per cycle; a bad epoch gives an outcome with its reason."""
-    reason = obstacle(epoch, screening)
-    if not reason:
-        try:
-            cycles = scoring_cycles(epoch, settings)
-        except ValueError as error:
-            reason = str(error)
-    if reason:
-        return Score(epoch.source, epoch.label, epoch.condition, unusable(epoch, reason))
+    try:
+        if reason := obstacle(epoch, screening):
+            raise ValueError(reason)
+        cycles = scoring_cycles(epoch, settings)
+    except ValueError as error:
+        outcome = unusable(epoch, str(error))
+        return Score(epoch.source, epoch.label, epoch.condition, outcome)
     n = cycles.n_cycles
     interval_s = 1.0 / (POINTS_PER_CYCLE * cycles.frequency_hz)
     return Score(
@@ -195,9 +184,8 @@ def find_motion(epoch: Epoch) -> Motion:
     time_s, angle = _angle(epoch)
     peak_hz, _ = _spectral_peak(time_s, angle)
     rate_hz = 1.0 / float(time_s[1] - time_s[0])
-    around = scipy.signal.butter(
-        2, [0.5 * peak_hz, min(2 * peak_hz, 0.45 * rate_hz)], "bandpass", fs=rate_hz, output="sos"
-    )
+    band = 0.5 * peak_hz, min(2 * peak_hz, 0.45 * rate_hz)
+    around = butterworth(2, band, "bandpass", rate_hz)
     envelope = np.abs(scipy.signal.hilbert(scipy.signal.sosfiltfilt(around, angle)))
     moving = np.flatnonzero(envelope > 0.5 * np.quantile(envelope, 0.9))
     first, last = int(moving[0]), int(moving[-1])
@@ -248,12 +236,8 @@ def _thinned(channel: Channel) -> Channel:
     step = int(channel.rate_hz / (20 * HIGHEST_HZ) + 1e-6)
     if step < 2:
         return channel
-    count = len(channel) // step
-    time_s, values = (
-        part[: count * step].reshape(count, step).mean(axis=1)
-        for part in (channel.time_s, channel.values)
-    )
-    return Channel(channel.name, time_s, values)
+    both = np.stack([channel.time_s, channel.values])[:, : len(channel) // step * step]
+    return Channel(channel.name, *both.reshape(2, -1, step).mean(axis=2))
 
 
 def _angle(epoch: Epoch) -> tuple[Array, Array]:

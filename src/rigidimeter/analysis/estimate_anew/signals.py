@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from rigidimeter.analysis.estimate_anew.drive import Drive
 
 Array = NDArray[np.float64]
-Edge = Literal["lowpass", "highpass"]
+Edge = float | tuple[float, float]
+Kind = Literal["lowpass", "highpass", "bandpass"]
 
 GRID_POINTS_PER_CYCLE = 20
 """Of the highest frequency: the derivative of a cubic spline is then within 0.006 %."""
@@ -128,7 +129,7 @@ def uniform_grid(channels: Sequence[Channel], rate_hz: float) -> Array:
     """
     start = max(float(channel.time_s[0]) for channel in channels)
     stop = min(float(channel.time_s[-1]) for channel in channels)
-    count = int(np.floor((stop - start) * rate_hz + 1e-6)) + 1 if stop >= start else 0
+    count = max(int(np.floor((stop - start) * rate_hz + 1e-6)) + 1, 0)
     return np.minimum(start + np.arange(count) / rate_hz, stop)
 
 
@@ -182,14 +183,11 @@ def kinematics(epoch: Epoch, time_s: Array) -> Array:
     angle; a missing angle is the integral of the velocity, zero at the first time. The acceleration
     is the derivative of the velocity.
     """
-    velocity = epoch.channels.get("velocity_rad_s")
-    if velocity is not None:
-        slope = scipy.interpolate.CubicSpline(velocity.time_s, velocity.values).derivative()
-        return np.stack([slope(time_s), values_at(velocity, time_s), angle_at(epoch, time_s)])
-    found = velocity_at(epoch, time_s)
+    found, own = velocity_at(epoch, time_s), epoch.channels.get("velocity_rad_s")
     # A second spline through the velocity, since the second derivative of the first is only
     # piecewise linear and loses the upper part of the band.
-    slope = scipy.interpolate.CubicSpline(time_s, found).derivative()
+    known = (time_s, found) if own is None else (own.time_s, own.values)
+    slope = scipy.interpolate.CubicSpline(*known).derivative()
     return np.stack([slope(time_s), found, angle_at(epoch, time_s)])
 
 
@@ -220,9 +218,8 @@ def angle_range_rad(epoch: Epoch, time_s: Array) -> float:
     angle = epoch.channels.get("angle_rad")
     if angle is None or time_s.size == 0:
         return math.nan
-    first, stop = np.searchsorted(angle.time_s, (time_s[0], time_s[-1]), side="left")
-    used = slice(int(first), int(stop) + 1)
-    values = angle.values[used][sound(epoch, angle.time_s[used])]
+    within = (angle.time_s >= time_s[0]) & (angle.time_s <= time_s[-1])
+    values = angle.values[within & sound(epoch, angle.time_s)]
     return float(np.ptp(values)) if values.size else math.nan
 
 
@@ -251,26 +248,20 @@ def bandlimited_signals(
     if drive is None or command is None:
         motion = kinematics(epoch, full)
     else:
-        rest = dict(epoch.channels)
-        for one in used[1:]:
-            caused = drive.motion(command, one.time_s)[2 if one.name == "angle_rad" else 1]
-            rest[one.name] = Channel(one.name, one.time_s, one.values - caused)
-        motion = kinematics(replace(epoch, channels=rest), full)
-        if cutoff_hz := settings.torque_lowpass_hz:
-            # As the torque sensor sees it.
-            behind = drive.model.smoothed(cutoff_hz, settings.torque_lowpass_order)
-            drive = replace(drive, model=behind)
+        cutoff_hz, order = settings.torque_lowpass_hz, settings.torque_lowpass_order
+        seen = drive.behind((cutoff_hz, order) if cutoff_hz else None)
         # One spline of the three, at the stamps that they share.
-        motion += columns_at(torque, drive.motion(command, torque.time_s), full)
+        caused = columns_at(torque, seen.motion(command, torque.time_s), full)
+        motion = caused + kinematics(drive.beyond(epoch), full)
     edge = math.ceil(EDGE_SAMPLES * rate_hz / min(channel.rate_hz for channel in used))
     inner = slice(edge, full.size - edge)
-    time_s = full[inner]
+    time_s, motion = full[inner], motion[:, inner]
     trim = max(round(settings.trim_s * rate_hz) - edge, 0)
     keep = sound(epoch, time_s, settings.trim_s)
     keep[:trim] = keep[time_s.size - trim :] = False
-    everything = np.stack([values_at(torque, time_s), *motion[:, inner]])
-    found, a, v, x = zero_phase_band(everything, rate_hz, band)[:, keep]
-    return Signals(time_s[keep], found, a, v, x, rate_hz, band)
+    everything = np.stack([values_at(torque, time_s), *motion])
+    torque_nm, a, v, x = zero_phase_band(everything, rate_hz, band)[:, keep]
+    return Signals(time_s[keep], torque_nm, a, v, x, rate_hz, band)
 
 
 def zero_phase_band(values: Array, rate_hz: float, band: tuple[float, float]) -> Array:
@@ -289,25 +280,26 @@ def zero_phase_band(values: Array, rate_hz: float, band: tuple[float, float]) ->
     rate_hz : float
     band : (float, float)
     """
-    n = values.shape[-1]
+    n, passed = values.shape[-1], values - np.mean(values, axis=-1, keepdims=True)
     if n <= SHORT_MEMORY:
         raise ValueError(f"{n} samples are too few for a filter; it needs {SHORT_MEMORY + 1}")
-    # To the digits that stamps are good for, so that epochs share their filters.
-    rounded_hz, passed = float(f"{rate_hz:.9g}"), values - np.mean(values, axis=-1, keepdims=True)
-    filters: tuple[tuple[int, float, Edge, int], ...] = (
-        (4, band[1], "lowpass", SHORT_MEMORY),
-        (2, band[0], "highpass", round(rate_hz / band[0])),
-    )
-    for order, edge_hz, kind, memory in filters:
-        sections = _sections(order, edge_hz, kind, rounded_hz)
+    lowpass = butterworth(4, band[1], "lowpass", rate_hz), SHORT_MEMORY
+    highpass = butterworth(2, band[0], "highpass", rate_hz), round(rate_hz / band[0])
+    for sections, memory in (lowpass, highpass):
         past = min(n - 1, memory)
         passed = scipy.signal.sosfiltfilt(sections, passed, padtype="even", padlen=past)
     return np.asarray(passed)
 
 
+def butterworth(order: int, edge_hz: Edge, kind: Kind, rate_hz: float) -> Array:
+    """Return the sections of a Butterworth filter."""
+    # To the digits that stamps are good for, so that epochs share their filters.
+    return _sections(order, edge_hz, kind, float(f"{rate_hz:.9g}"))
+
+
 @lru_cache(maxsize=32)
-def _sections(order: int, edge_hz: float, kind: Edge, rate_hz: float) -> Array:
-    """Return a Butterworth filter; to design it takes longer than to filter an epoch."""
+def _sections(order: int, edge_hz: Edge, kind: Kind, rate_hz: float) -> Array:
+    """Return a filter; to design it takes longer than to filter an epoch."""
     return np.asarray(scipy.signal.butter(order, edge_hz, kind, fs=rate_hz, output="sos"))
 
 
@@ -330,14 +322,11 @@ def power_lines(
         So many times as many lines, for a peak between two of them.
     """
     values = values[: scipy.fft.prev_fast_len(values.size)]
-    n = longer * values.size
-    centred = values - np.mean(values)
+    n, centred = longer * values.size, values - np.mean(values)
     if tapered:
         centred = centred * (np.sqrt(8.0 / 3.0) * scipy.signal.windows.hann(values.size))
     power = (2.0 / (n * values.size)) * np.abs(scipy.fft.rfft(centred, n)) ** 2
-    power[0] /= 2.0
-    if n % 2 == 0:
-        power[-1] /= 2.0
+    power[[0, -1] if n % 2 == 0 else 0] /= 2.0
     return scipy.fft.rfftfreq(n, 1.0 / rate_hz), power
 
 

@@ -278,9 +278,8 @@ def noise_powers(problems: Sequence[Problem], values: Array) -> list[Array]:
     """
     grids = [one.observation.grid for one in problems]
     finest = max(grids, key=lambda grid: grid.line.size)
-    total = np.zeros(finest.line.size)
-    for one, grid in zip(problems, grids, strict=True):
-        total += on_lines(finest, grid, np.abs(one.residual(values)) ** 2)
+    own = [np.abs(one.residual(values)) ** 2 for one in problems]
+    total = np.sum([on_lines(finest, *one) for one in zip(grids, own, strict=True)], axis=0)
     power = smoother(finest.line, len(problems))(total / len(problems))
     if not np.all(power > 0):
         raise ValueError("the fit leaves nothing at some frequencies: are the channels simulated?")
@@ -300,11 +299,6 @@ class Smoother(NamedTuple):
 
     start: NDArray[np.intp]
     stop: NDArray[np.intp]
-
-    @classmethod
-    def over(cls, line: NDArray[np.intp], least: int, share: float = NEIGHBOURS) -> Smoother:
-        """Average so many lines in a row to each side, or this share of their own number."""
-        return _smoother(int(line[0]), line.size, least, share)
 
     @property
     def lines(self) -> NDArray[np.intp]:
@@ -328,13 +322,13 @@ class Smoother(NamedTuple):
 
 def smoother(line: NDArray[np.intp], epochs: int) -> Smoother:
     """Return the mean over neighbours that, with that over so many epochs, is of enough lines."""
-    return Smoother.over(line, -(-ENOUGH_LINES // epochs) // 2)
+    return _smoother(int(line[0]), line.size, -(-ENOUGH_LINES // epochs) // 2)
 
 
 @lru_cache(maxsize=64)
-def _smoother(first: int, count: int, least: int, share: float) -> Smoother:
+def _smoother(first: int, count: int, least: int) -> Smoother:
     place = np.arange(count)
-    half = np.maximum(least, np.rint(share * (first + place)).astype(np.intp))
+    half = np.maximum(least, np.rint(NEIGHBOURS * (first + place)).astype(np.intp))
     return Smoother(np.maximum(place - half, 0), np.minimum(place + half + 1, count))
 
 
@@ -363,9 +357,13 @@ class LineNoise:
         """The window's c."""
         return self.problem.observation.grid.spread
 
-    def taken_by_weights(self, smooth: Smoother, epochs: int) -> Array:
+    def smooth(self, epochs: int) -> Smoother:
+        """Return the `smoother` of its lines."""
+        return smoother(self.problem.observation.grid.line, epochs)
+
+    def taken_by_weights(self, epochs: int) -> Array:
         """Return D, shape (p, p), where the power is that of the residual of so many epochs."""
-        m, p = self.weighted.shape
+        (m, p), smooth = self.weighted.shape, self.smooth(epochs)
         slope = (self.weighted.conj()[:, :, None] * self.problem.regressors[:, None, :]).real
         slope = slope.reshape(m, p * p)
         around = smooth(self.power[:, None] * slope) / self.power[:, None]
@@ -422,28 +420,21 @@ def _with_uncertainty(
 ) -> Solution:
     """Return a solution with its covariance; `fitted_powers` says that S is of its residual."""
     p, count, inverse = values.size, len(problems), inverse_of(gram)
-    each = [
-        LineNoise(one, power, one.instruments / power[:, None], inverse)
-        for one, power in zip(problems, powers, strict=True)
-    ]
-    lines = [one.observation.grid.line for one in problems]
+    both = list(zip(problems, powers, strict=True))
+    each = [LineNoise(o, power, o.instruments / power[:, None], inverse) for o, power in both]
     widened = inverse
     if fitted_powers:
-        taken = np.sum(
-            [one.taken_by_weights(smoother(line, count), count)
-             for one, line in zip(each, lines, strict=True)], axis=0,
-        )  # fmt: skip
+        taken = np.sum([one.taken_by_weights(count) for one in each], axis=0)
         widened = inverse @ np.linalg.inv(np.eye(p) - taken @ inverse)
-    residuals = [one.residual(values) for one in problems]
-    scores = [(one.weighted.conj().T @ r).real for one, r in zip(each, residuals, strict=True)]
+    scores = [(one.weighted.conj().T @ one.problem.residual(values)).real for one in each]
     effects = np.stack(scores) @ widened.T
     covariance = effects.T @ effects * (count / max(count - 1, 1))
     degrees, bounds = np.full(p, count - 1.0), powers
     if count < ENOUGH_EPOCHS:
         of_lines, squares = np.zeros((p, p)), np.zeros(p)
-        for one, line, residual in zip(each, lines, residuals, strict=True):
-            own, smooth = replace(one, inverse=widened), smoother(line, 1)
-            density = own.density(residual, smooth)
+        for one in each:
+            own, smooth = replace(one, inverse=widened), one.smooth(1)
+            density = own.density(one.problem.residual(values), smooth)
             part = own.variance(density)
             of_lines += part
             squares += np.diag(part) ** 2 / own.degrees(density, smooth)
