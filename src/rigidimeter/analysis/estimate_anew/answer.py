@@ -201,6 +201,8 @@ class Answer(NamedTuple):
     change : array, shape (3,)
         How J, B and K change where low lines count more.
     answered : bool
+    little : frozenset of str
+        Terms that are there and too small to matter.
     case, state : Case, State
     """
 
@@ -213,6 +215,7 @@ class Answer(NamedTuple):
     left: float
     change: Array
     answered: bool
+    little: frozenset[str]
     case: Case
     state: State
 
@@ -240,6 +243,7 @@ def answer(
     offered = [one for one in (*TERMS, *more) if _offered(case, one, person)]
     first: dict[str, float] = {}
     found: list[Found] = []
+    little: set[str] = set()
     strongest = 0.0
     while True:
         tested = _tested(case, state, offered)
@@ -263,7 +267,7 @@ def answer(
         # The gain of a coupling is that of a straight column, and it bends.
         sure = [one for one in sure if one.name in gains
                 and (one.name == "cuff" or gains[one.name][0] > FURTHER * strongest)]  # fmt: skip
-        chosen = _chosen(case, state, tested, sure, gains)
+        chosen = _chosen(case, state, tested, sure, gains, little)
         if chosen is None:
             break
         state, size = chosen
@@ -273,7 +277,7 @@ def answer(
             state = settled(case, state.beside(Taken(of.FINER[term.name])))
         gone = {term.name, *NOT_BESIDE.get(term.name, ())}
         offered = [one for one in offered if one.name not in gone]
-    return _answered(case, state, tested, found, first, nameless)
+    return _answered(case, state, tested, found, first, nameless)._replace(little=frozenset(little))
 
 
 def case_of(problems: Sequence[Problem]) -> Case:
@@ -536,8 +540,12 @@ def _chosen(
     tested: _Tested,
     sure: Sequence[Term],
     gains: dict[str, tuple[float, Array]],
+    little: set[str],
 ) -> tuple[State, float] | None:
-    """Return the state with the term that leaves least of those that matter, and its size."""
+    """Return the state with the term that leaves least of those that matter, and its size.
+
+    Those that do not matter are added to `little`.
+    """
     ranked = sorted(sure, key=lambda term: -gains[term.name][0])
     first = gains[ranked[0].name][0] if ranked else 0.0
     rivals = [one for one in ranked[:RIVALS] if gains[one.name][0] >= RIVAL * first]
@@ -556,6 +564,8 @@ def _chosen(
         if term.resists and term.bent is None and new.taken[-1].values[0] <= 0:
             continue
         clear = state.unlikely - new.unlikely > ALONE * sum(one.size for one in new.powers)
+        if size < least:
+            little.add(term.name)
         if size < least or (term.linear and not (case.caused or clear)):
             continue
         found.append((new, size))
@@ -699,11 +709,12 @@ def _answered(
     if case.caused:
         # What another drive explains is not of the joint.
         remains = max([linear.p, *(p for _, one in others[1:] for p in one.values())])
-        plain = linear if remains >= REMAINS else nameless
-        left = float(np.sqrt(2 * np.mean(plain.values**2)))
         change = _otherwise(model, fit.values, lambda w: w[0] / w)
     # A linear term beside which something linear remains has not its name.
     named = {one.term.name: one for one in found if not remains < REMAINS or not _linear(one.term)}
+    if case.caused:
+        plain = linear if len(named) == len(found) else nameless
+        left = float(np.sqrt(2 * np.mean(plain.values**2)))
     little = np.max(np.abs(change / joint)) < LITTLE and len(named) == len(found)
     answered = bool(remains >= REMAINS or not case.caused or little)
     half = half + np.abs(change) * (remains < REMAINS)
@@ -721,8 +732,9 @@ def _answered(
             inner=one.inner, inner_half=inner_half,
         ))  # fmt: skip
     return Answer(
-        joint, half, of_joint, tuple(told), p, remains, left, change, answered, case, state
-    )
+        joint, half, of_joint, tuple(told), p, remains, left, change, answered, frozenset(),
+        case, state,
+    )  # fmt: skip
 
 
 def _linear(term: Term) -> bool:

@@ -771,7 +771,8 @@ def _beside(
         epoch=fit.epoch,
         condition=fit.condition,
         outcome=fit.outcome,
-        findings=fit.findings,
+        # What J, B and K alone leave is what the terms are.
+        findings=tuple(each for each in fit.findings if each.name != "residual_perturbation"),
         activity=fit.activity,
     )
 
@@ -798,6 +799,8 @@ def _together(
             for finding in findings_of(one.answer, seen[0].settings, stands=bool(one.problems))
         ]
 
+    rubs = {one.condition for one in told if "friction" in one.answer.little}
+
     def with_shared(fit: Fit, more: Sequence[Finding], settings: Settings) -> Fit:
         shared = found_in.get(fit.condition, [])
         own = [band for band in bands if band.condition == fit.condition]
@@ -820,9 +823,11 @@ def _together(
             alone.append(fit)
             continue
         delay = next((one for one in delays if one.source == fit.source), None)
-        missing, more = found_in.get(fit.condition, []), []
+        more: list[Finding] = []
         if ready.drive is None:
-            more = of_fit.between_samples(ready.epoch, fit, pull, ready.settings, delay, missing)
+            more = of_fit.between_samples(ready.epoch, fit, pull, ready.settings, delay)
+        if not more and fit.condition in rubs:
+            more = of_fit.friction_of_drive(ready.epoch, fit, ready.settings)
         alone.append(with_shared(fit, more, ready.settings))
     together = []
     for pool in pooled:

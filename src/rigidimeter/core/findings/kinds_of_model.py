@@ -44,8 +44,8 @@ checks: largest change of J, B or K, in %, with another drive that explains the 
     command as well, if it is more than the standard error
     ([why](../explanation/between-samples.md)); also how far J may be too low where command or
     perturbation was recorded and the drive is not known, where neither was and the drive of the
-    settings would change J by more, or where the torque holds a friction below 2 % of its SD, as a
-    drive with friction leaves
+    settings would change J by more, or where the torque holds a little friction, as a drive with
+    friction leaves
 headline: {symbol} may be {value:.2g} % off: motion between samples is not known
 measured: Drives that explain the motion equally well give {symbol} up to {value:.2g} % away (at
     most {limit:g} %).
@@ -70,8 +70,8 @@ meaning: The torque was sampled when commands were sent, and sees less than the 
 remedy: Record the velocity command at every tick, beside angle or velocity, or <sample_faster>
 -- friction
 headline: J may be some percent too small: friction of the drive
-measured: The torque holds a friction below {little:g} % of its SD, as friction of the drive leaves
-    there.
+measured: The torque holds a friction below 2 % of what J, B and K take, as friction of the drive
+    leaves there.
 meaning: Without the command it is not known how the drive moved between the samples, and J may be
     some percent too small.
 remedy: Record the command, or <sample_faster>

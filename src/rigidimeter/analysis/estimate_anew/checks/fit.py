@@ -38,7 +38,6 @@ of all bandwidths up to that of the settings.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -116,9 +115,6 @@ LATE = 0.1
 """A drive of first order is ruled out where the torque is late by less than this share of a tick.
 On rigs of 200 to 1000 ticks/s it was .34 to .50 late with velocity PI drives, with drives of second
 order at most .06 where these take less than 2 % off J."""
-
-LITTLE = 0.02
-"""A friction below this share of the torque's SD may be one of the drive."""
 
 
 def residual(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
@@ -474,12 +470,10 @@ def between_samples(
     pull: Pull,
     settings: Settings,
     delay: Delay | None,
-    missing: Sequence[Finding] = (),
 ) -> list[Finding]:
     """Return by how much J may be too low, in %, where the loop was recorded and not its drive.
 
-    A drive shows in the torque only by what it does between the samples of the velocity. Where no
-    loop was recorded, J is not known as long as friction of the drive may be in the torque.
+    A drive shows in the torque only by what it does between the samples of the velocity.
 
     Parameters
     ----------
@@ -490,8 +484,6 @@ def between_samples(
     settings : Settings
     delay : Delay or None
         Of the torque of its recording.
-    missing : sequence of Finding
-        What the torque holds beside J, B and K.
     """
     checks, rig = settings.diagnostics, settings.rig
     command = epoch.channels.get("velocity_command_rad_s")
@@ -509,9 +501,16 @@ def between_samples(
         value = 100.0 * (1.0 / seen - 1.0)
         more = {"facts": facts, "variant": "unknown_drive", "effect": effect}
         return at_most(name, checks, value, most, **more)
-    said = any(one.name == name for one in fit.findings)
-    little = any("of_drive" in str(one.facts.get("variant")).split() for one in missing)
-    if pull.instruments or command is not None or said or not little:
+    return []
+
+
+def friction_of_drive(epoch: Epoch, fit: Fit, settings: Settings) -> list[Finding]:
+    """Return that a little friction in the torque is left by a drive that has some.
+
+    Such a drive does not do between the ticks what it does without, and J misses some percent.
+    """
+    said = any(one.name == "between_samples" for one in fit.findings)
+    if said or "velocity_command_rad_s" in epoch.channels:
         return []
-    facts = {"little": 100 * LITTLE}
-    return [found(name, checks, math.nan, most, facts=facts, variant="friction")]
+    most = settings.diagnostics.max_between_samples_percent
+    return [found("between_samples", settings.diagnostics, math.nan, most, variant="friction")]
