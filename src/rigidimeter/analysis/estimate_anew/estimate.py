@@ -115,6 +115,9 @@ SINGLE_FREQUENCY_SHARE = 0.85
 velocity shows steps to and fro. A sinusoid that fills half the epoch reaches 0.95, a PRBS in the
 closed loop 0.5."""
 
+WITHOUT_TERMS = ("residual_perturbation", "negative_parameters", "implausible_parameters")
+"""Findings of what J, B and K are, or leave, without terms that were found later."""
+
 DIFFERENT_INERTIA_PERCENT = 15.0
 """Recordings whose median J differ by more hardly are of one joint."""
 
@@ -771,8 +774,10 @@ def _beside(
         epoch=fit.epoch,
         condition=fit.condition,
         outcome=fit.outcome,
-        # What J, B and K alone leave is what the terms are.
-        findings=tuple(each for each in fit.findings if each.name != "residual_perturbation"),
+        findings=(
+            *(each for each in fit.findings if each.name not in WITHOUT_TERMS),
+            *of_fit.values(numbers, one.problems[0].observation.settings.diagnostics),
+        ),
         activity=fit.activity,
     )
 

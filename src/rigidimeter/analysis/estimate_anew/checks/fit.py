@@ -127,7 +127,12 @@ def parameters(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
     """Return what J, B and K, and R², say by themselves."""
     settings = seen.settings.diagnostics
     findings = gravity(seen.epoch, fit, settings) + r_squared(fit, pull, settings)
-    return findings + negative_parameters(fit, settings) + implausible_parameters(fit, settings)
+    return findings + values(fit, settings)
+
+
+def values(fit: Fit, settings: DiagnosticsSettings) -> list[Finding]:
+    """Return whether a joint can have these numbers."""
+    return negative_parameters(fit, settings) + implausible_parameters(fit, settings)
 
 
 def least_squares(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
