@@ -335,14 +335,15 @@ def _climbed(record: _Record, start: DriveModel) -> list[_Fitted]:
     With friction instead, where that leaves less than any linear drive would.
     """
     rubs = len(record.inputs) > 1
-    regressed = {} if rubs else _regressed(record)
-    speeds = [1.0] if rubs or regressed else [2.0**-n for n in range(6)]
+    regressed = [] if rubs else _regressed(record)
+    speeds = 2.0 ** -np.arange(1 if rubs or regressed else 6)
     models = [replace(start, poles_rad_s=tuple(x * p for p in start.poles_rad_s)) for x in speeds]
+    models += regressed
     found: list[_Fitted] = []
     spent = False
     for poles in range(2, MOST_POLES + 1):
         least = min((one.power for one in found), default=1.0)
-        near = [*models, *regressed.get(poles, []), *(one.model for one in found[-2:])]
+        near = [*models, *(one.model for one in found[-2:])]
         begins = [_coordinates(one, record.interval_s, poles, x) for one in near for x in BESIDE]
         for zeros in range(poles - 2 + rubs, poles):
             found.append(_best(record, begins, zeros, least))
@@ -359,7 +360,7 @@ def _climbed(record: _Record, start: DriveModel) -> list[_Fitted]:
         spent = share < WORTH
         if before or (spent and best.place[-1] == 0.0):
             break
-    near = [*models, *regressed.get(1, []), *(one.model for one in found[:2])]
+    near = [*models, *(one.model for one in found[:2])]
     single = [_coordinates(one, record.interval_s, 1) for one in near]
     found.append(_best(record, single, 0, best.power))
     return sorted(found, key=lambda one: (one.place.size, one.zeros))
@@ -540,28 +541,23 @@ def _explainable(one: _Fitted) -> float:
     return float(1.0 - (1.0 - share) * n / max(n - e, 1))
 
 
-def _regressed(record: _Record) -> dict[int, list[DriveModel]]:
-    """Return drives with the poles of regressions on even samples, by their number; or none."""
+def _regressed(record: _Record) -> list[DriveModel]:
+    """Return a drive with the poles of a regression on even samples; or none."""
     tick, held_s = _since(record, 0.0)
     rows = np.arange(MOST_POLES, tick.size)
     rows = rows[tick[rows] - tick[rows - MOST_POLES] == MOST_POLES]
     if np.ndim(held_s) or np.ndim(record.lengths_s) or rows.size < FEWEST_SAMPLES:
-        return {}
+        return []
     sent, lags = record.command.values, np.arange(MOST_POLES + 2)
     if record.every_s:
         sent = np.real(_from_angle(np.cumsum(sent), record.every_s))
-    past = _past(record)[rows].T
-    measured = past @ record.measured[rows[:, None] - lags[:-1]]
-    sent = past @ sent[np.maximum(tick[rows][:, None] - lags, 0)]
-    found: dict[int, list[DriveModel]] = {}
-    for poles in range(1, MOST_POLES + 1):
-        table = np.hstack([measured[:, 1 : poles + 1], sent[:, : poles + 2]])
-        values = np.linalg.lstsq(table, measured[:, 0], rcond=1e-12)[0]
-        shown = np.log(np.roots([1.0, *-values[:poles]]) + 0j)
-        shown = shown[(shown.real < 0) & (shown.imag >= 0) & (shown.imag < math.pi)]
-        if shown.size:
-            found[poles] = [DriveModel(tuple((shown / record.interval_s).tolist()), ())]
-    return found
+    measured = record.measured[rows[:, None] - lags[:-1]]
+    table = np.hstack([measured, sent[np.maximum(tick[rows][:, None] - lags, 0)]])
+    table = _past(record)[rows].T @ table
+    values = np.linalg.lstsq(table[:, 1:], table[:, 0], rcond=1e-12)[0]
+    shown = np.log(np.roots([1.0, *-values[:MOST_POLES]]) + 0j)
+    shown = shown[(shown.real < 0) & (shown.imag >= 0) & (shown.imag < math.pi)]
+    return [DriveModel(tuple((shown / record.interval_s).tolist()), ())] if shown.size else []
 
 
 def _rubbed(one: _Fitted, least: float) -> _Fitted | None:

@@ -282,7 +282,7 @@ def observe(
     moving = motion_channels(epoch)
     usable, low_hz = usable_hz(epoch, drive is not None), estimation.band_low_hz
     high_hz = min(estimation.band_high_closed_loop_hz, usable)
-    if not caused and drive is None:
+    if not caused and drive is None and low_hz > 0:  # one from 0 Hz was asked for up to its end
         # Higher, noise of the motion that no half of the samples shows would count as motion.
         slowest = min(one.rate_hz for one in (torque, *moving))
         high_hz = min(high_hz, max(slowest / DENSE, NARROWEST * low_hz))
@@ -293,9 +293,9 @@ def observe(
     repeats_s = _repeated_s(perturbation, used) if periodic and perturbation else None
     holes = [one[:2] for one in epoch.left_out]
     grid = grid_of(used, wide_hz, estimation.trim_s, holes, repeats_s)
-    observed = _at_lines(epoch, settings, grid, drive, loop, noise=not caused)
-    if repeats_s is not None:
-        observed = replace(observed, periods=round(grid.duration_s / repeats_s))
+    periods = 1 if repeats_s is None else round(grid.duration_s / repeats_s)
+    observed = _at_lines(epoch, settings, grid, drive, noise=not caused)
+    observed = replace(observed, loop=loop, periods=periods)
     if causes is not None and perturbation is not None and loop is not None:
         observed = replace(observed, cause=_cause(_evenly(perturbation), loop, grid, causes))
     if wide_hz == band_hz:
@@ -305,23 +305,12 @@ def observe(
 
 
 def _at_lines(
-    epoch: Epoch,
-    settings: Settings,
-    grid: Grid,
-    drive: Drive | None,
-    loop: Loop | None,
-    *,
-    noise: bool,
+    epoch: Epoch, settings: Settings, grid: Grid, drive: Drive | None, *, noise: bool
 ) -> Observation:
-    """Return torque and motion at the lines, without a cause."""
+    """Return torque and motion at the lines, without loop and cause."""
     torque, command = epoch.channels["torque_nm"], epoch.channels.get("velocity_command_rad_s")
-    time_s, channels = grid.time_s, epoch.channels
-    through, recorded, driven, seen = (
-        torque_filter_of(settings),
-        "angle_rad" in channels,
-        None,
-        epoch,
-    )
+    time_s, channels, through = grid.time_s, epoch.channels, torque_filter_of(settings)
+    recorded, driven, seen = "angle_rad" in channels, None, epoch
     recorded &= all(sampled(one, time_s, SAME_TIME) for one in motion_channels(epoch))
     lines_rad_s = float(grid.omega_rad_s[0]), float(grid.omega_rad_s[-1]), grid.line.size
     at = Sampling(lines_rad_s, 1.0 / ticks_hz(settings.rig, torque), through)
@@ -345,8 +334,9 @@ def _at_lines(
     if driven is not None:
         motion = motion + grid.lines(driven)[0].T
         angle, velocity = angle + driven[2] - np.mean(driven[2]), velocity + driven[1]
-    changes = without_drive(motion, settings.rig, at)
-    if drive is not None and command is not None:
+    if drive is None or command is None:
+        changes = without_drive(motion, settings.rig, at)
+    else:
         sent = grid.lines(command.values[tick])[0][:, None]
         if recorded:
             motion = motion + sent * beyond(drive.model, at, round(float(np.mean(after_s)), 9))[0]
@@ -361,7 +351,6 @@ def _at_lines(
         grid.coarse(np.stack([velocity, angle])),
         apart,
         changes,
-        loop,
         drive_known=drive is not None and command is not None,
     )
 
