@@ -115,7 +115,12 @@ SINGLE_FREQUENCY_SHARE = 0.85
 velocity shows steps to and fro. A sinusoid that fills half the epoch reaches 0.95, a PRBS in the
 closed loop 0.5."""
 
-WITHOUT_TERMS = ("residual_perturbation", "negative_parameters", "implausible_parameters")
+WITHOUT_TERMS = (
+    "residual_perturbation",
+    "gravity",
+    "negative_parameters",
+    "implausible_parameters",
+)
 """Findings of what J, B and K are, or leave, without terms that were found later."""
 
 DIFFERENT_INERTIA_PERCENT = 15.0
@@ -776,7 +781,7 @@ def _beside(
         outcome=fit.outcome,
         findings=(
             *(each for each in fit.findings if each.name not in WITHOUT_TERMS),
-            *of_fit.values(numbers, one.problems[0].observation.settings.diagnostics),
+            *of_fit.values(one.problems[places[0]].observation, numbers),
         ),
         activity=fit.activity,
     )

@@ -125,14 +125,15 @@ def residual(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
 
 def parameters(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
     """Return what J, B and K, and R², say by themselves."""
+    return r_squared(fit, pull, seen.settings.diagnostics) + values(seen, fit)
+
+
+def values(seen: Observation, fit: Fit) -> list[Finding]:
+    """Return whether a joint can have these numbers, and K without the limb's weight."""
     settings = seen.settings.diagnostics
-    findings = gravity(seen.epoch, fit, settings) + r_squared(fit, pull, settings)
-    return findings + values(fit, settings)
-
-
-def values(fit: Fit, settings: DiagnosticsSettings) -> list[Finding]:
-    """Return whether a joint can have these numbers."""
-    return negative_parameters(fit, settings) + implausible_parameters(fit, settings)
+    findings = negative_parameters(fit, settings) + implausible_parameters(fit, settings)
+    # Epochs in a pool need not have one posture.
+    return findings + (gravity(seen.epoch, fit, settings) if fit.epoch != "pooled" else [])
 
 
 def least_squares(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
