@@ -13,7 +13,6 @@ from rigidimeter.cli.output import echo, keep_inputs, say
 from rigidimeter.cli.reading_options import Recordings, reads_recordings
 from rigidimeter.cli.terminal_tables import Table, show
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import is_dictionary
 from rigidimeter.core.words import with_error
 
 if TYPE_CHECKING:
@@ -40,6 +39,8 @@ def inspect(
       rigidimeter inspect demo-study/elbow.csv
       rigidimeter inspect demo-study/elbow.csv --write-mapping lab.toml
     """
+    from rigidimeter.core.files import is_dictionary
+
     keep_inputs((write_mapping, plot), recordings.paths)
     named = [path for path in recordings.paths if not is_dictionary(path)] or recordings.paths
     several = len(named) > 1
