@@ -3,8 +3,11 @@
     M = Σ c C(motion, φ) + noise
 
 `terms` has columns C; those that are fitted only if they are asked for are here. They are solved as
-J, B and K are (`solve`): at the lines, each by its noise, with what the perturbation causes as the
-instruments where it was recorded, so that torque of the subject's own does not bias them. Inner
+J, B and K are (`solve`): at the lines, with what the perturbation causes as the instruments where
+it was recorded, so that torque of the subject's own does not bias them. Where the robot gives way
+to torque, each line counts by its noise: else what the subject does comes back as motion. Where
+nothing says so, all count alike, which is least squares in time (Parseval): what is left is then
+mostly misfit, and as noise it would hide the slow lines that tell viscous from dry friction. Inner
 parameters φ, as the delay of a reflex, are scanned, then solved as the coefficients of c ∂C/∂φ:
 errors hold that both are not known (Golub and Pereyra 2003; Young and Jakeman 1979).
 
@@ -37,7 +40,14 @@ from rigidimeter.analysis.estimate_anew.observation import Observation, torque_f
 from rigidimeter.analysis.estimate_anew.published import least_squares
 from rigidimeter.analysis.estimate_anew.score import without_filter
 from rigidimeter.analysis.estimate_anew.signals import angle_at, values_at
-from rigidimeter.analysis.estimate_anew.solve import Problem, Solution, shortest, solve, sums
+from rigidimeter.analysis.estimate_anew.solve import (
+    Problem,
+    Solution,
+    noise_powers,
+    shortest,
+    solve,
+    sums,
+)
 from rigidimeter.analysis.estimate_anew.terms import SMOOTH, TERMS, Motion, Term
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import Fit
@@ -141,12 +151,12 @@ def _rubs(sign: int) -> Term:
         if not motion.measured:
             # The best instrument of a jump is smooth where the caused velocity is not the true one.
             width = width + SMOOTH * float(np.sqrt(np.mean(motion.velocity**2)))
-        size = 0.5 if sign else 1.0
-        return _finely(motion, lambda v, x: size * (np.tanh(v / width) + sign))
+        toward = -float(sign <= 0), float(sign >= 0)
+        return _finely(motion, lambda v, x: np.clip(np.tanh(v / width), *toward))
 
-    name, low, high = "coulomb" + ["", "+", "-"][sign], np.array([1e-3]), np.array([0.2])
+    name, low, high = "coulomb" + ["", "+", "-"][sign], np.array([1e-4]), np.array([0.2])
     return Term(
-        name, "N·m", "friction", columns, np.geomspace(1e-3, 0.1, 5)[:, None], steps=low / 2,
+        name, "N·m", "friction", columns, np.geomspace(1e-4, 0.1, 7)[:, None], steps=low / 2,
         low=low, high=high, resists=True, asked=name,
     )  # fmt: skip
 
@@ -579,10 +589,11 @@ def _fitted(seen: Seen, names: tuple[str, ...]) -> ModelRow:
     """Fit one model whose terms are decided; ValueError says why not."""
     known, joint = _known(), start_of(seen)
     terms = tuple(sorted((known[name] for name in names), key=lambda one: one.asked not in JOINT))
-    powers: Sequence[Array] = [np.ones(one.grid.line.size) for one in seen]
+    powers: Sequence[Array] = [np.full(one.grid.line.size, one.grid.energy) for one in seen]
+    alike = seen[0].loop is None
     try:
         alone = _Model(tuple(known[one] for one in JOINT), joint, np.zeros(0), np.zeros(0, bool))
-        solution = solve(seen, alone.pose, joint)
+        solution = solve(seen, alone.pose, joint, powers if alike else None)
         joint, powers = solution.values, solution.powers
     except ValueError:
         pass  # the terms may do without one of J, B and K
@@ -594,10 +605,8 @@ def _fitted(seen: Seen, names: tuple[str, ...]) -> ModelRow:
         several = [f"response {lag_s:.3f} s" for lag_s in FIR_LAGS_S]
         own = several if count > 1 and term.muscle else ["gain" if term.muscle else ""] * count
         labels += [(term.asked, one) for one in own]
-    target, words = (
-        _real([one.torque_nm for one in seen]),
-        [" ".join(one).strip() for one in labels],
-    )
+    target = _real([one.torque_nm for one in seen])
+    words = [" ".join(one).strip() for one in labels]
     if not np.any(target):
         raise ValueError("the torque is constant in the band")
     # From coarse samples all: to as many digits as columns that are alike agree then.
@@ -606,7 +615,8 @@ def _fitted(seen: Seen, names: tuple[str, ...]) -> ModelRow:
     least_squares(_real([one.instruments for one in problems]), target, words)
     begin = least_squares(_real([one.regressors for one in problems]), target, words).values
     model = _searched(model, seen, motions, powers, [one for one, _ in labels])
-    model, solution = _settled(model, seen, begin)
+    rest = _whitened(problems, powers, begin)
+    model, solution = _settled(model, seen, begin, [rest * s for s in powers] if alike else None)
     return _row(names, model, labels, solution)
 
 
@@ -643,15 +653,14 @@ class _Search(NamedTuple):
         return self.left(inner[None])[0]
 
     def left(self, inner: Array) -> list[float]:
-        """Return it for each; more where the term would push."""
+        """Return it for each row of inner parameters; more where the term would push."""
         rows = [[self.term.columns(motion, inner) for motion in both] for both in self.motions]
         found = []
         for k in range(len(inner)):
             for one, (Z, X) in zip(self.problems, rows, strict=True):
                 one.instruments[:, self.place], one.regressors[:, self.place] = Z[k], X[k]
             values = shortest(*sums(self.problems, self.powers))
-            each = zip(self.problems, self.powers, strict=True)
-            remains = sum(float(np.sum(np.abs(p.residual(values)) ** 2 / s)) for p, s in each)
+            remains = _whitened(self.problems, self.powers, values)
             found.append(remains * (1 + (values[self.place] < 0)))
         return found
 
@@ -668,13 +677,15 @@ def _real(lines: Sequence[Complex]) -> Array:
     return np.concatenate([whole.real, whole.imag])
 
 
-def _settled(model: _Model, seen: Seen, begin: Array) -> tuple[_Model, Solution]:
+def _settled(
+    model: _Model, seen: Seen, begin: Array, powers: Sequence[Array] | None
+) -> tuple[_Model, Solution]:
     """Return the model at its solution; inner parameters that the data do not tell are held."""
     free = model.limit(model.inner, NEAR_BOUND) == model.inner
     while True:
         model = model._replace(free=free)
         try:
-            solution = solve(seen, model.pose, np.append(begin, model.inner[free]))
+            solution = solve(seen, model.pose, np.append(begin, model.inner[free]), powers)
         except ValueError:
             if not np.any(free):
                 raise
@@ -723,6 +734,7 @@ def _row(
                 )
     found.sort(key=lambda one: names.index(one.term))
     problems = solution.problems
+    solution = replace(solution, powers=noise_powers(problems, solution.values))
     left = [one.residual(solution.values) for one in problems]
     grids = [one.observation.grid for one in problems]
     whole = _power([one.observation.torque_nm for one in problems])
@@ -737,6 +749,12 @@ def _row(
     )  # fmt: skip
     row = ModelRow(names, fit)
     return row if problems[0].observation.cause else replace(row, beyond=_beyond(row))
+
+
+def _whitened(problems: Sequence[Problem], powers: Sequence[Array], values: Array) -> float:
+    """Return the mean of |r|²/S."""
+    each = zip(problems, powers, strict=True)
+    return float(np.mean(np.concatenate([np.abs(p.residual(values)) ** 2 / s for p, s in each])))
 
 
 def _power(lines: Sequence[Complex]) -> float:
@@ -911,11 +929,10 @@ def _predicted(rows: Sequence[ModelRow]) -> list[ModelRow]:
         problems = row.fit.solution.problems
         errors, offset = _block_errors(problems, powers), _block_errors(problems, powers, none=True)
         caused = problems[0].observation.cause is not None
-        beyond = (
-            errors
-            if caused
-            else _block_errors(freed := _freed(row), [np.ones(one.target.size) for one in freed])
-        )
+        beyond = errors
+        if not caused:
+            freed = _freed(row)
+            beyond = _block_errors(freed, [np.ones(one.target.size) for one in freed])
         found[i] = replace(
             row, held_out=gain(offset, errors), errors=errors, beyond_errors=beyond,
             problem="; ".join(filter(None, map(_pushes, _gains(row)))),
