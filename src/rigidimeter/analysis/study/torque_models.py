@@ -118,7 +118,9 @@ def model_recording(
             clock = ""
             if ready is not own:
                 plain = observations_of([own._replace(settings=settings)])
-                seen, clock = better_clock(seen, plain, models)
+                stamps_s = [o.epoch.channels["torque_nm"].time_s[0] for o in (own, ready)]
+                delay_s = float(stamps_s[0] - stamps_s[1])
+                seen, clock = better_clock(seen, plain, delay_s, models)
             if compare:
                 compared = compare_models(seen, models, grow=grow, refused=refusal(fit))
             else:
