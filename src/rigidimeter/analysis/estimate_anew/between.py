@@ -42,9 +42,10 @@ interval of that estimate: then the interval does not hold what other frequencie
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -54,7 +55,7 @@ from rigidimeter.analysis.estimate_anew.grid import Array, Complex
 from rigidimeter.analysis.estimate_anew.methods import all_caused
 from rigidimeter.analysis.estimate_anew.observation import Observation
 from rigidimeter.analysis.estimate_anew.solve import LineNoise, Problem, inverse_of, smoother
-from rigidimeter.core.findings import Effect, Fact, Finding, Three
+from rigidimeter.core.findings import Effect, Fact, Finding
 from rigidimeter.core.records import PARAMETERS, BandEstimate, Fit
 from rigidimeter.core.settings import FEWEST_LINES, DiagnosticsSettings
 from rigidimeter.core.words import epoch_name, short_names
@@ -154,58 +155,42 @@ def between_epochs(
     """
     if len(fits) < FEWEST_EPOCHS:
         return None
-    values, errors = (np.array([getattr(fit, of) for fit in fits]) for of in ("value", "se"))
+    values, errors, low, high = (
+        np.array([getattr(fit, name) for fit in fits]) for name in ("value", "se", "low", "high")
+    )
     if not np.all(np.isfinite(values)) or not np.all(errors > 0):
         return None
-    half = np.array([fit.high - fit.low for fit in fits]) / 2
     known, quantile = _quantiles()
-    degrees = np.interp(-half / errors, -quantile, known)
+    degrees = np.interp((low - high) / 2 / errors, -quantile, known)
     scatters = [scatter(j, values[:, j], errors[:, j], degrees[:, j]) for j in range(3)]
     most = settings.max_varying_percent
-    if by_perturbation:
-        ranked = sorted(scatters, key=lambda one: one.p)
+    sure = scatters[STIFFNESS:]
+    if by_perturbation:  # Holm 1979
+        sure = sorted(scatters, key=lambda one: one.p)
+    elif not scatters[STIFFNESS].percent > scatters[INERTIA].percent:
         sure = []
-        for left, one in zip(range(3, 0, -1), ranked, strict=True):  # Holm 1979
-            if not one.p * left < settings.varying_chance:
-                break
-            sure.append(one)
-    else:
-        K, J = scatters[STIFFNESS], scatters[INERTIA]
-        sure = [K] if K.p < settings.varying_chance and K.percent > J.percent else []
-    large = sorted((one for one in sure if one.percent > most), key=lambda one: -one.percent)
+    tests = range(len(sure), 0, -1)
+    within = itertools.takewhile(
+        lambda one: one[0].p * one[1] < settings.varying_chance, zip(sure, tests, strict=True)
+    )
+    large = sorted((one for one, _ in within if one.percent > most), key=lambda one: -one.percent)
     if not large:
         return None
     first, *others = large
     about, more = PARAMETERS[first.parameter], [PARAMETERS[one.parameter].symbol for one in others]
     names = short_names(fit.source for fit in fits)
     called = [epoch_name(fit.epoch, fit.source, names) for fit in fits]
-    low, high = int(np.argmin(first.drawn)), int(np.argmax(first.drawn))
     trend_percent, trend_p = first.trend()
     way = "rising" if trend_percent > 0 else "falling"
     trend = f", {way} by {abs(trend_percent):.0f} % over the epochs" if trend_p < TREND_P else ""
-    facts: dict[str, Fact] = {
-        "symbol": about.symbol,
-        "size_unit": about.unit,
-        "low": float(first.drawn[low]),
-        "low_at": called[low],
-        "high": float(first.drawn[high]),
-        "high_at": called[high],
-        "sd": first.sd,
-        "trend_percent": trend_percent,
-        "trend_p": trend_p,
-        "trend": trend,
-        "others": f"; {' and '.join(more)} too" if more else "",
-    }
-    return found(
-        "varying_between_epochs",
-        settings,
-        first.percent,
-        most,
-        p=first.p,
-        epochs=tuple(fit.epoch for fit in fits),
-        condition=fits[0].condition,
-        facts=facts,
-    )
+    facts: dict[str, Fact] = {"symbol": about.symbol, "size_unit": about.unit, "sd": first.sd}
+    facts |= {"trend_percent": trend_percent, "trend_p": trend_p, "trend": trend}
+    facts["others"] = f"; {' and '.join(more)} too" if more else ""
+    for name, at in (("low", np.argmin(first.drawn)), ("high", np.argmax(first.drawn))):
+        facts |= {name: float(first.drawn[at]), f"{name}_at": called[at]}
+    of: dict[str, Any] = {"epochs": tuple(fit.epoch for fit in fits), "p": first.p}
+    of |= {"condition": fits[0].condition, "facts": facts}
+    return found("varying_between_epochs", settings, first.percent, most, **of)
 
 
 @lru_cache
@@ -281,7 +266,7 @@ def _estimates(epochs: Sequence[_Lines], pooled: Fit | None) -> list[BandEstimat
     at, first = together if pooled is None else pooled.value, epochs[0].problem.observation
 
     def estimate(lines: slice, part: str, change: Array, se: Array, p: Array) -> BandEstimate:
-        vectors = (_three(one) for one in (at + change, change, se, p))
+        vectors: Any = (tuple(one.tolist()) for one in (at + change, change, se, p))
         return BandEstimate(first.epoch.condition, *first.grid.part(lines).band_hz, part, *vectors)
 
     nothing = np.zeros(3)
@@ -305,13 +290,10 @@ def _estimates(epochs: Sequence[_Lines], pooled: Fit | None) -> list[BandEstimat
 
 
 def _at_lines(observations: Sequence[Observation], values: Sequence[Array]) -> list[_Lines]:
-    found = []
-    common = np.median(values, axis=0)
-    for one, own, caused in zip(
-        observations, values, all_caused(observations, common), strict=True
-    ):
+    found, caused = [], all_caused(observations, np.median(values, axis=0))
+    for one, own, by in zip(observations, values, caused, strict=True):
         seen = one.wider or one
-        problem = Problem(seen.of_lines(caused.lines), seen.motion, seen.torque_nm, seen)
+        problem = Problem(seen.of_lines(by.lines), seen.motion, seen.torque_nm, seen)
         first = int(one.grid.line[0] - seen.grid.line[0])
         left, least = np.abs(problem.residual(own)) ** 2, np.max(np.abs(problem.target) ** 2)
         power = np.maximum(smoother(seen.grid.line, 1)(left), LEAST_POWER * float(least))
@@ -362,40 +344,20 @@ def band_finding(
     bands = [band for band in estimates if band.part == "all"][1:]
     if not bands:
         return []
-    change = np.array([band.change for band in bands])
-    p = np.minimum(change.size * np.array([band.p for band in bands]), 1.0)  # Bonferroni
-    percent = 100 * np.abs(change / fit.value)
-    half = half_widths(fit)
-    of_half = np.abs(change) / half
-    most = settings.max_band_sensitivity_percent
+    change, p = (np.array([getattr(band, name) for band in bands]) for name in ("change", "p"))
+    p = np.minimum(change.size * p, 1.0)  # Bonferroni
+    half, most = half_widths(fit), settings.max_band_sensitivity_percent
+    percent, of_half = 100 * np.abs(change / fit.value), np.abs(change) / half
     contradicting = (p < CHANCE) & (percent > most) & (of_half > OF_HALF)
     if not np.any(contradicting):
         return []
-    worst = np.argmax(np.where(contradicting, of_half, 0.0))
-    at, j = np.unravel_index(worst, change.shape)
-    band, own = bands[int(at)], estimates[0]
-    return [
-        found(
-            "band_sensitivity",
-            settings,
-            float(percent[at, j]),
-            most,
-            p=float(p[at, j]),
-            effect=Effect.of(-change[at], fit.value, half),
-            facts={
-                "symbol": PARAMETERS[int(j)].symbol,
-                "way": "more" if change[at, j] * fit.value[j] > 0 else "less",
-                "low_hz": band.low_hz,
-                "high_hz": band.high_hz,
-                "error": float(100 * band.change_se[j] / abs(fit.value[j])),
-                "own_low_hz": own.low_hz,
-                "own_high_hz": own.high_hz,
-                "of_half": float(of_half[at, j]),
-            },
-        )
-    ]
-
-
-def _three(values: Array) -> Three:
-    J, B, K = (float(value) for value in values)
-    return J, B, K
+    at, j = divmod(int(np.argmax(np.where(contradicting, of_half, 0.0))), 3)
+    band, own, value = bands[at], estimates[0], float(percent[at, j])
+    facts: dict[str, Fact] = {"symbol": PARAMETERS[j].symbol, "of_half": float(of_half[at, j])}
+    facts["way"] = "more" if change[at, j] * fit.value[j] > 0 else "less"
+    facts["error"] = float(100 * band.change_se[j] / abs(fit.value[j]))
+    facts |= {"low_hz": band.low_hz, "high_hz": band.high_hz}
+    facts |= {"own_low_hz": own.low_hz, "own_high_hz": own.high_hz}
+    effect, chance = Effect.of(-change[at], fit.value, half), float(p[at, j])
+    name = "band_sensitivity"
+    return [found(name, settings, value, most, p=chance, facts=facts, effect=effect)]

@@ -27,7 +27,6 @@ from rigidimeter.analysis.estimate_anew.answer import Answer, answer, beside, fi
 from rigidimeter.analysis.estimate_anew.between import band_estimates, band_finding, between_epochs
 from rigidimeter.analysis.estimate_anew.checks import (
     Pull,
-    excitation,
     in_half_intervals,
     motion,
     sensors,
@@ -93,7 +92,7 @@ Check = Callable[[Observation, Fit, Pull], list[Finding]]
 CHECKS: list[Check] = [
     sensors.sensors,
     sensors.velocity,
-    excitation.excitation,
+    motion.excitation,
     of_fit.following,
     sensors.static_torque,
     of_fit.residual,
@@ -378,7 +377,7 @@ def _follows(ready: Ready) -> bool:
         seen = _observation(ready, None)
     except ValueError:
         return True  # the fit says why
-    cause, velocity = excitation.perturbation_lines(seen), seen.motion[:, 1]
+    cause, velocity = motion.perturbation_lines(seen), seen.motion[:, 1]
     edges = [0]
     while edges[-1] < cause.size:
         reach = int(GROUP_SHARE * (seen.grid.line[0] + edges[-1]))
@@ -442,7 +441,7 @@ def impedance(epochs: Sequence[Ready]) -> Impedance | None:
     sums: Complex = np.zeros((2, int(np.count_nonzero(seen[0].excited))), dtype=np.complex128)
     noise = np.zeros(sums.shape[1])
     for one in seen:
-        at, cause = one.excited, excitation.perturbation_lines(one)
+        at, cause = one.excited, motion.perturbation_lines(one)
         turn = (cause.conj() / np.maximum(np.abs(cause), 1e-300))[at]
         sums += turn * np.stack([one.torque_nm[at], one.motion[at, 2]])
         between = np.where(at, np.nan, np.abs(one.torque_nm) ** 2)
@@ -651,7 +650,8 @@ def _findings(
     for check in CHECKS:
         yield from check(checked, fit, pull)
     whole = _with_active(method, ready)
-    yield from motion.emg_activity(ready.epoch, ready.activity, fit, whole, ready.settings, pull)
+    checks = ready.settings.diagnostics
+    yield from motion.emg_activity(ready.epoch, fit, whole, checks, pull)
     if not pull.instruments:
         yield from late_torque(seen, fit, delay)
 

@@ -49,6 +49,9 @@ NEAR = 0.1
 
 LEAST_USED_S = 1.0
 
+MOST_SHOWN = 3
+"""Stretches that a sentence names."""
+
 LEAST_BAND_RATIO = 4.0
 """A band narrower than two octaves cannot distinguish three parameters."""
 
@@ -189,6 +192,15 @@ def _parts(epoch: Epoch, margin_s: float = 0.0) -> list[tuple[float, float]]:
 def used_s(epoch: Epoch, trim_s: float) -> float:
     """Return for how long an epoch can be used, so much further from its ends and what is out."""
     return sum(max(stop_s - start_s, 0.0) for start_s, stop_s in _parts(epoch, trim_s))
+
+
+def rest_of(epoch: Epoch, stretches: Sequence[LeftOut]) -> dict[str, float | str]:
+    """Return which parts are left out, and how much of the epoch is used, as a finding has it."""
+    spans = [f"from {one.start_s:.4g} to {one.stop_s:.4g} s" for one in stretches]
+    more = [f"{len(spans) - MOST_SHOWN} more"] if len(spans) > MOST_SHOWN else []
+    start_s, stop_s = _span(epoch)
+    shown = " and ".join(spans[:MOST_SHOWN] + more)
+    return {"spans": shown, "used_s": used_s(epoch, 0.0), "length_s": stop_s - start_s}
 
 
 def too_little(epoch: Epoch, settings: EstimationSettings) -> str:

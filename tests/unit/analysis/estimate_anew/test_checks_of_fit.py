@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from rigidimeter.analysis.estimate_anew.checks import Pull
-from rigidimeter.analysis.estimate_anew.checks import excitation as motion
+from rigidimeter.analysis.estimate_anew.checks import Pull, motion
 from rigidimeter.analysis.estimate_anew.checks import fit as of_fit
 from rigidimeter.analysis.estimate_anew.observation import loop_of, observe
 from rigidimeter.core.records import Channel, Delay, Epoch, Fit, Outcome
@@ -46,6 +45,10 @@ def with_values(epoch, **values):
 
 def names(findings):
     return [one.name for one in findings]
+
+
+def named(name, findings):
+    return next(one for one in findings if one.name == name)
 
 
 def test_a_sound_epoch_shows_nothing_but_the_colour_of_its_residual(epoch):
@@ -141,10 +144,10 @@ def test_a_joint_that_turns_round_half_way_is_not_predicted(epoch):
     torque = epoch.channels["torque_nm"]
     middle_s = np.mean(torque.time_s[[0, -1]])
     turned = with_values(epoch, torque_nm=np.where(torque.time_s < middle_s, 1, -1) * torque.values)
-    (found,) = of_fit.held_out_vaf(motion.checked_lines(seen(turned)), FIT, Pull())
+    found = named("held_out_vaf", of_fit.residual(seen(turned), FIT, Pull()))
     assert found.value == pytest.approx(-300.0, abs=30.0)  # twice the torque is left
     assert found.level == "exclude"
-    assert of_fit.held_out_vaf(motion.checked_lines(seen(epoch)), FIT, Pull()) == []
+    assert "held_out_vaf" not in names(of_fit.residual(seen(epoch), FIT, Pull()))
 
 
 def test_the_flatness_of_a_residual_is_that_of_its_spectrum(epoch):
@@ -152,16 +155,14 @@ def test_the_flatness_of_a_residual_is_that_of_its_spectrum(epoch):
     white = rng.normal(size=torque.size)
     slow = signal.lfilter([1], [1, -0.99], white)
     found = [
-        of_fit.residual_whiteness(
-            motion.checked_lines(seen(with_values(epoch, torque_nm=torque + added))), FIT, Pull()
-        )
+        of_fit.residual(seen(with_values(epoch, torque_nm=torque + added)), FIT, Pull())
         for added in (white, slow)
     ]
-    assert found[0] == []
+    assert "residual_whiteness" not in names(found[0])
     # Of |1/(1 + f/f₀)|² with f₀ = 1.6 Hz up to 10 Hz.
     f = np.linspace(0.15, 10.0, 2000) / (0.01 * 1000 / (2 * np.pi))
     expected = np.exp(np.mean(np.log(1 / (1 + f**2)))) / np.mean(1 / (1 + f**2))
-    assert found[1][0].value == pytest.approx(expected, rel=0.25)
+    assert named("residual_whiteness", found[1]).value == pytest.approx(expected, rel=0.25)
 
 
 @pytest.mark.parametrize(
@@ -183,10 +184,11 @@ def test_numbers_that_no_joint_has_are_told(epoch, factors, high, name, shown):
 
 
 def test_gravity_is_taken_off(epoch):
-    checks = CHECKS.model_copy(update={"gravity_nm": 0.5, "gravity_angle_deg": 60.0})
-    (found,) = of_fit.gravity(
-        with_values(epoch, angle_rad=0 * epoch.channels["angle_rad"].values), FIT, checks
-    )
+    weight = {"gravity_nm": 0.5, "gravity_angle_deg": 60.0}
+    settings = parse_settings({"diagnostics": weight})
+    still = with_values(epoch, angle_rad=0 * epoch.channels["angle_rad"].values)
+    lines = replace(seen(epoch, settings), epoch=still)
+    found = named("gravity", of_fit.parameters(lines, FIT, Pull()))
     assert found.value == pytest.approx(TRUTH[2] - 0.25)
 
 

@@ -33,17 +33,6 @@ def half_widths(fit: Fit) -> Array:
     return np.where(np.isfinite(half), half, np.abs(fit.value) * UNKNOWN_WIDTH)
 
 
-def too_biased(fit: Fit, bias: Array, most_percent: float, in_interval: bool) -> bool:
-    """Return whether the bias of J, B or K is more than so many % of half its interval, or NaN.
-
-    One that the interval holds must also be more than `HELD` of the parameter.
-    """
-    small = np.abs(bias) <= most_percent / 100.0 * half_widths(fit)
-    if in_interval:
-        small |= np.abs(bias) <= HELD * np.abs(fit.value)
-    return not np.all(small)
-
-
 class Pull(NamedTuple):
     """What torque that is not the robot's does to an estimate.
 
@@ -62,6 +51,15 @@ class Pull(NamedTuple):
     in_interval: bool = False
     instruments: bool = False
 
+    def large(self, fit: Fit, most_percent: float) -> bool:
+        """Return whether the bias of J, B or K is more than so many % of half its interval, or NaN.
+
+        One that the interval holds must also be more than `HELD` of the parameter.
+        """
+        held = HELD * np.abs(fit.value) if self.in_interval else 0.0
+        most = np.maximum(most_percent / 100.0 * half_widths(fit), held)
+        return self.bias is None or not np.all(np.abs(self.bias) <= most)
+
     def harmless(self, fit: Fit, settings: DiagnosticsSettings) -> tuple[str, dict[str, Fact]]:
         """Return the variant that says why it does not move the estimate, and what that shows.
 
@@ -69,8 +67,8 @@ class Pull(NamedTuple):
         """
         if self.instruments:
             return "instrument", {"method": fit.method}
-        most, half = settings.max_loop_bias_percent, half_widths(fit)
-        if self.bias is None or too_biased(fit, self.bias, most, self.in_interval):
+        half = half_widths(fit)
+        if self.bias is None or self.large(fit, settings.max_loop_bias_percent):
             return "", {}
         if not self.in_interval:
             return "small_bias", {"share": float(np.max(100.0 * np.abs(self.bias) / half))}

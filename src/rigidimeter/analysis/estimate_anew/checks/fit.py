@@ -45,15 +45,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimate_anew.checks import (
-    Pull,
-    at_least,
-    at_most,
-    found,
-    half_widths,
-    too_biased,
-)
-from rigidimeter.analysis.estimate_anew.checks.excitation import (
+from rigidimeter.analysis.estimate_anew.checks import Pull, at_least, at_most, found, half_widths
+from rigidimeter.analysis.estimate_anew.checks.motion import (
     checked_lines,
     coherence,
     gain,
@@ -71,11 +64,10 @@ from rigidimeter.analysis.estimate_anew.observation import Observation, loop_of
 from rigidimeter.analysis.estimate_anew.published import acceleration_seen
 from rigidimeter.analysis.estimate_anew.signals import band_hz
 from rigidimeter.analysis.estimate_anew.solve import (
-    LineNoise,
     inverse_of,
     noise_powers,
     shortest,
-    smoother,
+    solve_once,
     sums,
 )
 from rigidimeter.analysis.estimate_anew.stretches import moves
@@ -118,22 +110,62 @@ order at most .06 where these take less than 2 % off J."""
 
 
 def residual(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
-    """Return what the torque that J, B and K leave says of the model."""
-    seen = checked_lines(observation)
-    return residual_whiteness(seen, fit, pull) + held_out_vaf(seen, fit, pull)
+    """Return what the torque that J, B and K leave says of the model.
+
+    **Whether it is white** within the band, by its spectral flatness: the geometric over the
+    arithmetic mean of the power, lines taken eight together; their mean logarithm is that of white
+    noise less ln 8 − ψ(8), which is made up for. **Whether J, B and K of the first half** explain
+    the second half's torque.
+    """
+    seen, settings = checked_lines(observation), observation.settings.diagnostics
+    power = np.abs(seen.torque_nm - seen.motion @ fit.value)[in_band(seen, hertz(seen.grid))] ** 2
+    groups = max(power.size // LINES_TOGETHER, 1)
+    means = power[: groups * LINES_TOGETHER].reshape(groups, -1).mean(axis=1)
+    value, more = math.nan, pull.told(fit, settings)
+    if np.all(means > 0):
+        made_up = math.log(LINES_TOGETHER) - float(scipy.special.digamma(LINES_TOGETHER))
+        value = min(float(np.exp(np.mean(np.log(means)) + made_up) / np.mean(means)), 1.0)
+    least = settings.min_residual_flatness
+    results = at_least("residual_whiteness", settings, value, least, **more)
+    _, (torque, *columns), _ = in_time(seen.grid, np.stack([seen.torque_nm, *seen.motion.T]))
+    half, motion = torque.size // 2, np.stack(columns, axis=1)
+    first, second = motion[:half], motion[half:]
+    joint = shortest(first.T @ first, first.T @ torque[:half])
+    variance, left = np.var(torque[half:]), np.var(torque[half:] - second @ joint)
+    value = float(100.0 * (1.0 - left / variance)) if variance > 0 else math.nan
+    least = settings.min_held_out_vaf_percent
+    return results + at_least("held_out_vaf", settings, value, least, **more)
 
 
 def parameters(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
-    """Return what J, B and K, and R², say by themselves."""
-    return r_squared(fit, pull, seen.settings.diagnostics) + values(seen, fit)
+    """Return what J, B and K, and R², say by themselves.
+
+    A low R² does not matter to a method that weights torque beyond the model away.
+    """
+    settings = seen.settings.diagnostics
+    more = pull.told(fit, settings)
+    if not (pull.instruments or pull.in_interval):
+        more = {"effect": more["effect"]}
+    low = at_least("r_squared", settings, fit.r_squared, settings.min_r_squared, **more)
+    return low + values(seen, fit)
 
 
 def values(seen: Observation, fit: Fit) -> list[Finding]:
-    """Return whether a joint can have these numbers, and K without the limb's weight."""
-    settings = seen.settings.diagnostics
-    findings = negative_parameters(fit, settings) + implausible_parameters(fit, settings)
+    """Return whether a joint can have these numbers, and K without the limb's weight.
+
+    A limb at the angle θ from hanging straight down takes the torque m g l sin θ, whose slope
+    m g l cos θ is in K.
+    """
+    settings, angle = seen.settings.diagnostics, seen.epoch.channels.get("angle_rad")
+    results = negative_parameters(fit, settings) + implausible_parameters(fit, settings)
     # Epochs in a pool need not have one posture.
-    return findings + (gravity(seen.epoch, fit, settings) if fit.epoch != "pooled" else [])
+    if settings.gravity_nm and angle is not None and fit.epoch != "pooled":
+        hanging_rad, K = rad_from_deg(settings.gravity_angle_deg), fit.stiffness_nm_rad
+        slope = settings.gravity_nm * float(np.mean(np.cos(hanging_rad + angle.values)))
+        results.append(
+            found("gravity", settings, K - slope, facts={"stiffness": K, "slope": slope})
+        )
+    return results
 
 
 def least_squares(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
@@ -144,48 +176,6 @@ def least_squares(observation: Observation, fit: Fit, pull: Pull) -> list[Findin
     if not pull.in_interval:
         return findings
     return findings + unweighted_fit(observation, fit) + noise_of_motion(observation, fit)
-
-
-def residual_whiteness(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
-    """Return whether the residual within the band is coloured, by its spectral flatness.
-
-    The geometric over the arithmetic mean of the power, lines taken eight together; their mean
-    logarithm is that of white noise less ln 8 − ψ(8), which is made up for.
-    """
-    settings = seen.settings.diagnostics
-    power = np.abs(seen.torque_nm - seen.motion @ fit.value)[in_band(seen, hertz(seen.grid))] ** 2
-    groups = max(power.size // LINES_TOGETHER, 1)
-    means = power[: groups * LINES_TOGETHER].reshape(groups, -1).mean(axis=1)
-    value = math.nan
-    if np.all(means > 0):
-        made_up = math.log(LINES_TOGETHER) - float(scipy.special.digamma(LINES_TOGETHER))
-        value = min(float(np.exp(np.mean(np.log(means)) + made_up) / np.mean(means)), 1.0)
-    least, more = settings.min_residual_flatness, pull.told(fit, settings)
-    return at_least("residual_whiteness", settings, value, least, **more)
-
-
-def held_out_vaf(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
-    """Return whether J, B and K of the first half explain the second half's torque."""
-    settings = seen.settings.diagnostics
-    _, (torque, *columns), _ = in_time(seen.grid, np.stack([seen.torque_nm, *seen.motion.T]))
-    half, motion = torque.size // 2, np.stack(columns, axis=1)
-    first, second = motion[:half], motion[half:]
-    values = shortest(first.T @ first, first.T @ torque[:half])
-    variance, left = np.var(torque[half:]), np.var(torque[half:] - second @ values)
-    value = float(100.0 * (1.0 - left / variance)) if variance > 0 else math.nan
-    least, more = settings.min_held_out_vaf_percent, pull.told(fit, settings)
-    return at_least("held_out_vaf", settings, value, least, **more)
-
-
-def r_squared(fit: Fit, pull: Pull, settings: DiagnosticsSettings) -> list[Finding]:
-    """Return whether J, B and K explain little of the torque.
-
-    It does not matter to a method that weights torque beyond the model away.
-    """
-    more = pull.told(fit, settings)
-    if not (pull.instruments or pull.in_interval):
-        more = {"effect": more["effect"]}
-    return at_least("r_squared", settings, fit.r_squared, settings.min_r_squared, **more)
 
 
 def negative_parameters(fit: Fit, settings: DiagnosticsSettings) -> list[Finding]:
@@ -219,20 +209,6 @@ def implausible_parameters(fit: Fit, settings: DiagnosticsSettings) -> list[Find
     facts = {"symbol": about.symbol, "size": float(fit.value[worst]), "size_unit": about.unit}
     value = factors[worst, side]
     return at_most("implausible_parameters", settings, value, 1.0, facts=facts | {"side": side})
-
-
-def gravity(epoch: Epoch, fit: Fit, settings: DiagnosticsSettings) -> list[Finding]:
-    """Return K without the slope of the limb's weight, where that is in the settings.
-
-    A limb at the angle θ from hanging straight down takes the torque m g l sin θ, whose slope
-    m g l cos θ is in K.
-    """
-    angle = epoch.channels.get("angle_rad")
-    if settings.gravity_nm == 0.0 or angle is None:
-        return []
-    hanging_rad, K = rad_from_deg(settings.gravity_angle_deg), fit.stiffness_nm_rad
-    slope = settings.gravity_nm * float(np.mean(np.cos(hanging_rad + angle.values)))
-    return [found("gravity", settings, K - slope, facts={"stiffness": K, "slope": slope})]
 
 
 def pull_of(observation: Observation, fit: Fit, *, by_noise: bool) -> Pull:
@@ -274,7 +250,7 @@ def loop_bias(fit: Fit, pull: Pull, settings: DiagnosticsSettings) -> list[Findi
     value = 100.0 * float(np.max(np.abs(pull.bias) / half))
     if not math.isfinite(value):
         return [found("loop_bias", settings, value, most, variant="unknown")]
-    if not too_biased(fit, pull.bias, most, pull.in_interval):
+    if not pull.large(fit, most):
         return []
     effect = Effect.of(pull.bias, fit.value, half)
     variant = "first_order" if pull.in_interval else ""
@@ -284,18 +260,13 @@ def loop_bias(fit: Fit, pull: Pull, settings: DiagnosticsSettings) -> list[Findi
 def unweighted_fit(observation: Observation, fit: Fit) -> list[Finding]:
     """Return by how many % least squares without weights differs, more than noise and loop do."""
     settings, grid = observation.settings.diagnostics, observation.grid
-    problems = direct([observation], fit.value)
-    gram, moment = sums(problems)
-    inverse = inverse_of(gram)
-    alike = inverse @ moment
-    pull = loop_pull(problems, [np.ones(grid.line.size)], alike, inverse)
+    problems, powers = direct([observation], fit.value), [np.ones(grid.line.size)]
+    alike = solve_once(problems, powers)
+    pull = loop_pull(problems, powers, alike.values, alike.inverse)
     if not np.all(np.isfinite(pull)):
         return []
-    (shape,), smooth = noise_powers(problems, alike), smoother(grid.line, 1)
-    noise = LineNoise(problems[0], shape, problems[0].instruments, inverse)
-    covariance = noise.variance(noise.density(problems[0].residual(alike), smooth))
-    apart = alike - pull - fit.value
-    allowed = STANDARD_ERRORS * np.sqrt(np.diag(covariance)) + PULL_SHARE * np.abs(pull)
+    apart = alike.values - pull - fit.value
+    allowed = STANDARD_ERRORS * alike.se + PULL_SHARE * np.abs(pull)
     percent, most = 100.0 * apart / np.abs(fit.value), settings.max_unweighted_percent
     sure = (np.abs(apart) > allowed) & (np.abs(percent) > most)
     if not np.any(sure):
@@ -315,14 +286,12 @@ def noise_of_motion(observation: Observation, fit: Fit) -> list[Finding]:
     if observation.noise is None:
         return []
     (power,) = noise_powers(direct([observation], fit.value), fit.value)
-    of_noise, of_motion = (
-        np.sum(np.abs(lines[:, :2]) ** 2 / power[:, None], axis=0)
-        for lines in (observation.noise, observation.motion)
-    )
+    weighted = np.abs(np.stack([observation.noise, observation.motion])[..., :2]) ** 2
+    of_noise, of_motion = np.sum(weighted / power[:, None], axis=1)
     share = 100.0 * of_noise / of_motion
     about, settings = int(np.argmax(share)), observation.settings.diagnostics
-    facts: dict[str, Fact] = {"symbol": "JB"[about]}
-    return at_most("noise_of_motion", settings, float(share[about]), MOST_NOISE, facts=facts)
+    facts, value = {"symbol": "JB"[about]}, float(share[about])
+    return at_most("noise_of_motion", settings, value, MOST_NOISE, facts=facts)
 
 
 class Shown(NamedTuple):
@@ -392,9 +361,8 @@ def controller_shown(seen: Observation, cause: Complex | None = None) -> Shown:
     if not percent > most:
         return Shown(percent, factor)
     columns = np.stack([sent, sent * (1.0 - 1.0 / z)], axis=1)[kept]
-    damping, beta = shortest(
-        *((columns.conj().T @ y).real for y in (columns, asked[kept]))
-    ).tolist()
+    both = ((columns.conj().T @ lines).real for lines in (columns, asked[kept]))
+    damping, beta = shortest(*both).tolist()
     if not beta > 0:
         return Shown(percent, factor)
     bent = damping / beta / math.log1p(damping / beta) if damping > 0 else 1.0
@@ -431,31 +399,23 @@ def following(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
 
 def controller_misfit(fit: Fit, pull: Pull, settings: Settings, shown: Shown) -> list[Finding]:
     """Return how far the command is from what the controller makes of perturbation and torque."""
-    checks, other, variant = settings.diagnostics, shown.controller, ""
+    checks, given, other, variant = settings.diagnostics, settings.controller, shown.controller, ""
     if not shown.misfit_percent > checks.max_controller_misfit_percent:
         return []
     harmless, facts = pull.harmless(fit, checks)
     if other is not None:
-        variant = _how_shown(settings.controller, other)
-        facts |= {"shown_inertia": other.inertia_kg_m2, "shown_damping": other.damping_nm_s_rad}
+        J, B = other.inertia_kg_m2, max(other.damping_nm_s_rad, 1e-12)
+        factors = np.log([J / given.inertia_kg_m2, B / max(given.damping_nm_s_rad, 1e-12)])
+        per_degree, within = math.log(per_rad_from_per_deg(1.0)), math.log(PER_DEGREE_WITHIN)
+        variant = "per_degree" if np.all(np.abs(factors - per_degree) < within) else "shown"
+        if np.all(np.abs(factors + per_degree) < within):
+            variant = "per_degree_twice"
+        facts |= {"shown_inertia": J, "shown_damping": other.damping_nm_s_rad}
     elif not pull.instruments:  # of a loop that is not known the bias cannot be told
         facts, harmless = {}, ""
     more = {"facts": facts | {"factor": shown.factor}, "variant": variant, "harmless": harmless}
     most = checks.max_controller_misfit_percent
     return at_most("controller_misfit", checks, shown.misfit_percent, most, **more)
-
-
-def _how_shown(given: ControllerSettings, other: ControllerSettings) -> str:
-    """Return the variant that says how the settings differ from the controller that was used."""
-    damping = max(other.damping_nm_s_rad, 1e-12) / max(given.damping_nm_s_rad, 1e-12)
-    factors, per_deg = (
-        np.log([other.inertia_kg_m2 / given.inertia_kg_m2, damping]),
-        math.log(per_rad_from_per_deg(1.0)),
-    )
-    for wrong, variant in ((per_deg, "per_degree"), (-per_deg, "per_degree_twice")):
-        if np.all(np.abs(factors - wrong) < math.log(PER_DEGREE_WITHIN)):
-            return variant
-    return "shown"
 
 
 def unstable_loop(epoch: Epoch, fit: Fit, pull: Pull, settings: Settings) -> list[Finding]:

@@ -30,15 +30,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 
-from rigidimeter.analysis.estimate_anew.checks import (
-    Pull,
-    at_least,
-    at_most,
-    found,
-    half_widths,
-)
-from rigidimeter.analysis.estimate_anew.checks.excitation import WHOLE, hertz
+from rigidimeter.analysis.estimate_anew.checks import Pull, at_least, at_most, found, half_widths
+from rigidimeter.analysis.estimate_anew.checks.motion import WHOLE, hertz
 from rigidimeter.analysis.estimate_anew.grid import SAME_TIME, Array, Complex
 from rigidimeter.analysis.estimate_anew.observation import Observation
 from rigidimeter.analysis.estimate_anew.signals import (
@@ -52,17 +47,14 @@ from rigidimeter.analysis.estimate_anew.solve import shortest
 from rigidimeter.analysis.estimate_anew.stretches import (
     motion_channels,
     moves,
+    rest_of,
     sound,
     unmeasured,
-    used_s,
 )
 from rigidimeter.core.findings import Effect, Fact, Finding
 from rigidimeter.core.records import LOST_SAMPLES, Channel, Epoch, Fit, LeftOut
 from rigidimeter.core.settings import DiagnosticsSettings
 from rigidimeter.core.units import rad_from_deg
-
-MOST_SHOWN = 3
-"""Stretches that a sentence names."""
 
 REACH = 2
 """Samples to each side: as far as a second difference of central differences reaches."""
@@ -119,44 +111,42 @@ def _not_a_sum(epoch: Epoch, channels: Sequence[Channel]) -> float:
     at = at[:: max(at.size // ROWS, 1)]
     if at.size < FEWEST_ROWS:
         return math.inf
-    columns, lags = [np.ones((at.size, 1))], at[:, None] + np.arange(-REACH, REACH + 1)
+    columns, lags = [np.ones((1, at.size))], at + np.arange(-REACH, REACH + 1)[:, None]
     for one in channels:
         at_times = held_at if one.name == "perturbation_nm" else values_at
         columns.append(at_times(one, torque.time_s)[lags])
     target = torque.values[at] - np.mean(torque.values[at])
-    left, sd = _left(np.hstack(columns), target), float(np.std(target))
-    return float(np.sqrt(np.mean(left**2))) / sd if sd > 0 else math.inf
+    return math.sqrt(_unexplained(np.concatenate(columns), target))
 
 
-def _left(regressors: Array, target: Array) -> Array:
-    """Return what least squares leaves of a target, each regressor scaled to unit length."""
-    lengths = np.linalg.norm(regressors, axis=0)
+def _unexplained(regressors: Complex | Array, target: Complex | Array) -> float:
+    """Return which share of a target's power real multiples of regressors, shape (k, m), leave."""
+    lengths = np.linalg.norm(regressors, axis=1, keepdims=True)
     scaled = regressors / np.where(lengths > 0, lengths, 1.0)
-    return np.asarray(target - scaled @ np.linalg.lstsq(scaled, target, rcond=None)[0])
+    columns, whole = (np.concatenate([x.real, x.imag], axis=-1).T for x in (scaled, target))
+    left = whole - columns @ np.linalg.lstsq(columns, whole, rcond=None)[0]
+    return float(left @ left / (whole @ whole)) if np.any(whole) else math.nan
 
 
 def repeating(epoch: Epoch, settings: DiagnosticsSettings) -> list[Finding]:
     """Return whether a channel was at the end of its range, or hung."""
     results: list[Finding] = []
-    inside, interval_s = unmeasured(epoch, settings), 1.0 / epoch.channels["torque_nm"].rate_hz
-    for name in ("saturation", "frozen"):
+    torque, found_now = epoch.channels["torque_nm"], unmeasured(epoch, settings)
+    length_s = float(np.ptp(torque.time_s[[0, -1]]))
+    limits = {"saturation": settings.max_saturated_percent, "frozen": settings.max_frozen_s}
+    for name, most in limits.items():
         out = [one for one in epoch.left_out if one.check == name]
-        spans = out or [one for one in inside if one.check == name]
+        spans = out or [one for one in found_now if one.check == name]
         if not spans:
             continue
         # The reason of a stretch begins with its channel.
         names = dict.fromkeys(one.reason.split()[0] for one in spans)
-        facts: dict[str, Fact] = {"channel": " and ".join(names)}
-        longest_s, first_s = max((one.stop_s - one.start_s, one.start_s) for one in spans)
-        value, most = longest_s, settings.max_frozen_s
+        value, start_s = max((one.stop_s - one.start_s, one.start_s) for one in spans)
         if name == "saturation":
-            most = settings.max_saturated_percent
-            repeated_s = (_seconds(spans) + len(spans) * interval_s) / len(names)
-            value = 100.0 * repeated_s / _length_s(epoch)
-        elif not out:
-            facts["start_s"] = first_s
-        if out:
-            facts |= rest_of(epoch, out)
+            repeated_s = _seconds(spans) + len(spans) / torque.rate_hz
+            value = 100.0 * repeated_s / len(names) / length_s
+        facts: dict[str, Fact] = {"channel": " and ".join(names), "start_s": start_s}
+        facts |= rest_of(epoch, out) if out else {}
         harmless = "left_out" if out else ""
         results.append(found(name, settings, value, most, facts=facts, harmless=harmless))
     return results
@@ -182,18 +172,6 @@ def left_out(epoch: Epoch, settings: DiagnosticsSettings) -> list[Finding]:
 
 def _seconds(stretches: Sequence[LeftOut]) -> float:
     return sum(stretch.stop_s - stretch.start_s for stretch in stretches)
-
-
-def _length_s(epoch: Epoch) -> float:
-    return float(np.ptp(epoch.channels["torque_nm"].time_s[[0, -1]]))
-
-
-def rest_of(epoch: Epoch, stretches: Sequence[LeftOut]) -> dict[str, Fact]:
-    """Return which parts are left out, and how much of the epoch is used."""
-    spans = [f"from {s.start_s:.4g} to {s.stop_s:.4g} s" for s in stretches[:MOST_SHOWN]]
-    more = len(stretches) - MOST_SHOWN
-    shown = " and ".join(spans) + (f" and {more} more" if more > 0 else "")
-    return {"spans": shown, "used_s": used_s(epoch, 0.0), "length_s": _length_s(epoch)}
 
 
 def loop(seen: Observation) -> list[Finding]:
@@ -223,37 +201,26 @@ def velocity(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
     """
     if not {"angle_rad", "velocity_rad_s"} <= seen.epoch.channels.keys():
         return []
-    scale, delay_s = velocity_fit(seen)
-    if not np.isfinite([scale, delay_s]).all():
+    time_s, (v, x) = seen.grid.coarse_time_s, seen.coarse
+    travelled = scipy.integrate.cumulative_trapezoid(v, time_s, initial=0)
+    n = max(round(STRETCH_S * seen.grid.rate_hz / seen.grid.step), 1)
+    signals = np.stack([travelled, v, x])
+    # Neither a stretch that is left out nor one that reaches into it.
+    steps = (signals[:, n:] - signals[:, :-n])[:, sound(seen.epoch, time_s[:-n], STRETCH_S)]
+    products = steps @ steps.T
+    if steps.shape[1] < 3 or not np.all(np.diag(products) > 0):
         return []  # what does not move is found by other checks
+    scale, delay_s = shortest(products[:2, :2], products[:2, 2]).tolist()
     checks, late_ms, half = seen.settings.diagnostics, 1e3 * delay_s / scale, half_widths(fit)
     value, most = 100.0 * abs(scale - 1.0), checks.max_velocity_scale_percent
     results = at_most("velocity_scale", checks, value, most, facts={"scale": scale})
     bias = np.array([0.0, -1e-3 * fit.value[2] * late_ms, 0.0])
     held_ms = abs(late_ms) * half[1] / max(abs(bias[1]), 1e-300)
     most = min(checks.max_velocity_delay_ms, float(held_ms))
+    effect = Effect.of(bias, fit.value, half)
     if not abs(late_ms) <= most:
-        effect = Effect.of(bias, fit.value, half)
         results.append(found("velocity_delay", checks, late_ms, most, effect=effect))
     return results + velocity_shape(seen)
-
-
-def velocity_fit(seen: Observation) -> tuple[float, float]:
-    """Return the scale g and the delay τ in s of the velocity against the angle.
-
-    NaN where the epoch does not move or is too short.
-    """
-    time_s, (v, x) = seen.grid.coarse_time_s, seen.coarse
-    travelled = np.append(0.0, np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(time_s)))
-    n = max(round(STRETCH_S * seen.grid.rate_hz / seen.grid.step), 1)
-    # Neither a stretch that is left out nor one that reaches into it.
-    kept, signals = sound(seen.epoch, time_s[:-n], STRETCH_S), np.stack([travelled, v, x])
-    steps = (signals[:, n:] - signals[:, :-n])[:, kept]
-    products = steps @ steps.T
-    if steps.shape[1] < 3 or not np.all(np.diag(products)[:2] > 0):
-        return math.nan, math.nan
-    scale, delay_s = shortest(products[:2, :2], products[:2, 2]).tolist()
-    return scale, delay_s
 
 
 def velocity_shape(seen: Observation) -> list[Finding]:
@@ -263,7 +230,7 @@ def velocity_shape(seen: Observation) -> list[Finding]:
     highest_hz, (v, x) = min(high_hz, SHAPE_HIGH_HZ), seen.coarse
     slow, used = (hertz(grid) <= most_hz for most_hz in (highest_hz, high_hz))
     slope, own = grid.coarse_motion(x, v)[slow, 0], grid.coarse_motion(v, x)[slow, :2]
-    value = 100.0 * math.sqrt(1.0 - _r_squared(own.T, slope))
+    value = 100.0 * math.sqrt(_unexplained(own.T, slope))
     most = checks.max_velocity_shape_percent
     if highest_hz <= 2 * low_hz or not value > most:
         return []
@@ -274,23 +241,13 @@ def velocity_shape(seen: Observation) -> list[Finding]:
     by_angle = grid.lines(angle_at(epoch, grid.time_s), 2)
     by_velocity = grid.lines(velocity_at(epoch, grid.time_s), 1)
     by_velocity = np.concatenate([by_velocity, grid.lines(np.stack([integral, *drifts]))[0]])
-    of_angle, of_velocity = (
-        _r_squared(lines[:, used], seen.torque_nm[used]) for lines in (by_angle, by_velocity)
-    )
-    less, more = sorted((1.0 - of_angle, 1.0 - of_velocity))
-    worse = "velocity" if of_angle > of_velocity else "angle"
-    facts: dict[str, Fact] = {"by_angle": of_angle, "by_velocity": of_velocity}
-    facts |= {"low_hz": low_hz, "high_hz": highest_hz}
-    variant = worse if more > CLEARLY * less else ""
+    torque_nm = seen.torque_nm[used]
+    left = [_unexplained(lines[:, used], torque_nm) for lines in (by_angle, by_velocity)]
+    worse = "velocity" if left[0] < left[1] else "angle"
+    facts: dict[str, Fact] = {"low_hz": low_hz, "high_hz": highest_hz}
+    facts |= {"by_angle": 1.0 - left[0], "by_velocity": 1.0 - left[1]}
+    variant = worse if max(left) > CLEARLY * min(left) else ""
     return [found("velocity_shape", checks, value, most, facts=facts, variant=variant)]
-
-
-def _r_squared(regressors: Complex, target: Complex) -> float:
-    """Return which share of a target's power at the lines real multiples of regressors give."""
-    whole = np.concatenate([target.real, target.imag])
-    left = _left(np.concatenate([regressors.real, regressors.imag], axis=1).T, whole)
-    power = float(whole @ whole)
-    return 1.0 - float(left @ left) / power if power > 0 else math.nan
 
 
 def static_torque(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
