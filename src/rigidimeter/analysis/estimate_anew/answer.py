@@ -15,8 +15,8 @@ response to the perturbation, or where it could change none of them by 1 %; else
 
 Where no perturbation was recorded the motion is its own instrument, and whatever the subject does
 by the loop is linear. Terms that are not linear are then tested in what no free linear filter of
-the motion explains, and come first; linear ones must explain most of the noise; rivals are compared
-by the power of the residual.
+the motion explains, and come first; linear ones must explain most of the noise, and are told without changing J, B and K; rivals are
+compared by the power of the residual.
 """
 
 from __future__ import annotations
@@ -218,6 +218,15 @@ class Answer(NamedTuple):
     little: frozenset[str]
     case: Case
     state: State
+
+    @property
+    def better(self) -> bool:
+        """Whether J, B and K beside the terms are to be preferred to those without.
+
+        Without a perturbation a subject who gives way looks like a linear term.
+        """
+        linear = any(one.term.linear for one in self.found)
+        return self.answered and bool(self.found) and (self.case.caused or not linear)
 
 
 def answer(

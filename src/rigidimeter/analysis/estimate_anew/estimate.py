@@ -116,6 +116,7 @@ closed loop 0.5."""
 
 WITHOUT_TERMS = (
     "residual_perturbation",
+    "torque_delay",
     "gravity",
     "negative_parameters",
     "implausible_parameters",
@@ -720,7 +721,7 @@ def _told(
         solution = shared[condition]
         seen = [one.observation for one in solution.problems]
         found = answer(solution, person=seen[0].settings.diagnostics.subject_present)
-        stands = own is method and found.answered and bool(found.found)
+        stands = own is method and found.better
         told.append(
             Told(
                 condition,
