@@ -15,8 +15,8 @@ response to the perturbation, or where it could change none of them by 1 %; else
 
 Where no perturbation was recorded the motion is its own instrument, and whatever the subject does
 by the loop is linear. Terms that are not linear are then tested in what no free linear filter of
-the motion explains, and come first; linear ones must explain most of the noise, and are told without changing J, B and K; rivals are
-compared by the power of the residual.
+the motion explains, and come first; linear ones must explain most of the noise, and are told
+without changing J, B and K; rivals are compared by the power of the residual.
 """
 
 from __future__ import annotations
