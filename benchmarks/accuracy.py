@@ -25,7 +25,7 @@ from tests.docs.measured import folded
 
 from benchmarks import hard_epochs, two_rigs
 from benchmarks.known_joint import TRUTH, array, sessions, settings_with
-from rigidimeter.analysis.estimate_anew import estimate_recorded, fit_epoch, prepare
+from rigidimeter.analysis.estimation import estimate_recorded, fit_epoch, prepare
 from rigidimeter.core.records import Channel, Epoch, Fit
 from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE, Settings
 from rigidimeter.planning import prbs_nm, predicted_precision

@@ -20,7 +20,7 @@ from tests.pushes import JOINT, Pushed, epochs_with_emg, with_reflex_emg
 from tests.scenarios.recordings import measured_alone
 from tests.scenarios.scenario import scenario
 
-from rigidimeter.analysis.estimate_anew import estimate_recorded, prepare
+from rigidimeter.analysis.estimation import estimate_recorded, prepare
 from rigidimeter.core.records import Activity, Epoch
 from rigidimeter.core.settings import Settings
 

@@ -17,7 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.paired import REPEATS, Row, in_ms, paired
-from rigidimeter.analysis.estimate_anew import CHECKS, estimate, estimate_recorded, prepare
+from rigidimeter.analysis.estimation import CHECKS, estimate, estimate_recorded, prepare
 from rigidimeter.analysis.reading import ReadOptions, read_recording
 from rigidimeter.core.records import Epoch
 from rigidimeter.core.settings import Settings, parse_settings

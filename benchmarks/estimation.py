@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.paired import REPEATS, Row, in_ms, paired
-from rigidimeter.analysis.estimate_anew import fit_epoch
+from rigidimeter.analysis.estimation import fit_epoch
 from rigidimeter.core.settings import Settings
 from rigidimeter.virtual.batch import simulate_epochs
 

@@ -12,7 +12,7 @@ from tests.scenarios.recordings import measured_alone
 from tests.scenarios.scenario import scenario
 
 from benchmarks.known_joint import TRUTH, sessions, settings_with
-from rigidimeter.analysis.estimate_anew import estimate, fit_epoch
+from rigidimeter.analysis.estimation import estimate, fit_epoch
 from rigidimeter.core.records import Channel, Epoch
 from rigidimeter.core.settings import Settings
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from tests.docs.measured import between_the_marks, folded
 from tests.scenarios.late_drive_rig import LateRig, simulate
 
-from rigidimeter.analysis.estimate_anew import estimate_recorded, prepare
+from rigidimeter.analysis.estimation import estimate_recorded, prepare
 from rigidimeter.core.settings import parse_settings
 
 Array = NDArray[np.float64]

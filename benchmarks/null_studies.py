@@ -42,7 +42,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimate_anew import (
+from rigidimeter.analysis.estimation import (
     estimate_recorded,
     loop_area_j,
     prepare,

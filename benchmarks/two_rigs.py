@@ -13,7 +13,7 @@ import numpy as np
 from tests.scenarios.independent_rig import Rig, simulate
 
 from benchmarks.known_joint import JOINT, TRUTH, array
-from rigidimeter.analysis.estimate_anew import estimate_recorded, prepare
+from rigidimeter.analysis.estimation import estimate_recorded, prepare
 from rigidimeter.core.records import Channel, Epoch, Fit
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.virtual.batch import simulate_chunks

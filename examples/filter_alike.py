@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfilt, sosfiltfilt
 
-from rigidimeter.analysis.estimate_anew import Signals, fit_inertia_damping_stiffness
+from rigidimeter.analysis.estimation import Signals, fit_inertia_damping_stiffness
 from rigidimeter.core.records import Epoch
 from rigidimeter.core.session import read_session, session_settings
 

@@ -11,7 +11,7 @@ import numpy as np
 from tests.scenarios.catalogue import SCENARIOS
 from tests.scenarios.recordings import measured_alone
 
-from rigidimeter.analysis.estimate_anew import estimate_recorded, prepare
+from rigidimeter.analysis.estimation import estimate_recorded, prepare
 from rigidimeter.core.executor import each
 from rigidimeter.core.records import Analysis, Epoch, Fit
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from rigidimeter.analysis.estimate_anew.grid import grid_of
-from rigidimeter.analysis.estimate_anew.score import chance
+from rigidimeter.analysis.estimation.grid import grid_of
+from rigidimeter.analysis.estimation.score import chance
 from rigidimeter.core.records import Channel
 from rigidimeter.core.settings import parse_settings
 from rigidimeter.model import Loop

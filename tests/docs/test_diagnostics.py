@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tests.docs.generated import REFERENCE
 
-from rigidimeter.analysis import estimate_anew
+from rigidimeter.analysis import estimation
 from rigidimeter.core import records
 from rigidimeter.core.findings import KINDS, STUDY_KINDS
 from rigidimeter.core.settings import DiagnosticLevels, DiagnosticsSettings
@@ -25,7 +25,7 @@ def test_every_check_has_its_row_and_no_other_has() -> None:
     assert len(names) == len(set(names))
     names = [name for name in names if KINDS[name] not in STUDY_KINDS]
     assert sorted(names) == sorted(DiagnosticLevels.model_fields)
-    folders = [Path(one.__file__).parent for one in (estimate_anew, records)]
+    folders = [Path(one.__file__).parent for one in (estimation, records)]
     code = "".join(path.read_text("utf-8") for one in folders for path in one.rglob("*.py"))
     assert [name for name in names if f'"{name}"' not in code] == []  # each may be found
 

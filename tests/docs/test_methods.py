@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rigidimeter.analysis.estimate_anew import METHODS
+from rigidimeter.analysis.estimation import METHODS
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = DOCS / "reference" / "methods.md"

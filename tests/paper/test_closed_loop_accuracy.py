@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rigidimeter.analysis.estimate_anew import epoch_signals, fit_inertia_damping_stiffness
+from rigidimeter.analysis.estimation import epoch_signals, fit_inertia_damping_stiffness
 from rigidimeter.core.session import read_session
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.virtual import PAPER_RATES

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimate_anew import fit_epoch
+from rigidimeter.analysis.estimation import fit_epoch
 from rigidimeter.core.session import read_session
 from rigidimeter.core.settings import Settings
 from rigidimeter.virtual import PAPER_RATES

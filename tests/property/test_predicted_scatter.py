@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimate_anew import (
+from rigidimeter.analysis.estimation import (
     epoch_signals,
     estimate_recorded,
     fit_inertia_damping_stiffness,

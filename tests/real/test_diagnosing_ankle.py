@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimate_anew import estimate, estimate_recorded, prepare
+from rigidimeter.analysis.estimation import estimate, estimate_recorded, prepare
 from rigidimeter.analysis.reading import ReadOptions, Recording, read_recording
 from rigidimeter.analysis.study import fit_terms
 from rigidimeter.core.records import Channel

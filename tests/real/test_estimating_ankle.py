@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scipy.io
 
-from rigidimeter.analysis.estimate_anew import epoch_signals, fit_inertia_damping_stiffness
+from rigidimeter.analysis.estimation import epoch_signals, fit_inertia_damping_stiffness
 from rigidimeter.analysis.reading import ReadOptions, read_recording
 from rigidimeter.cli.main import main
 from rigidimeter.core.errors import UserError

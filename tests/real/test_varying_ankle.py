@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimate_anew import estimate
+from rigidimeter.analysis.estimation import estimate
 from rigidimeter.analysis.reading.formats.read_options import ReadOptions
 from rigidimeter.analysis.reading.formats.readers import read_recording
 from rigidimeter.core.records import Channel

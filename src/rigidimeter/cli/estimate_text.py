@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from rigidimeter.analysis.estimate_anew import METHODS
+from rigidimeter.analysis.estimation import METHODS
 from rigidimeter.analysis.study import Precision, StudyResult, condition_precisions
 from rigidimeter.cli.comparison_text import finding_notes, full_blocks, stiffness_notes, two_lines
 from rigidimeter.cli.terminal_tables import ROWS, Block, Heading, Table, text_lines

@@ -120,7 +120,7 @@ def full_text(parameter: Any) -> str:
 
         return f"What to read: {formats_text()}."
     if "--method" in parameter.opts:
-        from rigidimeter.analysis.estimate_anew import METHODS
+        from rigidimeter.analysis.estimation import METHODS
 
         known = ", ".join(f"{method.name} ({method.title})" for method in METHODS)
         return (
@@ -131,7 +131,7 @@ def full_text(parameter: Any) -> str:
 
         return f"Format: {', '.join(f'{each.name} ({each.title})' for each in FORMATS)}."
     if "--terms" in parameter.opts:
-        from rigidimeter.analysis.estimate_anew import term_names
+        from rigidimeter.analysis.estimation import term_names
 
         return (
             f"Terms of the torque: {', '.join(term_names())} (+ or - after a reflex: the "

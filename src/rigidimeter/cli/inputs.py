@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from rigidimeter.analysis.estimate_anew import method_names, no_such_method
+from rigidimeter.analysis.estimation import method_names, no_such_method
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.analysis.study import (
     StudyResult,

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from statistics import median
 
-from rigidimeter.analysis.estimate_anew import Comparison, ModelRow
+from rigidimeter.analysis.estimation import Comparison, ModelRow
 from rigidimeter.analysis.study.torque_models import ModelledEpoch
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
 from rigidimeter.core.findings import SERIOUS_FIRST

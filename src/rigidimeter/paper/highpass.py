@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from rigidimeter.analysis.estimate_anew import Signals, fit_inertia_damping_stiffness
+from rigidimeter.analysis.estimation import Signals, fit_inertia_damping_stiffness
 from rigidimeter.core.settings import Settings
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Bound, Claim, bounded

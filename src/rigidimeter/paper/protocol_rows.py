@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from rigidimeter.analysis.estimate_anew import scoring_cycles
+from rigidimeter.analysis.estimation import scoring_cycles
 from rigidimeter.analysis.report.contents import Figure
 from rigidimeter.analysis.report.curves import draw_perturbation, draw_spectrum
 from rigidimeter.analysis.report.style import drawn

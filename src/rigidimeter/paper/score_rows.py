@@ -21,7 +21,7 @@ from functools import partial
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from rigidimeter.analysis.estimate_anew import Cycles, loop_area_j, score_epoch, scoring_cycles
+from rigidimeter.analysis.estimation import Cycles, loop_area_j, score_epoch, scoring_cycles
 from rigidimeter.analysis.report.contents import Figure
 from rigidimeter.analysis.report.curves import draw_loops
 from rigidimeter.analysis.report.style import GREY, drawn

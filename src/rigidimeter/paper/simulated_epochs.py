@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimeter.analysis.estimate_anew import (
+from rigidimeter.analysis.estimation import (
     epoch_signals,
     estimate,
     fit_inertia_damping_stiffness,

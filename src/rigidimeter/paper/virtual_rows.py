@@ -10,12 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from rigidimeter.analysis.estimate_anew import (
-    Signals,
-    epoch_signals,
-    scoring_cycles,
-    zero_phase_band,
-)
+from rigidimeter.analysis.estimation import Signals, epoch_signals, scoring_cycles, zero_phase_band
 from rigidimeter.analysis.report.contents import Figure
 from rigidimeter.analysis.report.curves import draw_loops, loop_limits
 from rigidimeter.analysis.report.points import distribution_size, draw_distribution

@@ -13,7 +13,7 @@ import pytest
 from tests.small_study import record
 
 import rigidimeter as rm
-from rigidimeter.analysis.estimate_anew import estimate_recorded, prepare
+from rigidimeter.analysis.estimation import estimate_recorded, prepare
 from rigidimeter.core.files import plain_values
 from rigidimeter.core.records import Channel
 

@@ -10,7 +10,7 @@ from tests.core_install import DEMO, ROOT, examples
 from typer.main import get_command
 from typer.testing import CliRunner
 
-from rigidimeter.analysis.estimate_anew import METHODS
+from rigidimeter.analysis.estimation import METHODS
 from rigidimeter.analysis.export import FORMATS
 from rigidimeter.cli.help_pages import HelpCommand, HelpGroup, full_text
 from rigidimeter.cli.main import app

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimate_anew import CHECKS, METHODS, TERMS
+from rigidimeter.analysis.estimation import CHECKS, METHODS, TERMS
 from rigidimeter.core.findings import KINDS
 
 ROOT = Path(__file__).parents[3]

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rigidimeter.analysis.estimate_anew import estimate
+from rigidimeter.analysis.estimation import estimate
 from rigidimeter.analysis.reading import read
 from rigidimeter.analysis.study import compare
 from rigidimeter.cli.progress import LEAST_SHARE, Meter

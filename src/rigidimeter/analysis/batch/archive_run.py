@@ -23,7 +23,7 @@ from rigidimeter.analysis.batch.archive_inputs import (
 from rigidimeter.analysis.batch.epoch_rows import How, answer, refusal
 from rigidimeter.analysis.batch.epoch_table import ENDINGS, columns, read_table, write_table
 from rigidimeter.analysis.batch.parts import Parts, Row
-from rigidimeter.analysis.estimate_anew import method_names, no_such_method
+from rigidimeter.analysis.estimation import method_names, no_such_method
 from rigidimeter.analysis.reading.recording import read_options
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.executor import each

@@ -1,83 +1,52 @@
-"""From an epoch to numbers: offline and pure.
+"""From epochs to J, B and K, to scores, and to what else the torque holds: offline and pure."""
 
-Each name is imported when it is first used: the estimator that runs beside a session needs one
-module, and would otherwise load scipy while the arm is about to move.
-"""
-
-from typing import TYPE_CHECKING
-
-from rigidimeter.core.lazy_names import lazy_names
-
-if TYPE_CHECKING:
-    from rigidimeter.analysis.estimation.alignment import aligned, estimate_delays
-    from rigidimeter.analysis.estimation.amplitude import amplitude_of_signals
-    from rigidimeter.analysis.estimation.bandlimited import band_hz
-    from rigidimeter.analysis.estimation.least_squares import fit_inertia_damping_stiffness
-    from rigidimeter.analysis.estimation.method_record import Method
-    from rigidimeter.analysis.estimation.methods import (
-        METHODS,
-        choose_method,
-        epoch_signals,
-        fit_epoch,
-        fit_epochs,
-        method_named,
-        method_names,
-        no_such_method,
-    )
-    from rigidimeter.analysis.estimation.scores import (
-        Cycles,
-        find_motion,
-        score_epoch,
-        scoring_cycles,
-    )
-    from rigidimeter.analysis.estimation.signals import Signals
-
-__all__ = [
-    "METHODS",
-    "Cycles",
-    "Method",
-    "Signals",
-    "aligned",
-    "amplitude_of_signals",
-    "band_hz",
-    "choose_method",
-    "epoch_signals",
-    "estimate_delays",
-    "find_motion",
-    "fit_epoch",
-    "fit_epochs",
-    "fit_inertia_damping_stiffness",
-    "method_named",
-    "method_names",
-    "no_such_method",
-    "score_epoch",
-    "scoring_cycles",
-]
-
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "alignment": ("aligned", "estimate_delays"),
-        "amplitude": ("amplitude_of_signals",),
-        "bandlimited": ("band_hz",),
-        "least_squares": ("fit_inertia_damping_stiffness",),
-        "method_record": ("Method",),
-        "methods": (
-            "METHODS",
-            "choose_method",
-            "epoch_signals",
-            "fit_epoch",
-            "fit_epochs",
-            "method_named",
-            "method_names",
-            "no_such_method",
-        ),
-        "scores": (
-            "Cycles",
-            "find_motion",
-            "score_epoch",
-            "scoring_cycles",
-        ),
-        "signals": ("Signals",),
-    },
+from rigidimeter.analysis.estimation.answer import Answer, answer
+from rigidimeter.analysis.estimation.checks import Pull, at_least, at_most, found
+from rigidimeter.analysis.estimation.delay import aligned
+from rigidimeter.analysis.estimation.estimate import (
+    CHECKS,
+    METHODS,
+    Impedance,
+    Progress,
+    Recorded,
+    choose_method,
+    estimate,
+    estimate_recorded,
+    fit_epoch,
+    impedance,
+    method_named,
+    method_names,
+    no_such_method,
+    observations_of,
+    prepare,
+    task_of,
 )
+from rigidimeter.analysis.estimation.grid import Array
+from rigidimeter.analysis.estimation.methods import Method, Ready
+from rigidimeter.analysis.estimation.models import (
+    Comparison,
+    ModelRow,
+    TermsFit,
+    better_clock,
+    candidates,
+    compare_models,
+    fit_models,
+    from_zero,
+    parse_terms,
+    refusal,
+    term_names,
+)
+from rigidimeter.analysis.estimation.published import (
+    epoch_signals,
+    fit_inertia_damping_stiffness,
+)
+from rigidimeter.analysis.estimation.scores import (
+    Cycles,
+    find_motion,
+    loop_area_j,
+    score_epoch,
+    scoring_cycles,
+)
+from rigidimeter.analysis.estimation.signals import Signals, band_hz, zero_phase_band
+from rigidimeter.analysis.estimation.stretches import longest_part
+from rigidimeter.analysis.estimation.terms import TERMS, Term

@@ -13,27 +13,24 @@ which also lets the cycles begin and end between samples.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 import scipy
+from scipy.interpolate import CubicSpline
 
-from rigidimeter.analysis.estimation.power_lines import power_lines
-from rigidimeter.analysis.estimation.prepared import PreparedEpoch
-from rigidimeter.analysis.estimation.screening import before_fit, unusable
 from rigidimeter.analysis.estimation.signals import (
     Array,
     angle_at,
+    butterworth,
     grid_rate_hz,
-    motion_channels,
-    thinned,
+    power_lines,
     uniform_grid,
     values_at,
 )
-from rigidimeter.core.records import Epoch, Motion, Outcome, Score
+from rigidimeter.analysis.estimation.stretches import motion_channels, obstacle, unusable
+from rigidimeter.core.records import Channel, Epoch, Motion, Outcome, Score
 from rigidimeter.core.settings import EstimationSettings, ScoreSettings
 
 POINTS_PER_CYCLE = 4096
@@ -75,11 +72,6 @@ def loop_area_j(torque_nm: Array, angle_rad: Array) -> float:
     return float(np.sum(0.5 * (torque_nm[1:] + torque_nm[:-1]) * np.diff(angle_rad)))
 
 
-def angular_impulse_nm_s(torque_nm: Array, interval_s: float) -> float:
-    """Return Σ|M| Δt in N·m·s over equally spaced samples (the numerator of Eq. 1)."""
-    return float(np.sum(np.abs(torque_nm)) * interval_s)
-
-
 def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
     """Return the cycles that are scored: whole ones, without the first and last second of motion.
 
@@ -104,7 +96,8 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
     rate_hz = grid_rate_hz(used, settings.band_high_hz)
     grid = uniform_grid(used, rate_hz)
     both = np.stack([values_at(used[0], grid), angle_at(epoch, grid)])
-    bandpass = _bandpass(settings.band_low_hz, settings.band_high_hz, rate_hz)
+    band = settings.band_low_hz, settings.band_high_hz
+    bandpass = butterworth(2, band, "bandpass", rate_hz)
     _, response = scipy.signal.sosfreqz(bandpass, [motion.frequency_hz], fs=rate_hz)
     gain = float(np.abs(response[0]) ** 2)  # once forwards and once backwards
     if gain < LEAST_GAIN:
@@ -121,20 +114,13 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
             f"the {motion.frequency_hz:.3g} Hz motion of {motion.duration_s:.3g} s holds no whole "
             f"cycle once {settings.discard_s:g} s at each end are discarded"
         )
-    points = n_cycles * POINTS_PER_CYCLE
-    fine = start + np.arange(points + 1) / (POINTS_PER_CYCLE * motion.frequency_hz)
+    points = np.arange(n_cycles * POINTS_PER_CYCLE + 1)
+    fine = start + points / (POINTS_PER_CYCLE * motion.frequency_hz)
     centred = both - np.mean(both, axis=1, keepdims=True)
     padded, before = _continued(grid, centred, motion.frequency_hz, padding_s)
     filtered = scipy.signal.sosfiltfilt(bandpass, padded)[:, before : before + grid.size]
-    torque, angle = scipy.interpolate.CubicSpline(grid, filtered / gain, axis=1)(fine)
+    torque, angle = CubicSpline(grid, filtered / gain, axis=1)(fine)
     return Cycles(fine, torque, angle, motion.frequency_hz, n_cycles)
-
-
-@lru_cache(maxsize=16)
-def _bandpass(low_hz: float, high_hz: float, rate_hz: float) -> Array:
-    """Return the filter of the scores; to design it takes as long as to filter with it."""
-    sections = scipy.signal.butter(2, [low_hz, high_hz], "bandpass", fs=rate_hz, output="sos")
-    return np.asarray(sections)
 
 
 def _continued(
@@ -148,50 +134,25 @@ def _continued(
     end, one at rest with its last value; a filter that started from a mirror image instead would
     take seconds to forget it, longer than the second that is discarded.
     """
-    interval_s = float(grid[1] - grid[0])
-    n = round(padding_s / interval_s)
-    steps = np.arange(1, n + 1) * interval_s
-    cycle_s = 1.0 / frequency_hz
-    back = (-steps) % cycle_s  # how far into the first cycle, for each time before it
-    early, late = np.repeat(values[:, :1], n, axis=1), np.repeat(values[:, -1:], n, axis=1)
-    cycle, full = round(cycle_s / interval_s), SAME_AMPLITUDE * float(np.ptp(values[-1]))
-    moving = [float(np.ptp(end)) > full for end in (values[-1, :cycle], values[-1, -cycle:])]
-    if any(moving):
-        motion = scipy.interpolate.CubicSpline(grid, values, axis=1)
-        early = motion(grid[0] + back) if moving[0] else early
-        late = motion(grid[-1] - back) if moving[1] else late
-    return np.concatenate([early[:, ::-1], values, late], axis=1), n
-
-
-def cycles_of(prepared: PreparedEpoch) -> Cycles:
-    """Return `scoring_cycles` of a prepared epoch.
-
-    Raises
-    ------
-    ValueError
-        As there.
-    """
-    return scoring_cycles(prepared.epoch, prepared.settings.scores)
+    interval_s, cycle_s = float(grid[1] - grid[0]), 1.0 / frequency_hz
+    n, cycle = round(padding_s / interval_s), round(cycle_s / interval_s)
+    # How far into the first cycle, for each time before it, from the last on.
+    back = (-np.arange(1, n + 1) * interval_s) % cycle_s
+    full, motion = SAME_AMPLITUDE * float(np.ptp(values[-1])), CubicSpline(grid, values, axis=1)
+    early, late = (float(np.ptp(end)) > full for end in (values[-1, :cycle], values[-1, -cycle:]))
+    before, after = motion(grid[0] + early * back), motion(grid[-1] - late * back)
+    return np.concatenate([before[:, ::-1], values, after], axis=1), n
 
 
 def score_epoch(epoch: Epoch, settings: ScoreSettings, screening: EstimationSettings) -> Score:
     """Return impulse and work per cycle; a bad epoch gives an outcome with its reason."""
-    return _score(epoch, before_fit(epoch, screening), lambda: scoring_cycles(epoch, settings))
-
-
-def score_prepared(prepared: PreparedEpoch) -> Score:
-    """Return `score_epoch` of a prepared epoch."""
-    return _score(prepared.epoch, prepared.obstacle, lambda: prepared.once(cycles_of))
-
-
-def _score(epoch: Epoch, obstacle: str, make_cycles: Callable[[], Cycles]) -> Score:
-    if not obstacle:
-        try:
-            cycles = make_cycles()
-        except ValueError as error:
-            obstacle = str(error)
-    if obstacle:
-        return Score(epoch.source, epoch.label, epoch.condition, unusable(epoch, obstacle))
+    try:
+        if reason := obstacle(epoch, screening):
+            raise ValueError(reason)
+        cycles = scoring_cycles(epoch, settings)
+    except ValueError as error:
+        outcome = unusable(epoch, str(error))
+        return Score(epoch.source, epoch.label, epoch.condition, outcome)
     n = cycles.n_cycles
     interval_s = 1.0 / (POINTS_PER_CYCLE * cycles.frequency_hz)
     return Score(
@@ -200,7 +161,7 @@ def _score(epoch: Epoch, obstacle: str, make_cycles: Callable[[], Cycles]) -> Sc
         condition=epoch.condition,
         outcome=Outcome() if epoch.closed.included else Outcome("excluded", epoch.closed.reason),
         # The last point begins the next cycle, so Eq. 1 leaves it out.
-        impulse_nm_s=angular_impulse_nm_s(cycles.torque_nm[:-1], interval_s) / n,
+        impulse_nm_s=float(np.sum(np.abs(cycles.torque_nm[:-1])) * interval_s) / n,
         work_j=loop_area_j(cycles.torque_nm, cycles.angle_rad) / n,
         n_cycles=n,
         frequency_hz=cycles.frequency_hz,
@@ -223,9 +184,8 @@ def find_motion(epoch: Epoch) -> Motion:
     time_s, angle = _angle(epoch)
     peak_hz, _ = _spectral_peak(time_s, angle)
     rate_hz = 1.0 / float(time_s[1] - time_s[0])
-    around = scipy.signal.butter(
-        2, [0.5 * peak_hz, min(2 * peak_hz, 0.45 * rate_hz)], "bandpass", fs=rate_hz, output="sos"
-    )
+    band = 0.5 * peak_hz, min(2 * peak_hz, 0.45 * rate_hz)
+    around = butterworth(2, band, "bandpass", rate_hz)
     envelope = np.abs(scipy.signal.hilbert(scipy.signal.sosfiltfilt(around, angle)))
     moving = np.flatnonzero(envelope > 0.5 * np.quantile(envelope, 0.9))
     first, last = int(moving[0]), int(moving[-1])
@@ -264,11 +224,20 @@ def line_shares(epoch: Epoch) -> LineShares:
     That of the angle is close to 1 for an imposed sinusoid, well below for a perturbation with many
     frequencies.
     """
-    motion = {c.name: thinned(c, HIGHEST_HZ) for c in motion_channels(epoch)}
+    motion = {c.name: _thinned(c) for c in motion_channels(epoch)}
     time_s, angle = _angle(replace(epoch, channels=motion))
     if time_s.size < 16 or not np.any(angle):
         return LineShares(0.0, 0.0)
     return _spectral_peak(time_s, angle)[1]
+
+
+def _thinned(channel: Channel) -> Channel:
+    """Return the means of a channel over stretches that keep 20 points a cycle."""
+    step = int(channel.rate_hz / (20 * HIGHEST_HZ) + 1e-6)
+    if step < 2:
+        return channel
+    both = np.stack([channel.time_s, channel.values])[:, : len(channel) // step * step]
+    return Channel(channel.name, *both.reshape(2, -1, step).mean(axis=2))
 
 
 def _angle(epoch: Epoch) -> tuple[Array, Array]:
@@ -282,12 +251,24 @@ def _spectral_peak(time_s: Array, angle: Array) -> tuple[float, LineShares]:
     """Return the frequency of the strongest line and its share of the power."""
     rate_hz = 1.0 / float(time_s[1] - time_s[0])
     frequency_hz, power = power_lines(angle, rate_hz, tapered=True, longer=4)
+    return strongest_line(frequency_hz, power, 1.0 / float(time_s[-1] - time_s[0]))
+
+
+def strongest_line(frequency_hz: Array, power: Array, line_hz: float) -> tuple[float, LineShares]:
+    """Return the frequency of the angle's strongest line, and its shares of the power.
+
+    Parameters
+    ----------
+    frequency_hz, power : arrays, shape (m,)
+        Of the angle.
+    line_hz : float
+        From one line to the next, one over the duration.
+    """
     inside = (frequency_hz >= LOWEST_HZ) & (frequency_hz <= HIGHEST_HZ)
     if not np.any(power[inside] > 0):
         raise ValueError("the joint does not move")
     peak_hz = float(frequency_hz[inside][np.argmax(power[inside])])
-    resolution_hz = 2.0 / float(time_s[-1] - time_s[0])
-    near = np.abs(frequency_hz - peak_hz) <= max(0.19 * peak_hz, resolution_hz)
+    near = np.abs(frequency_hz - peak_hz) <= max(0.19 * peak_hz, 2.0 * line_hz)
     of_velocity = power * frequency_hz**2 * (frequency_hz <= HIGHEST_HZ)
     shares = (float(one[near].sum() / one.sum()) for one in (power, of_velocity))
     return peak_hz, LineShares(*shares)

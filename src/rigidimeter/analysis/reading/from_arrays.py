@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimeter.analysis.estimate_anew import (
+from rigidimeter.analysis.estimation import (
     Array,
     choose_method,
     estimate_recorded,

@@ -10,7 +10,7 @@ from matplotlib.ticker import LogLocator, MultipleLocator, NullLocator
 from numpy.typing import NDArray
 from scipy import signal
 
-from rigidimeter.analysis.estimate_anew import Cycles, Signals
+from rigidimeter.analysis.estimation import Cycles, Signals
 from rigidimeter.analysis.report.style import (
     GREY,
     INK,

@@ -18,7 +18,7 @@ from typing import Any
 import jinja2
 import numpy as np
 
-from rigidimeter.analysis.estimate_anew import METHODS, Method
+from rigidimeter.analysis.estimation import METHODS, Method
 from rigidimeter.analysis.report.references import Cited, Prose
 from rigidimeter.analysis.study import RATING, Condition, StudyResult
 from rigidimeter.analysis.study.drawing import channel_facts

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimate_anew import aligned, epoch_signals, longest_part
+from rigidimeter.analysis.estimation import aligned, epoch_signals, longest_part
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.analysis.report.curves import (
     EXCITATION_HEIGHTS,

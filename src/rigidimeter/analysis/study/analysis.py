@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from rigidimeter.analysis import estimate_anew
-from rigidimeter.analysis.estimate_anew import Progress
+from rigidimeter.analysis import estimation
+from rigidimeter.analysis.estimation import Progress
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import Analysis, Epoch
@@ -64,6 +64,6 @@ def estimate(
         raise UserError(
             "estimate takes a Recording or a list of its epochs; read a path with rigidimeter.read"
         )
-    if method not in estimate_anew.method_names():
-        raise ValueError(f"method {method!r}: {estimate_anew.no_such_method(method)}")
-    return estimate_anew.estimate(epochs, settings_from(settings), method, progress=progress)
+    if method not in estimation.method_names():
+        raise ValueError(f"method {method!r}: {estimation.no_such_method(method)}")
+    return estimation.estimate(epochs, settings_from(settings), method, progress=progress)

@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigidimeter.analysis.estimate_anew import Progress
+from rigidimeter.analysis.estimation import Progress
 from rigidimeter.analysis.reading import read_estimates
 from rigidimeter.analysis.reading.formats import READERS
 from rigidimeter.analysis.study.compared import Comparison

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigidimeter.analysis.estimate_anew import Progress
+from rigidimeter.analysis.estimation import Progress
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.analysis.statistics import (
     DayDifference,

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimate_anew import Ready, epoch_signals, scoring_cycles
+from rigidimeter.analysis.estimation import Ready, epoch_signals, scoring_cycles
 from rigidimeter.analysis.study.drawn_signals import ChannelFacts, EpochTrace, facts_of
 from rigidimeter.analysis.study.examples import prepared_epochs
 from rigidimeter.analysis.study.results import StudyResult

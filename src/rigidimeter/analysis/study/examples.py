@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
-from rigidimeter.analysis.estimate_anew import Ready, prepare
+from rigidimeter.analysis.estimation import Ready, prepare
 from rigidimeter.analysis.study.results import StudyResult
 from rigidimeter.core.records import Channel, Epoch, Fit, Score
 

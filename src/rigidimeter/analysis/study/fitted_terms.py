@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rigidimeter.analysis.estimate_anew import Progress, candidates, parse_terms
+from rigidimeter.analysis.estimation import Progress, candidates, parse_terms
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.analysis.study.torque_models import ModelledEpoch, model_recording
 from rigidimeter.core.errors import UserError

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import date
 
-from rigidimeter.analysis.estimate_anew import method_named
+from rigidimeter.analysis.estimation import method_named
 from rigidimeter.analysis.study.compared import Comparison
 from rigidimeter.analysis.study.differences import Difference, by_units, signed
 from rigidimeter.analysis.study.families import Family

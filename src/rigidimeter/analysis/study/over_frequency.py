@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigidimeter.analysis.estimate_anew import epoch_signals, impedance
+from rigidimeter.analysis.estimation import epoch_signals, impedance
 from rigidimeter.analysis.study.drawn_signals import Response, Spectrum
 from rigidimeter.analysis.study.examples import prepared_epochs
 from rigidimeter.analysis.study.results import StudyResult

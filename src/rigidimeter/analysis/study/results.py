@@ -9,7 +9,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any, Literal
 
 import rigidimeter
-from rigidimeter.analysis.estimate_anew import Ready
+from rigidimeter.analysis.estimation import Ready
 from rigidimeter.analysis.statistics import EffectDifference
 from rigidimeter.analysis.study.compared import Comparison, comparison_rows
 from rigidimeter.analysis.study.families import Primary

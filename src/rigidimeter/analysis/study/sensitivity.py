@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
-from rigidimeter.analysis.estimate_anew import METHODS
+from rigidimeter.analysis.estimation import METHODS
 from rigidimeter.analysis.study.comparison import FEWEST_FOR_TEST, day_test, observed, rank_test
 from rigidimeter.analysis.study.measures import MEASURES, Measure
 from rigidimeter.analysis.study.results import SensitivityRow, SessionEntry

@@ -11,12 +11,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 
+from rigidimeter.analysis.estimation import task_of
 from rigidimeter.analysis.reading import ReadOptions, read_recording
 from rigidimeter.analysis.reading.channels.joining import FOUND
 from rigidimeter.analysis.reading.channels.mapping_file import read_mapping
 from rigidimeter.analysis.reading.formats import reader_of, settings_in_file
 from rigidimeter.analysis.reading.recording import read_joined
-from rigidimeter.analysis.estimate_anew import task_of
 from rigidimeter.analysis.study.blinding import Naming
 from rigidimeter.analysis.study.results import LeftOut, SessionEntry
 from rigidimeter.analysis.study.session_checks import (

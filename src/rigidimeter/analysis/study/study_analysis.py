@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rigidimeter.analysis.estimate_anew import (
+from rigidimeter.analysis.estimation import (
     Progress,
     Recorded,
     choose_method,
@@ -35,7 +35,7 @@ from rigidimeter.analysis.study.comparison import (
 from rigidimeter.analysis.study.deviations import deviations
 from rigidimeter.analysis.study.exclusions import exclusions_of, operators_exclusions
 from rigidimeter.analysis.study.families import Primary, primary_of
-from rigidimeter.analysis.study.measures import MEASURES, RATING, chosen_pair
+from rigidimeter.analysis.study.measures import RATING, chosen_pair
 from rigidimeter.analysis.study.ratings_model import rated, ratings_comparison, ratings_days
 from rigidimeter.analysis.study.results import SensitivityRow, SessionEntry, StudyResult
 from rigidimeter.analysis.study.sensitivity import sensitivity_methods, sensitivity_rows

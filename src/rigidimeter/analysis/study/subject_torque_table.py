@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
-from rigidimeter.analysis.estimate_anew import aligned, epoch_signals, longest_part
+from rigidimeter.analysis.estimation import aligned, epoch_signals, longest_part
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.core.errors import UserError, refused
 from rigidimeter.core.files import as_written, in_place, write_dictionary_beside

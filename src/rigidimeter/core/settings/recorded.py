@@ -54,10 +54,7 @@ _RENAMED: Mapping[str, Mapping[str, str]] = {
 }
 """By table, the name that a key had and the one that it has."""
 
-_REMOVED = {
-    "estimation": ("intervals", "bootstrap_draws"),
-    "levels": ("differs_from_estimate",),
-}
+_REMOVED = {"estimation": ("intervals", "bootstrap_draws"), "levels": ("differs_from_estimate",)}
 _LEVELS = {"doubt": "caution"}
 
 

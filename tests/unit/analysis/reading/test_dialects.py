@@ -11,7 +11,7 @@ import pytest
 from tests.corpus import CORPUS, Entry
 from tests.known_joint import TRUTH
 
-from rigidimeter.analysis.estimate_anew import fit_epoch
+from rigidimeter.analysis.estimation import fit_epoch
 from rigidimeter.analysis.reading.channels.inspection import inspect_table
 from rigidimeter.analysis.reading.channels.joining import join_tables, joined_options
 from rigidimeter.analysis.reading.formats import read_table

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimate_anew import METHODS, fit_epoch
+from rigidimeter.analysis.estimation import METHODS, fit_epoch
 from rigidimeter.analysis.reading import from_arrays, identify
 from rigidimeter.core.records import Channel, Epoch
 from rigidimeter.core.settings import Settings, parse_settings

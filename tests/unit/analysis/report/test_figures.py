@@ -11,7 +11,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rigidimeter.analysis.estimate_anew import epoch_signals, scoring_cycles
+from rigidimeter.analysis.estimation import epoch_signals, scoring_cycles
 from rigidimeter.analysis.report.curves import (
     changes,
     draw_loops,

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimate_anew import impedance as without_model
-from rigidimeter.analysis.estimate_anew import prepare
+from rigidimeter.analysis.estimation import impedance as without_model
+from rigidimeter.analysis.estimation import prepare
 from rigidimeter.analysis.report import SECTIONS, Figure
 from rigidimeter.analysis.report.curves import (
     COHERENT,

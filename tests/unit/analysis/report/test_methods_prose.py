@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 from tests.unit.analysis.report.cohorts import Design, made_study
 
-from rigidimeter.analysis.estimate_anew import METHODS, Method
+from rigidimeter.analysis.estimation import METHODS, Method
 from rigidimeter.analysis.report.methods_prose import methods_prose
 from rigidimeter.analysis.study import StudyResult
 

@@ -5,7 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rigidimeter.analysis.estimate_anew import task_of
+from rigidimeter.analysis.estimation import task_of
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.analysis.study import compare, compare_analysis, conditions, estimate
 from rigidimeter.core.errors import UserError

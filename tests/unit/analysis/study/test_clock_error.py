@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.known_joint import DAMPING_NM_S_RAD, INERTIA_KG_M2, STIFFNESS_NM_RAD, TRUTH
 
-from rigidimeter.analysis.estimate_anew import estimate_recorded, prepare
+from rigidimeter.analysis.estimation import estimate_recorded, prepare
 from rigidimeter.core.records import Channel, Delay, Epoch
 from rigidimeter.core.settings import Settings
 

@@ -10,7 +10,7 @@ import numba
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimate_anew import fit_epoch
+from rigidimeter.analysis.estimation import fit_epoch
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import Settings, SubjectSettings, parse_settings
 from rigidimeter.model import JointDynamics

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimate_anew import METHODS
+from rigidimeter.analysis.estimation import METHODS
 from rigidimeter.analysis.reading.channels.choice import MOTION
 from rigidimeter.analysis.reading.channels.column_facts import ColumnFacts, column_facts
 from rigidimeter.analysis.reading.channels.lever_arm import lever_arm

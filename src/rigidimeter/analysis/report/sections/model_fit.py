@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from markupsafe import Markup
 
-from rigidimeter.analysis.estimate_anew import Signals, epoch_signals, scoring_cycles
+from rigidimeter.analysis.estimation import Signals, epoch_signals, scoring_cycles
 from rigidimeter.analysis.report.contents import Block, Figure, Section, named, paragraph, part
 from rigidimeter.analysis.report.curves import (
     TORQUE_HEIGHTS,

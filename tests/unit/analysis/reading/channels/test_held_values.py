@@ -5,7 +5,7 @@ import pytest
 from scipy import signal
 from tests.known_joint import TRUTH, angle_rad, torque_nm
 
-from rigidimeter.analysis.estimate_anew import fit_epoch
+from rigidimeter.analysis.estimation import fit_epoch
 from rigidimeter.analysis.reading.channels.channels_of_table import channels_of_table
 from rigidimeter.analysis.reading.channels.held_values import held_rows, knots
 from rigidimeter.analysis.reading.formats.read_options import ReadOptions

@@ -1,1 +1,0 @@
-"""Estimates from a known perturbation in a closed loop, where the motion itself is not trusted."""
