@@ -26,8 +26,7 @@ from rigidimeter.core.version import __version__
 
 if TYPE_CHECKING:
     from rigidimeter.analysis.batch import batch
-    from rigidimeter.analysis.estimation import identify
-    from rigidimeter.analysis.reading import data, read
+    from rigidimeter.analysis.reading import data, identify, read
     from rigidimeter.analysis.report import plot, report
     from rigidimeter.analysis.study import compare, estimate, fit_terms
     from rigidimeter.planning import design

@@ -56,7 +56,7 @@ def torque_figure(name: str, context: Context) -> Claim:
     joint = JointDynamics(fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad)
     epoch = analysed_epoch(study, fit)
     assert epoch is not None  # a fit of the study is of one of its epochs
-    measured = epoch_signals(epoch, "bandlimited", study.settings.estimation)
+    measured = epoch_signals(epoch, study.settings, "bandlimited")
     perturbation = epoch.channels["perturbation_nm"]
     motion = closed_loop_motion(perturbation.values, study.settings, joint)
 

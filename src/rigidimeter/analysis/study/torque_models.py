@@ -120,7 +120,8 @@ def model_recording(
                 plain = observations_of([own._replace(settings=settings)])
                 stamps_s = [o.epoch.channels["torque_nm"].time_s[0] for o in (own, ready)]
                 delay_s = float(stamps_s[0] - stamps_s[1])
-                seen, clock = better_clock(seen, plain, delay_s, models)
+                better, clock = better_clock(seen, plain, delay_s, models)
+                seen = list(better)
             if compare:
                 compared = compare_models(seen, models, grow=grow, refused=refusal(fit))
             else:
