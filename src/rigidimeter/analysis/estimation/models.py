@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise, product
 from typing import Any, NamedTuple
 
@@ -48,7 +49,7 @@ from rigidimeter.analysis.estimation.solve import (
     solve,
     sums,
 )
-from rigidimeter.analysis.estimation.terms import SMOOTH, TERMS, Motion, Term
+from rigidimeter.analysis.estimation.terms import SMOOTH, TERMS, Columns, Motion, Term
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import Fit
 from rigidimeter.core.settings import Settings
@@ -77,6 +78,7 @@ INNER = {
     "reflex": (("delay", "s"),),
     "reflex-second-order": (("delay", "s"), ("natural frequency", "Hz"), ("damping ratio", "1")),
     "coulomb": (("width", "rad/s"),),
+    "stiffness-by-side": (("bend", "rad"), ("middle from the mean angle", "rad")),
 }
 """Names and units of inner parameters."""
 
@@ -180,8 +182,27 @@ ASKED: list[Term] = [
 
 def _known() -> dict[str, Term]:
     """Return them by name, with those of `terms` that have one name and do not bend the model."""
-    more = [one for one in TERMS if one.asked and "," not in one.asked and one.bent is None]
-    return {one.asked: one for one in (*more, *ASKED) if one.asked not in GROUPS}
+    own = {one.asked: one for one in ASKED}
+    return own | {
+        one.asked: one._replace(columns=partial(_from_mean, one.columns))
+        for one in TERMS
+        if one.asked and not {one.asked, ","} & {*own, *GROUPS, *one.asked} and one.bent is None
+    }
+
+
+def _scaled(term: Term, motions: Motions) -> Term:
+    """Return a term whose inner angles are sought inside the motion: beside it a bend is none."""
+    if ("bend", "rad") not in INNER.get(term.asked, ()):
+        return term
+    sd_rad = np.sqrt(np.mean([np.var(own.angle) for _, own in motions]))
+    names = ("inner", "steps", "low", "high")
+    share = sd_rad / term.high[-1]
+    return term._replace(**{name: share * getattr(term, name) for name in names})
+
+
+def _from_mean(columns: Columns, motion: Motion, inner: Array) -> Complex:
+    """Return the columns of a term of `terms`, whose angle is that from its mean."""
+    return columns(motion._replace(angle=motion.angle - np.mean(motion.angle)), inner)
 
 
 def term_names() -> tuple[str, ...]:
@@ -588,7 +609,6 @@ def fit_model(observations: Seen, names: str | Sequence[str]) -> ModelRow:
 def _fitted(seen: Seen, names: tuple[str, ...]) -> ModelRow:
     """Fit one model whose terms are decided; ValueError says why not."""
     known, joint = _known(), start_of(seen)
-    terms = tuple(sorted((known[name] for name in names), key=lambda one: one.asked not in JOINT))
     powers: Sequence[Array] = [np.full(one.grid.line.size, one.grid.energy) for one in seen]
     alike = seen[0].loop is None
     try:
@@ -597,8 +617,11 @@ def _fitted(seen: Seen, names: tuple[str, ...]) -> ModelRow:
         joint, powers = solution.values, solution.powers
     except ValueError:
         pass  # the terms may do without one of J, B and K
+    motions = _motions(seen, joint)
+    # J, B and K first
+    terms = tuple(_scaled(known[one], motions) for one in sorted(names, key=lambda n: n not in JOINT))
     inner = np.concatenate([one.inner[0] for one in terms])
-    model, motions = _Model(terms, joint, inner, np.zeros(inner.size, bool)), _motions(seen, joint)
+    model = _Model(terms, joint, inner, np.zeros(inner.size, bool))
     labels = []
     for term in terms:
         count = len(term.columns(motions[0][1], term.inner[:1]))
