@@ -191,13 +191,15 @@ def _known() -> dict[str, Term]:
 
 
 def _scaled(term: Term, motions: Motions) -> Term:
-    """Return a term whose inner angles are sought inside the motion: beside it a bend is none."""
-    if ("bend", "rad") not in INNER.get(term.asked, ()):
+    """Return a term whose bend is sought inside the motion: beside it there is none."""
+    if term.asked != "stiffness-by-side":
         return term
-    sd_rad = np.sqrt(np.mean([np.var(own.angle) for _, own in motions]))
-    names = ("inner", "steps", "low", "high")
-    share = sd_rad / term.high[-1]
-    return term._replace(**{name: share * getattr(term, name) for name in names})
+    sd_rad = float(np.sqrt(np.mean([np.var(own.angle) for _, own in motions])))
+    tried = np.array([*product((0.1, 0.4), (0.0, -0.5, 0.5))])
+    low, high = np.array([[0.02, -1.0], [1.0, 1.0]])
+    return term._replace(
+        inner=sd_rad * tried, steps=np.full(2, 0.01 * sd_rad), low=sd_rad * low, high=sd_rad * high
+    )
 
 
 def _from_mean(columns: Columns, motion: Motion, inner: Array) -> Complex:
@@ -380,6 +382,8 @@ class ModelRow:
         The terms that are not linear in the motion, where no perturbation was recorded.
     problem : str
         Why it could not be fitted, or is not to be chosen.
+    freed : sequence of Problem
+        What no linear filter of the motion makes of torque and these terms, white.
     errors, beyond_errors : array, shape (b,)
         Of the prediction of each block.
     """
@@ -389,6 +393,7 @@ class ModelRow:
     held_out: Gain | None = None
     beyond: tuple[TermGain, ...] = ()
     problem: str = ""
+    freed: Sequence[Problem] = field(default=(), repr=False)
     errors: Array = field(default_factory=lambda: np.zeros(0), repr=False)
     beyond_errors: Array = field(default_factory=lambda: np.zeros(0), repr=False)
 
@@ -619,7 +624,9 @@ def _fitted(seen: Seen, names: tuple[str, ...]) -> ModelRow:
         pass  # the terms may do without one of J, B and K
     motions = _motions(seen, joint)
     # J, B and K first
-    terms = tuple(_scaled(known[one], motions) for one in sorted(names, key=lambda n: n not in JOINT))
+    terms = tuple(
+        _scaled(known[one], motions) for one in sorted(names, key=lambda n: n not in JOINT)
+    )
     inner = np.concatenate([one.inner[0] for one in terms])
     model = _Model(terms, joint, inner, np.zeros(inner.size, bool))
     labels = []
@@ -640,18 +647,27 @@ def _fitted(seen: Seen, names: tuple[str, ...]) -> ModelRow:
     model = _searched(model, seen, motions, powers, [one for one, _ in labels])
     rest = _whitened(problems, powers, begin)
     model, solution = _settled(model, seen, begin, [rest * s for s in powers] if alike else None)
-    return _row(names, model, labels, solution)
+    row = _row(names, model, labels, solution)
+    return row if seen[0].cause else _beyond(row, model, seen, motions)
 
 
 def _searched(
-    model: _Model, seen: Seen, motions: Motions, powers: Sequence[Array], terms: Sequence[str]
+    model: _Model,
+    seen: Seen,
+    motions: Motions,
+    powers: Sequence[Array],
+    terms: Sequence[str],
+    of: Callable[[Problem], Problem] = lambda one: one,
 ) -> _Model:
-    """Return the model with the inner parameters that leave least; `terms` are of the columns."""
+    """Return the model with the inner parameters that leave least of problems made by `of`.
+
+    `terms` are those of the columns.
+    """
     inner = [i for i, one in enumerate(model.terms) if one.steps.size]
     for i in inner * min(len(inner), 2):
         term, parts = model.terms[i], model.parts(model.inner)
         problems = model.problems(seen, motions, np.zeros(len(terms)))
-        search = _Search(term, terms.index(term.asked), motions, problems, powers)
+        search = _Search(term, terms.index(term.asked), motions, problems, powers, of)
         parts[i] = best = term.inner[int(np.argmin(search.left(term.inner)))]
         if best.size > 1:  # a valley that steps of the solution do not find
             parts[i] = scipy.optimize.minimize(
@@ -670,6 +686,7 @@ class _Search(NamedTuple):
     motions: Motions
     problems: list[Problem]
     powers: Sequence[Array]
+    of: Callable[[Problem], Problem]
 
     def at(self, inner: Array) -> float:
         """Return it, for inner parameters of shape (d,)."""
@@ -682,8 +699,9 @@ class _Search(NamedTuple):
         for k in range(len(inner)):
             for one, (Z, X) in zip(self.problems, rows, strict=True):
                 one.instruments[:, self.place], one.regressors[:, self.place] = Z[k], X[k]
-            values = shortest(*sums(self.problems, self.powers))
-            remains = _whitened(self.problems, self.powers, values)
+            problems = [self.of(one) for one in self.problems]
+            values = shortest(*sums(problems, self.powers))
+            remains = _whitened(problems, self.powers, values)
             found.append(remains * (1 + (values[self.place] < 0)))
         return found
 
@@ -770,8 +788,7 @@ def _row(
         misfit + p * float(np.log(count)), count, solution.condition_number,
         _residual_test(problems, left, model.joint), tuple(remarks), solution, labels,
     )  # fmt: skip
-    row = ModelRow(names, fit)
-    return row if problems[0].observation.cause else replace(row, beyond=_beyond(row))
+    return ModelRow(names, fit)
 
 
 def _whitened(problems: Sequence[Problem], powers: Sequence[Array], values: Array) -> float:
@@ -826,34 +843,40 @@ def _gains(row: ModelRow) -> tuple[TermGain, ...]:
     )
 
 
-def _freed(row: ModelRow) -> list[Problem]:
-    """Return what no linear filter of the motion makes of torque and terms, white."""
-    assert row.fit is not None  # else there are no problems
-    bent = [term in row.bent for term, _ in row.fit.columns]
-    found = []
-    for one in row.fit.solution.problems:
-        slopes = one.regressors.shape[1] - len(bent)
-        own, seen = one.regressors[:, np.append(bent, np.ones(slopes, bool))], one.observation
-        rows = np.vstack([seen.torque_nm, seen.motion.T, one.target, own.T])
-        _, _, _, _, target, *left = without_filter(seen.grid, rows)
-        columns = np.array(left).reshape(-1, target.size).T
-        found.append(Problem(columns, columns, target, seen))
-    return found
+def _freed(one: Problem) -> Problem:
+    """Return what no linear filter of the motion makes of torque and columns, white."""
+    seen = one.observation
+    rows = np.vstack([seen.torque_nm, seen.motion.T, one.target, one.regressors.T])
+    found = without_filter(seen.grid, rows)[4:]
+    return Problem(found[1:].T, found[1:].T, found[0], seen)
 
 
-def _beyond(row: ModelRow) -> tuple[TermGain, ...]:
-    assert row.fit is not None  # as above
-    problems, labels = _freed(row), [one for one in row.fit.columns if one[0] in row.bent]
+def _beyond(row: ModelRow, model: _Model, seen: Seen, motions: Motions) -> ModelRow:
+    """Return the row with its terms beside a free linear filter, with inner ones of their own."""
+    at = [i for i, one in enumerate(model.terms) if one.asked in row.bent]
+    if not at:
+        none = np.zeros((0, 0))
+        return replace(row, freed=[_freed(Problem(none, none.T, o.torque_nm, o)) for o in seen])
+    terms, parts = tuple(model.terms[i] for i in at), model.parts(model.inner)
+    inner = np.concatenate([parts[i] for i in at])
+    model = _Model(terms, model.joint, inner, np.zeros(inner.size, bool))
+    names = [name for name, _ in row.fit.columns if name in row.bent] if row.fit else []
+    powers = [np.ones(one.grid.line.size) for one in seen]
+    model = _searched(model, seen, motions, powers, names, _freed)
+    values = shortest(*sums([*map(_freed, model.problems(seen, motions, np.zeros(len(names))))]))
+    free = model.limit(model.inner, NEAR_BOUND) == model.inner
+    model, values = model._replace(free=free), np.append(values, model.inner[free])
+    problems = [*map(_freed, model.problems(seen, motions, values))]
     gram, moment = sums(problems)
     inverse = _inverse(gram)
-    values, covariance = inverse @ moment, problems[0].observation.grid.spread / 2 * inverse
+    values, covariance = inverse @ moment, seen[0].grid.spread / 2 * inverse
     found = []
-    for term in dict.fromkeys(term for term, _ in labels):
-        at = [place for place, one in enumerate(labels) if one[0] == term]
-        width, unit = (FIR_SPACING_S, "N·m·s/rad") if len(at) > 1 else (1.0, _known()[term].unit)
+    for term in terms:
+        at = [place for place, name in enumerate(names) if name == term.asked]
+        width, unit = (FIR_SPACING_S, "N·m·s/rad") if len(at) > 1 else (1.0, term.unit)
         se = width * float(np.sqrt(np.sum(covariance[np.ix_(at, at)])))
-        found.append(TermGain(term, width * float(np.sum(values[at])), se, unit))
-    return tuple(found)
+        found.append(TermGain(term.asked, width * float(np.sum(values[at])), se, unit))
+    return replace(row, beyond=tuple(found), freed=problems)
 
 
 def _inverse(gram: Array) -> Array:
@@ -954,8 +977,7 @@ def _predicted(rows: Sequence[ModelRow]) -> list[ModelRow]:
         caused = problems[0].observation.cause is not None
         beyond = errors
         if not caused:
-            freed = _freed(row)
-            beyond = _block_errors(freed, [np.ones(one.target.size) for one in freed])
+            beyond = _block_errors(row.freed, [np.ones(one.target.size) for one in row.freed])
         found[i] = replace(
             row, held_out=gain(offset, errors), errors=errors, beyond_errors=beyond,
             problem="; ".join(filter(None, map(_pushes, _gains(row)))),
