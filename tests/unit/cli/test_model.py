@@ -65,7 +65,10 @@ def test_a_session_is_modelled(rigidimeter, simulate):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--terms", "inertia,magic"], "there is no term 'magic'; known: "),
+        (
+            ["--terms", "inertia,magic"],
+            "there is no term 'magic'; known: inertia, damping, stiffness",
+        ),
         (["--terms", "reflex-slow"], "followed by + or - for the direction"),
         (["--terms", "inertia,offset"], "offset is constant and does not pass a band"),
         (

@@ -855,8 +855,8 @@ def _beyond(row: ModelRow, model: _Model, seen: Seen, motions: Motions) -> Model
     """Return the row with its terms beside a free linear filter, with inner ones of their own."""
     at = [i for i, one in enumerate(model.terms) if one.asked in row.bent]
     if not at:
-        none = np.zeros((0, 0))
-        return replace(row, freed=[_freed(Problem(none, none.T, o.torque_nm, o)) for o in seen])
+        none = [Problem(o.motion[:, :0], o.motion[:, :0], o.torque_nm, o) for o in seen]
+        return replace(row, freed=[*map(_freed, none)])
     terms, parts = tuple(model.terms[i] for i in at), model.parts(model.inner)
     inner = np.concatenate([parts[i] for i in at])
     model = _Model(terms, model.joint, inner, np.zeros(inner.size, bool))
