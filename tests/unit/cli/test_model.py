@@ -34,7 +34,7 @@ def test_terms_are_fitted_and_written(rigidimeter, joint, tmp_path):
     document = json.loads((tmp_path / "m.json").read_text())
     assert document["schema"] == "rigidimeter.model/2"
     (epoch,) = document["epochs"]
-    assert epoch["band_hz"] == [0.0, 12.5]  # at most a sixteenth of the rate
+    assert epoch["band_hz"] == [0.0, 15.0]  # up to where it was asked for
     found = {p["term"]: p["value"] for p in epoch["models"][0]["parameters"]}
     assert found["cubic"] == pytest.approx(2000, rel=0.05)
     assert found["offset"] == pytest.approx(0.2, abs=0.01)

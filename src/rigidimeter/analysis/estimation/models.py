@@ -735,7 +735,8 @@ def _settled(
         inner = model.inner.copy()
         inner[free] = solution.values[begin.size :]
         inside = model.limit(inner, NEAR_BOUND) == inner
-        model = model._replace(inner=model.limit(inner))
+        # What steps out of its bounds stays where it was found to leave least.
+        model = model._replace(inner=np.where(inside, inner, model.inner))
         if np.all(inside[free]):
             return model, solution
         free = free & inside
