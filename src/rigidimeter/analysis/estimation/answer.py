@@ -203,6 +203,8 @@ class Answer(NamedTuple):
     answered : bool
     little : frozenset of str
         Terms that are there and too small to matter.
+    differs : bool
+        Whether a term is not the same in all epochs.
     case, state : Case, State
     """
 
@@ -216,6 +218,7 @@ class Answer(NamedTuple):
     change: Array
     answered: bool
     little: frozenset[str]
+    differs: bool
     case: Case
     state: State
 
@@ -286,7 +289,8 @@ def answer(
             state = settled(case, state.beside(Taken(of.FINER[term.name])))
         gone = {term.name, *NOT_BESIDE.get(term.name, ())}
         offered = [one for one in offered if one.name not in gone]
-    return _answered(case, state, tested, found, first, nameless)._replace(little=frozenset(little))
+    made = _answered(case, state, tested, found, first, nameless)
+    return made._replace(little=frozenset(little), differs=_differs(state, tested.model))
 
 
 def case_of(problems: Sequence[Problem]) -> Case:
@@ -741,7 +745,7 @@ def _answered(
             inner=one.inner, inner_half=inner_half,
         ))  # fmt: skip
     return Answer(
-        joint, half, of_joint, tuple(told), p, remains, left, change, answered, frozenset(),
+        joint, half, of_joint, tuple(told), p, remains, left, change, answered, frozenset(), False,
         case, state,
     )  # fmt: skip
 
@@ -782,6 +786,18 @@ def _otherwise(model: Model, values: Array, weight: Callable[[Array], Array]) ->
     return np.asarray((by.fitted(parts, model.base).values - values)[:3])
 
 
+def _differs(state: State, model: Model) -> bool:
+    """Return whether coefficients of a term that all epochs share are not those of each."""
+    looked = {
+        one.term.name: [(c, e) for c, _ in model.base[own] for e in range(len(model.parts) - 1)]
+        for one, own in zip(state.taken, model.of_terms, strict=True)
+        if not one.term.own and one.term.parameter is None
+    }
+    if len(model.parts) < 2 or not looked:
+        return False
+    return any(one.p < CHANCE for one in _scores(model, looked)[1].values())
+
+
 # --- What is told
 
 
@@ -808,7 +824,9 @@ def beside(found: Answer) -> list[Problem]:
     return problems
 
 
-def findings_of(found: Answer, settings: Settings, *, stands: bool) -> tuple[Finding, ...]:
+def findings_of(
+    found: Answer, settings: Settings, shown: tuple[Array, Array] | None = None
+) -> tuple[Finding, ...]:
     """Return the findings of an answer, one for each kind.
 
     What was answered is a note where J, B and K beside it stand in the fit, and nothing that is
@@ -818,8 +836,9 @@ def findings_of(found: Answer, settings: Settings, *, stands: bool) -> tuple[Fin
     ----------
     found : Answer
     settings : Settings
-    stands : bool
-        Whether the fits give J, B and K beside the terms.
+    shown : tuple of array, optional
+        J, B and K that are given and half their intervals, where they are not those beside the
+        terms.
     """
     limits, told = settings.diagnostics, []
     tested = bool(np.isfinite(found.remains))
@@ -828,12 +847,13 @@ def findings_of(found: Answer, settings: Settings, *, stands: bool) -> tuple[Fin
         own = [one for one, its in zip(found.found, kinds, strict=True) if its == kind]
         if kind == "varying_between_epochs":
             continue  # told with the fits of single epochs
-        added = _without(found, {one.term.name for one in own}) - found.joint
-        value, limit, facts, variant = _told(kind, own, added, found, limits)
-        how = "" if not stands else "answered" if tested else "beside"
+        values, half = shown or (_without(found, {one.term.name for one in own}), found.half)
+        added = values - found.joint
+        value, limit, facts, variant = _told(kind, own, added / half, found, limits)
+        how = "" if shown else "answered" if tested else "beside"
         if not found.answered:
             how = "withheld"
-        effect = Effect.of(added, found.joint + added, found.half)
+        effect = Effect.of(added, values, half)
         told.append(
             said(
                 kind, limits, value, limit, p=max(one.p for one in own),
@@ -876,7 +896,7 @@ def _kind(term: Term, case: Case) -> str:
 
 
 def _told(
-    kind: str, own: Sequence[Found], added: Array, found: Answer, limits: DiagnosticsSettings
+    kind: str, own: Sequence[Found], halves: Array, found: Answer, limits: DiagnosticsSettings
 ) -> tuple[float, float, dict[str, Fact], str]:
     """Return value, limit, facts and variant of a kind's finding."""
     first, facts = own[0], dict[str, Fact]()
@@ -912,7 +932,7 @@ def _told(
     variant = "several" if len(own) > 1 else ""
     if first.term.name == "cuff" and not variant:
         variant, facts["size"] = "coupling", 1 / float(first.values[0])
-    return 100 * float(np.max(np.abs(added) / found.half)), 100.0, facts, variant
+    return 100 * float(np.max(np.abs(halves))), 100.0, facts, variant
 
 
 def _range(one: Found, found: Answer) -> tuple[float, dict[str, Fact]]:

@@ -117,6 +117,7 @@ closed loop 0.5."""
 WITHOUT_TERMS = (
     "residual_perturbation",
     "torque_delay",
+    "unweighted_fit",
     "gravity",
     "negative_parameters",
     "implausible_parameters",
@@ -666,30 +667,56 @@ def _with_active(method: Method, ready: Ready) -> Fit | None:
     return fit if fit.n_samples else None
 
 
+class Part(NamedTuple):
+    """Epochs that hold the same terms.
+
+    Attributes
+    ----------
+    epochs : tuple of (str, str)
+        Source and label of each.
+    answer : Answer
+    problems : list of Problem
+        Of J, B and K, with the torque of the terms taken from their targets where `beside`.
+    powers : list of array
+    beside : bool
+        Whether J, B and K are given beside the terms.
+    """
+
+    epochs: tuple[tuple[str, str], ...]
+    answer: Answer
+    problems: list[Problem]
+    powers: list[Array]
+    beside: bool
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """What the epochs are called."""
+        return tuple(label for _, label in self.epochs)
+
+
 class Told(NamedTuple):
     """What the epochs of a condition that count say together.
 
     Attributes
     ----------
     condition : str
-    labels : tuple of str
-        Of the epochs.
-    answer : Answer
-    problems : list of Problem
-        Of J, B and K with the torque of the terms taken from their targets; empty where the fits
-        are not those of the answer.
     solution : Solution
         Without terms.
     values : list of array, shape (3,)
         J, B and K of each epoch without terms.
+    parts : list of Part
+        One of all epochs, or one of each where a term is not the same in all.
     """
 
     condition: str
-    labels: tuple[str, ...]
-    answer: Answer
-    problems: list[Problem]
     solution: Solution
     values: list[Array]
+    parts: list[Part]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """What the epochs are called."""
+        return tuple(one.observation.epoch.label for one in self.solution.problems)
 
 
 def _told(
@@ -701,78 +728,97 @@ def _told(
 ) -> list[Told]:
     """Return what the torque of each condition holds beside J, B and K.
 
-    By the perturbation where it was recorded, whatever the method: at J, B and K of least squares
-    the subject's own torque would show in the residual as well.
+    By the perturbation where all epochs recorded it, whatever the method: at J, B and K of least
+    squares the subject's own torque would show in the residual as well.
     """
     counting = [i for i, fit in enumerate(fits) if fit.outcome.included]
-    known = [i for i in counting if not no_instrument(epochs[i].epoch)]
-    own, shared = method, fitted.shared
-    if method is not IV or len(known) < len(counting):
-        own, used = (IV, known) if known else (BANDLIMITED, counting)
-        if own is not method or used != counting:
-            some = [epochs[i] for i in used]
-            fitted = fit_epochs(own, some, observed_for(own, some), pooled=False)
-            shared, fits = fitted.shared, fitted.fits
+    epochs, seen = [epochs[i] for i in counting], [observed[i] for i in counting]
+    own = BANDLIMITED if any(no_instrument(one.epoch) for one in epochs) else IV
+    shared, fits = fitted.shared, [fits[i] for i in counting]
+    if own is not method:
+        seen = observed_for(own, epochs)
+        fitted = fit_epochs(own, epochs, seen, pooled=False)
+        shared, fits = fitted.shared, fitted.fits
     values = {(f.condition, f.source, f.epoch): f.value for f in fits if f.outcome.included}
-    told = []
-    for condition in dict.fromkeys(fit.condition for fit in fits):
-        if condition not in shared:
-            continue
-        solution = shared[condition]
-        seen = [one.observation for one in solution.problems]
-        found = answer(solution, person=seen[0].settings.diagnostics.subject_present)
-        stands = own is method and found.better
-        told.append(
-            Told(
-                condition,
-                tuple(one.epoch.label for one in seen),
-                found,
-                beside(found) if stands else [],
-                solution,
-                [
-                    values.get((condition, one.epoch.source, one.epoch.label), solution.values)
-                    for one in seen
-                ],
-            )
+
+    def part_of(solution: Solution) -> Part:
+        those = [one.observation for one in solution.problems]
+        found = answer(solution, person=those[0].settings.diagnostics.subject_present)
+        better = own is method and found.better
+        return Part(
+            tuple((one.epoch.source, one.epoch.label) for one in those),
+            found,
+            beside(found) if better else list(solution.problems),
+            list(found.state.powers if better else solution.powers),
+            better,
         )
+
+    told = []
+    for condition, solution in shared.items():
+        parts = [part_of(solution)]
+        if parts[0].answer.differs:
+            alone = [
+                fit_epochs(own, [one], [each], pooled=False).shared.get(condition)
+                for one, each in zip(epochs, seen, strict=True)
+                if (one.epoch.source, one.epoch.label) in parts[0].epochs
+            ]
+            parts = [part_of(one) for one in alone if one is not None]
+        each_value = [
+            values.get((condition, p.observation.epoch.source, p.observation.epoch.label),
+                       solution.values)
+            for p in solution.problems
+        ]  # fmt: skip
+        told.append(Told(condition, solution, each_value, parts))
     return told
+
+
+def _parts_of(fit: Fit, told: Sequence[Told]) -> list[Part]:
+    """Return the parts that an epoch, or a pool of one condition or of all, is made of."""
+    return [
+        part
+        for one in told
+        for part in one.parts
+        if fit.condition in ("", one.condition)
+        and (fit.epoch == "pooled" or (fit.source, fit.epoch) in part.epochs)
+    ]
 
 
 def _beside(
     method: Method, fit: Fit, told: Sequence[Told], inertia_kg_m2: float | None = None
 ) -> Fit:
-    """Return a fit with J, B and K beside the terms that its condition holds.
+    """Return a fit with J, B and K beside the terms that its conditions hold.
 
     Its intervals hold the error of the terms too.
     """
-    one = next((one for one in told if one.condition == fit.condition), None)
-    if one is None or not one.problems or not fit.outcome.included:
+    parts = _parts_of(fit, told)
+    if not any(one.beside for one in parts) or not fit.outcome.included:
         return fit
-    powers = one.answer.state.powers
     held = () if inertia_kg_m2 is None else (inertia_kg_m2,)
-    problems = [
-        p._replace(
-            instruments=p.instruments[:, len(held) :],
-            regressors=p.regressors[:, len(held) :],
-            target=p.target - p.regressors[:, : len(held)] @ np.array(held),
-            held=held,
-        )
-        for p in one.problems
-    ]
-    places = [
-        i
-        for i, p in enumerate(problems)
-        if fit.epoch == "pooled"
-        or (p.observation.epoch.label, p.observation.epoch.source) == (fit.epoch, fit.source)
-    ]
-    if not places:
-        return fit
-    whole = solve_once(problems, powers)
-    own = solve_once([problems[i] for i in places], [powers[i] for i in places])
-    made = fit_of(method, own, inertia_kg_m2, beside=True)
-    # What the terms' own error adds to that of J, B and K with the terms given.
-    more = np.maximum(np.diag(one.answer.covariance)[len(held) :] - np.diag(whole.covariance), 0.0)
-    wider = np.append(np.zeros(len(held)), np.sqrt(more))
+    free = slice(len(held), None)
+    problems: list[Problem] = []
+    powers: list[Array] = []
+    variance: Array = np.zeros(3 - len(held))
+    for part in parts:
+        given = [
+            p._replace(
+                instruments=p.instruments[:, free],
+                regressors=p.regressors[:, free],
+                target=p.target - p.regressors[:, : len(held)] @ np.array(held),
+                held=held,
+            )
+            for p in part.problems
+        ]
+        mine = [i for i, one in enumerate(part.epochs)
+                if fit.epoch == "pooled" or one == (fit.source, fit.epoch)]  # fmt: skip
+        if part.beside:
+            # What the terms' own error adds to that of J, B and K with the terms given.
+            known = np.diag(solve_once(given, part.powers).covariance)
+            more = np.maximum(np.diag(part.answer.covariance)[free] - known, 0.0)
+            variance = variance + len(mine) ** 2 * more
+        problems += [given[i] for i in mine]
+        powers += [part.powers[i] for i in mine]
+    made = fit_of(method, solve_once(problems, powers), inertia_kg_m2, beside=True)
+    wider = np.append(np.zeros(len(held)), np.sqrt(variance) / len(problems))
     numbers = widened(made, list(np.diag(wider)))
     return replace(
         numbers,
@@ -781,11 +827,18 @@ def _beside(
         condition=fit.condition,
         outcome=fit.outcome,
         findings=(
-            *(each for each in fit.findings if each.name not in WITHOUT_TERMS),
-            *of_fit.values(one.problems[places[0]].observation, numbers),
+            *(one for one in fit.findings if not _explained(one, numbers)),
+            *of_fit.values(problems[0].observation, numbers),
         ),
         activity=fit.activity,
     )
+
+
+def _explained(finding: Finding, fit: Fit) -> bool:
+    """Return whether a finding without terms is none beside them."""
+    if finding.name == "voluntary_torque":
+        return 100.0 - fit.vaf_percent < finding.limit
+    return finding.name in WITHOUT_TERMS
 
 
 def _together(
@@ -798,22 +851,29 @@ def _together(
     delays: Sequence[Delay],
 ) -> tuple[list[Fit], list[Fit], list[BandEstimate]]:
     """Return fits and pooled fits with what epochs of a condition show together, and bands."""
-    found_in: dict[str, list[Finding]] = {}
+    found_in: dict[tuple[tuple[str, str], ...], list[Finding]] = {}
     bands: list[BandEstimate] = []
+    rubs = set()
     for one in told:
         seen = [p.observation for p in one.solution.problems]
         pool = next((fit for fit in pooled if fit.condition == one.condition), None)
         if seen[0].cause is not None:
             bands += band_estimates(seen, one.values, pool if method.uses_perturbation else None)
-        found_in[one.condition] = [
-            replace(finding, condition=one.condition, epochs=one.labels)
-            for finding in findings_of(one.answer, seen[0].settings, stands=bool(one.problems))
-        ]
-
-    rubs = {one.condition for one in told if "friction" in one.answer.little}
+        for part in one.parts:
+            found_in[part.epochs] = [
+                replace(finding, condition=one.condition, epochs=part.labels)
+                for finding in findings_of(
+                    part.answer, seen[0].settings, None if part.beside else _shown(fits, part)
+                )
+            ]
+            rubs |= set(part.epochs) if "friction" in part.answer.little else set()
 
     def with_shared(fit: Fit, more: Sequence[Finding], settings: Settings) -> Fit:
-        shared = found_in.get(fit.condition, [])
+        by_name: dict[str, Finding] = {}
+        for part in _parts_of(fit, told):
+            for finding in found_in[part.epochs]:
+                by_name.setdefault(finding.name, finding)
+        shared = list(by_name.values())
         own = [band for band in bands if band.condition == fit.condition]
         if not shared and own:  # what has no other name
             labels = next(one.labels for one in told if one.condition == fit.condition)
@@ -837,7 +897,7 @@ def _together(
         more: list[Finding] = []
         if ready.drive is None:
             more = of_fit.between_samples(ready.epoch, fit, pull, ready.settings, delay)
-        if not more and fit.condition in rubs:
+        if not more and (fit.source, fit.epoch) in rubs:
             more = of_fit.friction_of_drive(ready.epoch, fit, ready.settings)
         alone.append(with_shared(fit, more, ready.settings))
     together = []
@@ -861,6 +921,13 @@ def _together(
         whole = with_shared(pool, more, settings)
         together.append(replace(whole, findings=(*whole.findings, *_of_every(whole, own))))
     return alone, together, bands
+
+
+def _shown(fits: Sequence[Fit], part: Part) -> tuple[Array, Array]:
+    """Return the mean J, B and K of the epochs of a part, and half their intervals."""
+    own = [one for one in fits if (one.source, one.epoch) in part.epochs]
+    halves = [(np.asarray(one.high) - np.asarray(one.low)) / 2 for one in own]
+    return np.mean([one.value for one in own], axis=0), np.mean(halves, axis=0)
 
 
 def _of_every(pool: Fit, own: Sequence[Fit]) -> list[Finding]:
