@@ -98,6 +98,16 @@ def test_an_offset_is_what_the_mean_is_beyond_the_terms():
     assert row.fit.of("offset").value == pytest.approx(0.5 - 0.2 * 3.0, abs=1e-6)
 
 
+def test_a_bend_of_stiffness_is_found_inside_a_motion_far_from_the_sensors_zero():
+    _, x, _, _ = motion()
+    bend_rad, middle_rad = 0.004, 0.01
+    side = 1.5 * bend_rad * np.log(np.cosh((x - middle_rad) / bend_rad))
+    row = fit_model(observed(of_joint(**TRUTH) + side, shift_rad=0.5), f"{JBK},stiffness-by-side")
+    assert row.fit.of("stiffness-by-side").value == pytest.approx(1.5, rel=0.01)
+    assert row.fit.of("stiffness").value == pytest.approx(3.0, rel=0.01)
+    assert row.fit.of("stiffness-by-side bend").value == pytest.approx(bend_rad, rel=0.05)
+
+
 @pytest.mark.parametrize("name", ["reflex+", "reflex-second-order-"])
 def test_a_known_reflex_is_recovered(name):
     """The late velocity is in closed form, and the muscle a discrete filter: nothing of ours."""
