@@ -258,12 +258,11 @@ def static_torque(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
     # Noise above the band is nobody's torque. Means without overshoot keep the function.
     highest_hz, kept = band_hz(seen.epoch, seen.settings.estimation)[1], grid.window[0] > WHOLE
     length = max(round(grid.rate_hz / (2.0 * highest_hz)), 1)
-    blocks = np.count_nonzero(kept) // length
     posture, values = (
-        values_at(one, grid.time_s, SAME_TIME)[kept][: blocks * length].reshape(blocks, length)
+        scipy.ndimage.uniform_filter1d(values_at(one, grid.time_s, SAME_TIME), length)[kept]
         for one in (channels["angle_rad"], channels["torque_nm"])
     )
-    values = values.mean(axis=1)[np.argsort(posture.mean(axis=1), kind="stable")]
+    values = values[np.argsort(posture, kind="stable")]
     variance = float(np.var(values))
     value = 50.0 * float(np.mean(np.diff(values) ** 2)) / variance if variance > 0 else math.nan
     return at_least("static_torque", checks, value, checks.min_static_torque_percent)
