@@ -195,11 +195,9 @@ def _scaled(term: Term, motions: Motions) -> Term:
     if term.asked != "stiffness-by-side":
         return term
     sd_rad = float(np.sqrt(np.mean([np.var(own.angle) for _, own in motions])))
-    tried = np.array([*product((0.1, 0.4), (0.0, -0.5, 0.5))])
-    low, high = np.array([[0.02, -1.0], [1.0, 1.0]])
-    return term._replace(
-        inner=sd_rad * tried, steps=np.full(2, 0.01 * sd_rad), low=sd_rad * low, high=sd_rad * high
-    )
+    tried = sd_rad * np.array([*product((0.1, 0.4), (0.0, -0.5, 0.5))])
+    steps, low, high = sd_rad * np.array([[0.01, 0.01], [0.02, -1.0], [1.0, 1.0]])
+    return term._replace(inner=tried, steps=steps, low=low, high=high)
 
 
 def _from_mean(columns: Columns, motion: Motion, inner: Array) -> Complex:
@@ -563,6 +561,11 @@ class _Model(NamedTuple):
         return self.problems(seen, _motions(seen, np.array(joint)), values)
 
 
+def _begun(terms: Sequence[Term], joint: Array) -> _Model:
+    inner = np.concatenate([one.inner[0] for one in terms])
+    return _Model(tuple(terms), joint, inner, np.zeros(inner.size, bool))
+
+
 # --- One model
 
 
@@ -617,18 +620,15 @@ def _fitted(seen: Seen, names: tuple[str, ...]) -> ModelRow:
     powers: Sequence[Array] = [np.full(one.grid.line.size, one.grid.energy) for one in seen]
     alike = seen[0].loop is None
     try:
-        alone = _Model(tuple(known[one] for one in JOINT), joint, np.zeros(0), np.zeros(0, bool))
+        alone = _begun([known[one] for one in JOINT], joint)
         solution = solve(seen, alone.pose, joint, powers if alike else None)
         joint, powers = solution.values, solution.powers
     except ValueError:
         pass  # the terms may do without one of J, B and K
     motions = _motions(seen, joint)
-    # J, B and K first
-    terms = tuple(
-        _scaled(known[one], motions) for one in sorted(names, key=lambda n: n not in JOINT)
-    )
-    inner = np.concatenate([one.inner[0] for one in terms])
-    model = _Model(terms, joint, inner, np.zeros(inner.size, bool))
+    in_order = sorted(names, key=lambda one: one not in JOINT)
+    terms = tuple(_scaled(known[one], motions) for one in in_order)
+    model = _begun(terms, joint)
     labels = []
     for term in terms:
         count = len(term.columns(motions[0][1], term.inner[:1]))
@@ -854,14 +854,11 @@ def _freed(one: Problem) -> Problem:
 
 def _beyond(row: ModelRow, model: _Model, seen: Seen, motions: Motions) -> ModelRow:
     """Return the row with its terms beside a free linear filter, with inner ones of their own."""
-    at = [i for i, one in enumerate(model.terms) if one.asked in row.bent]
-    if not at:
+    if not row.bent or row.fit is None:
         none = [Problem(o.motion[:, :0], o.motion[:, :0], o.torque_nm, o) for o in seen]
         return replace(row, freed=[*map(_freed, none)])
-    terms, parts = tuple(model.terms[i] for i in at), model.parts(model.inner)
-    inner = np.concatenate([parts[i] for i in at])
-    model = _Model(terms, model.joint, inner, np.zeros(inner.size, bool))
-    names = [name for name, _ in row.fit.columns if name in row.bent] if row.fit else []
+    names = [name for name, _ in row.fit.columns if name in row.bent]
+    model = _begun([one for one in model.terms if one.asked in names], model.joint)
     powers = [np.ones(one.grid.line.size) for one in seen]
     model = _searched(model, seen, motions, powers, names, _freed)
     values = shortest(*sums([*map(_freed, model.problems(seen, motions, np.zeros(len(names))))]))
@@ -872,7 +869,7 @@ def _beyond(row: ModelRow, model: _Model, seen: Seen, motions: Motions) -> Model
     inverse = _inverse(gram)
     values, covariance = inverse @ moment, seen[0].grid.spread / 2 * inverse
     found = []
-    for term in terms:
+    for term in model.terms:
         at = [place for place, name in enumerate(names) if name == term.asked]
         width, unit = (FIR_SPACING_S, "N·m·s/rad") if len(at) > 1 else (1.0, term.unit)
         se = width * float(np.sqrt(np.sum(covariance[np.ix_(at, at)])))
