@@ -230,7 +230,7 @@ def _voluntary(context: Context) -> Mapping[str, Triple]:
         for epoch in epochs
     ]
     found["least squares"] = errors_percent(np.mean([fit.value for fit in ordinary], axis=0))
-    (pooled,) = [one for one in estimate(epochs, settings, "iv").pooled if not one.condition]
+    pooled = estimate(epochs, settings, "iv").pooled[0]
     found["iv"] = errors_percent(_fitted(pooled))
     return found
 

@@ -44,9 +44,10 @@ from rigidimeter.core.words import series
 from rigidimeter.model import lowpass
 
 CHANCE, MOST_TERMS = 1e-3, 3
-REMAINS, LITTLE = 1e-3, 0.01
+REMAINS, LITTLE, MUCH = 1e-3, 0.01, 0.1
 """J, B and K are withheld where p of what remains is below the first, unless it could change them
-by less than the second."""
+by less than the second. Without a perturbation it is told where it could change them by more than
+the third: torque of the subject is in it too."""
 
 LEAST_SHARE, LEAST_RANGE, LEAST_DELAY_S = 0.02, 0.10, 2e-4
 LEAST_CUFF, MOST_CUFF, FURTHER, ALONE = 0.002, 0.3, 0.03, 1.0
@@ -205,6 +206,9 @@ class Answer(NamedTuple):
         Terms that are there and too small to matter.
     differs : bool
         Whether a term is not the same in all epochs.
+    follows : float
+        Without a perturbation p of anything linear beside J, B and K, NaN if they hardly hinge on
+        the frequencies that count.
     case, state : Case, State
     """
 
@@ -219,6 +223,7 @@ class Answer(NamedTuple):
     answered: bool
     little: frozenset[str]
     differs: bool
+    follows: float
     case: Case
     state: State
 
@@ -718,16 +723,21 @@ def _answered(
     most = np.max([np.zeros(3), *moved], axis=0)
     depends = most > DEPENDS * np.abs(joint)
     half = half + np.where(depends, np.maximum(most, 2 * without), most)
-    remains, left, change = np.nan, 0.0, np.zeros(3)
+    remains, change = np.nan, np.zeros(3)
+
+    def low(w: Array) -> Array:
+        return np.asarray(w[0] / w)
+
     if case.caused:
         # What another drive explains is not of the joint.
         remains = max([linear.p, *(p for _, one in others[1:] for p in one.values())])
-        change = _otherwise(model, fit.values, lambda w: w[0] / w)
+        change = _otherwise(model, fit.values, low)
     # A linear term beside which something linear remains has not its name.
     named = {one.term.name: one for one in found if not remains < REMAINS or not _linear(one.term)}
-    if case.caused:
-        plain = linear if len(named) == len(found) else nameless
-        left = float(np.sqrt(2 * np.mean(plain.values**2)))
+    plain = linear if len(named) == len(found) or not case.caused else nameless
+    left, follows = float(np.sqrt(2 * np.mean(plain.values**2))), np.nan
+    if not case.caused and np.max(np.abs(_otherwise(model, fit.values, low) / joint)) > MUCH:
+        follows = linear.p
     little = np.max(np.abs(change / joint)) < LITTLE and len(named) == len(found)
     answered = bool(remains >= REMAINS or not case.caused or little)
     half = half + np.abs(change) * (remains < REMAINS)
@@ -746,7 +756,7 @@ def _answered(
         ))  # fmt: skip
     return Answer(
         joint, half, of_joint, tuple(told), p, remains, left, change, answered, frozenset(), False,
-        case, state,
+        follows, case, state,
     )  # fmt: skip
 
 
@@ -865,15 +875,17 @@ def findings_of(
             )
         )  # fmt: skip
     percent, most = 100 * found.left, limits.max_lack_of_fit_percent
-    if found.remains < REMAINS and percent > most and (found.answered or not found.found):
+    p = found.remains if tested else found.follows
+    if p < REMAINS and percent > most and (found.answered or not found.found):
         low_hz, high_hz = found.case.measured[0].grid.band_hz
         change = (100 * found.change / found.joint).tolist()
         facts = {f"half_{symbol}": one for symbol, one in zip("JBK", change, strict=True)}
         facts |= {"low_hz": low_hz, "high_hz": high_hz}
         told.append(
             said(
-                "lack_of_fit", limits, percent, most, p=found.remains, facts=facts,
-                harmless="answered" if found.answered else "",
+                "lack_of_fit", limits, percent, most, p=p, facts=facts,
+                variant="" if tested else "motion",
+                harmless="answered" if tested and found.answered else "",
             )
         )  # fmt: skip
     return tuple(told)

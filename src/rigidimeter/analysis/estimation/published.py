@@ -62,7 +62,7 @@ LOW = 0.01
 """In rad a tick: slow enough that what sampling does no longer depends on it."""
 
 
-class Solved(NamedTuple):
+class LeastSquares(NamedTuple):
     """What minimises |target − columns · values|, and how well the columns can be told apart.
 
     Attributes
@@ -95,7 +95,7 @@ class Solved(NamedTuple):
         return np.asarray(inverse @ inverse.T / np.outer(self.lengths, self.lengths))
 
 
-def least_squares(columns: Array, target: Array, names: Sequence[str] = ()) -> Solved:
+def least_squares(columns: Array, target: Array, names: Sequence[str] = ()) -> LeastSquares:
     """Return the least-squares solution of columns, shape (n, p), for a target, shape (n,).
 
     Raises
@@ -123,7 +123,7 @@ def least_squares(columns: Array, target: Array, names: Sequence[str] = ()) -> S
         )
     with np.errstate(divide="ignore", invalid="ignore"):
         values = (right.T / singular) @ (left.T @ target) / lengths
-    return Solved(values, lengths, singular, right, len(columns))
+    return LeastSquares(values, lengths, singular, right, len(columns))
 
 
 def fit_inertia_damping_stiffness(signals: Signals, inertia_kg_m2: float | None = None) -> Fit:

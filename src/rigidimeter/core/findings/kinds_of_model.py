@@ -21,6 +21,12 @@ example: {"value": 6.4, "limit": 2.0, "p": 3e-09, "low_hz": 0.15, "high_hz": 30.
 meaning: That is below 1 % of each, and the intervals include it.
 remedy:
 example: {"value": 2.6, "half_J": 0.4, "half_B": -0.2, "half_K": 0.1}
+-- motion
+headline: {value:.2g} % of the torque that goes with the motion is not J, B, K
+measured: From {low_hz:.3g} to {high_hz:.3g} Hz {value:.2g} % of the torque that goes with the
+    motion is not J, B and K (at most {limit:g} %; {p}).
+meaning: A term is missing, or the subject answers the motion; J, B and K absorb part of it.
+remedy: Record the perturbation and use --method iv.
 -- withheld
 headline: No estimate: {value:.2g} % of the response to the perturbation is unexplained
 meaning: J, B and K depend on the frequencies that count, so none are given.

@@ -31,6 +31,7 @@ WHEN: Mapping[str, str] = {
     "several": "When several terms are missing",
     "answered": "When J, B and K are those beside it",
     "beside": "When they are, without a recorded perturbation",
+    "motion": "Without a recorded perturbation",
     "withheld": "When something else follows the perturbation as well",
     "coupling": "When the coupling is compliant",
     "shown": "When the recording shows the controller",
