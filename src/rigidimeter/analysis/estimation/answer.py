@@ -256,7 +256,7 @@ def answer(
     state = State(solution.values, list(solution.powers))
     case = with_phases(case_of(solution.problems), state)
     if not case.caused and case.measured[0].phase is not None:
-        state = settled(case, state.beside(Taken(of.MOVEMENT)))
+        state = _also(case, state, of.MOVEMENT)
     offered = [one for one in (*TERMS, *more) if _offered(case, one, person)]
     first: dict[str, float] = {}
     found: list[Found] = []
@@ -291,7 +291,7 @@ def answer(
         term = state.taken[-1].term
         found.append(Found(term, p.get(term.name, min(p.values())), size))
         if term.name in of.FINER:
-            state = settled(case, state.beside(Taken(of.FINER[term.name])))
+            state = _also(case, state, of.FINER[term.name])
         gone = {term.name, *NOT_BESIDE.get(term.name, ())}
         offered = [one for one in offered if one.name not in gone]
     made = _answered(case, state, tested, found, first, nameless)
@@ -502,6 +502,14 @@ def settled(case: Case, state: State, rounds: int = ROUNDS) -> State:
         if max([step, *(share for _, share in moved)]) < SETTLED:
             break
     return state
+
+
+def _also(case: Case, state: State, term: Term) -> State:
+    """Return the state with a term that is not tested, or without where it cannot be told apart."""
+    try:
+        return settled(case, state.beside(Taken(term)))
+    except ValueError:
+        return state
 
 
 # --- Which term
@@ -736,11 +744,13 @@ def _answered(
     named = {one.term.name: one for one in found if not remains < REMAINS or not _linear(one.term)}
     plain = linear if len(named) == len(found) or not case.caused else nameless
     left, follows = float(np.sqrt(2 * np.mean(plain.values**2))), np.nan
-    if not case.caused and np.max(np.abs(_otherwise(model, fit.values, low) / joint)) > MUCH:
-        follows = linear.p
+    if not case.caused and linear.p < REMAINS:
+        hinges = np.max(np.abs(_otherwise(model, fit.values, low) / joint)) > MUCH
+        follows = linear.p if hinges else np.nan
     little = np.max(np.abs(change / joint)) < LITTLE and len(named) == len(found)
     answered = bool(remains >= REMAINS or not case.caused or little)
-    half = half + np.abs(change) * (remains < REMAINS)
+    if remains < REMAINS:
+        half = half + np.abs(change)
     if any(one.term.name in _LATE for one in found):
         half = half + unsure_s(case) * np.append(np.abs(joint[1:]), 0.0)
     told = []
@@ -793,7 +803,10 @@ def _otherwise(model: Model, values: Array, weight: Callable[[Array], Array]) ->
         one._replace(instruments=one.instruments * weight(one.grid.omega_rad_s))
         for one in model.parts
     ]
-    return np.asarray((by.fitted(parts, model.base).values - values)[:3])
+    try:
+        return np.asarray((by.fitted(parts, model.base).values - values)[:3])
+    except ValueError:  # low lines do not tell the terms apart
+        return np.full(3, np.nan)
 
 
 def _differs(state: State, model: Model) -> bool:

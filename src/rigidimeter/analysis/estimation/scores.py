@@ -18,7 +18,6 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from scipy.interpolate import CubicSpline
 
 from rigidimeter.analysis.estimation.signals import (
     Array,
@@ -119,7 +118,7 @@ def scoring_cycles(epoch: Epoch, settings: ScoreSettings) -> Cycles:
     centred = both - np.mean(both, axis=1, keepdims=True)
     padded, before = _continued(grid, centred, motion.frequency_hz, padding_s)
     filtered = scipy.signal.sosfiltfilt(bandpass, padded)[:, before : before + grid.size]
-    torque, angle = CubicSpline(grid, filtered / gain, axis=1)(fine)
+    torque, angle = scipy.interpolate.CubicSpline(grid, filtered / gain, axis=1)(fine)
     return Cycles(fine, torque, angle, motion.frequency_hz, n_cycles)
 
 
@@ -138,7 +137,7 @@ def _continued(
     n, cycle = round(padding_s / interval_s), round(cycle_s / interval_s)
     # How far into the first cycle, for each time before it, from the last on.
     back = (-np.arange(1, n + 1) * interval_s) % cycle_s
-    full, motion = SAME_AMPLITUDE * float(np.ptp(values[-1])), CubicSpline(grid, values, axis=1)
+    full, motion = SAME_AMPLITUDE * float(np.ptp(values[-1])), scipy.interpolate.CubicSpline(grid, values, axis=1)
     early, late = (float(np.ptp(end)) > full for end in (values[-1, :cycle], values[-1, -cycle:]))
     before, after = motion(grid[0] + early * back), motion(grid[-1] - late * back)
     return np.concatenate([before[:, ::-1], values, after], axis=1), n

@@ -207,7 +207,7 @@ def test_a_reflex_beside_torque_of_the_subject_is_answered(perturbation: bool) -
     assert np.all(np.abs(found.joint - truth) < 2 * found.half)
     assert abs(solution.values[1] - truth[1]) > 0.1 * truth[1]
     settings = solution.problems[0].observation.settings
-    (told,) = findings_of(found, settings, stands=True)
+    (told,) = findings_of(found, settings)
     assert told.name == "missing_term"
     assert told.facts["late_ms"] == pytest.approx(58, abs=1)
     assert not [one for one in answer(solution, person=False).found if one.term.muscle]
@@ -220,7 +220,7 @@ def test_nothing_is_found_where_nothing_is() -> None:
     assert found.answered
     assert found.joint == pytest.approx(solution.values, rel=1e-3)
     settings = solution.problems[0].observation.settings
-    assert findings_of(found, settings, stands=False) == ()
+    assert findings_of(found, settings) == ()
     case = case_of(solution.problems)
     assert case.caused
 
