@@ -118,7 +118,11 @@ def test_tremor_in_one_condition(recorded):
 
 
 def test_stiffness_that_varies_within_the_recording(recorded):
-    """Without weights the softer half counts more, in which the arm moves further."""
+    """Without weights the softer half counts more, in which the arm moves further.
+
+    K beside its course is right within 5 %, and no difference is claimed; at 100 samples/s without
+    the perturbation J is 12 % low, and a little of that is in K.
+    """
     off = replace(OFF, columns=MOTION)
     varying = replace(AT_REST, stiffness="drift", stiffness_depth=0.6)
     found = compared(
@@ -128,7 +132,7 @@ def test_stiffness_that_varies_within_the_recording(recorded):
         )
     )
     assert_none_claimed(found)
-    assert found[0]["stiffness_nm_rad"]["p_holm"] > 0.05
+    assert abs(found[0]["stiffness_nm_rad"]["difference_percent"]) < 5.0
 
 
 @pytest.mark.parametrize(
