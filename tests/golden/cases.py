@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 from tests.corpus import CORPUS
 from tests.golden.case import ANSWER, Case, estimated
 from tests.golden.spoiled import SPOILED, as_it_is
@@ -94,6 +95,21 @@ def _scenario(name: str, folder: Path) -> None:
     write_session(folder / "session", epochs, SCENARIOS[name].analysed_with())
 
 
+def _without_a_person(name: str, folder: Path) -> None:
+    """A reflex is not looked for, so that what it does has no name."""
+    epochs, _ = SCENARIOS[name].simulated(0, 2)
+    settings = SCENARIOS[name].analysed_with()
+    checks = settings.diagnostics.model_copy(update={"subject_present": False})
+    write_session(folder / "session", epochs, settings.model_copy(update={"diagnostics": checks}))
+
+
+def _torque_and_angle(name: str, folder: Path) -> None:
+    (epoch,) = SCENARIOS[name].simulated(0, 1).epochs
+    channels = [epoch.channels[one] for one in ("torque_nm", "angle_rad")]
+    columns = {one.name: one.values for one in channels}
+    np.savez(folder / "session.npz", time_s=channels[0].time_s, **columns)
+
+
 def _of_files() -> Iterator[Case]:
     for name, (shows, more) in FILES.items():
         entry = CORPUS[name]
@@ -110,6 +126,17 @@ def _of_findings() -> Iterator[Case]:
                 partial(_scenario, name),
                 [estimated("session", method=method)],
             )
+
+    for name, makes, file, method in (
+        ("reflex 35 ms, 0.05", _without_a_person, "session", "iv"),
+        ("cuff 60 N·m/rad", _torque_and_angle, "session.npz", "bandlimited"),
+    ):
+        yield Case(
+            f"joint: {name}, {makes.__name__[1:].replace('_', ' ')}",
+            f"method {method}",
+            partial(makes, name),
+            [estimated(file, method=method)],
+        )
 
 
 def _of_spoiled() -> Iterator[Case]:

@@ -875,9 +875,9 @@ def _together(
                 by_name.setdefault(finding.name, finding)
         shared = list(by_name.values())
         own = [band for band in bands if band.condition == fit.condition]
-        if not shared and own:  # what has no other name
+        if own and by_name.keys() <= {"lack_of_fit"}:  # what has no other name
             labels = next(one.labels for one in told if one.condition == fit.condition)
-            shared = [
+            shared += [
                 replace(finding, condition=fit.condition, epochs=labels)
                 for finding in band_finding(fit, own, settings.diagnostics)
             ]

@@ -137,7 +137,10 @@ def _continued(
     n, cycle = round(padding_s / interval_s), round(cycle_s / interval_s)
     # How far into the first cycle, for each time before it, from the last on.
     back = (-np.arange(1, n + 1) * interval_s) % cycle_s
-    full, motion = SAME_AMPLITUDE * float(np.ptp(values[-1])), scipy.interpolate.CubicSpline(grid, values, axis=1)
+    full, motion = (
+        SAME_AMPLITUDE * float(np.ptp(values[-1])),
+        scipy.interpolate.CubicSpline(grid, values, axis=1),
+    )
     early, late = (float(np.ptp(end)) > full for end in (values[-1, :cycle], values[-1, -cycle:]))
     before, after = motion(grid[0] + early * back), motion(grid[-1] - late * back)
     return np.concatenate([before[:, ::-1], values, after], axis=1), n
