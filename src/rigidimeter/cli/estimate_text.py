@@ -25,8 +25,8 @@ MOST_EPOCHS, FIRST_EPOCHS = 8, 4
 """Of more epochs than the first number the second and the last are shown, of several recordings
 none."""
 
-SIGNIFICANT = 3.0
-"""Standard errors; a delay below is not shown."""
+SIGNIFICANT, LEAST_S = 3.0, 1e-4
+"""Standard errors; a delay below is not shown, nor one that is too short to be corrected."""
 
 MORE = "--full: every table · --json FILE: every number · rigidimeter explain NAME"
 
@@ -200,7 +200,7 @@ def _delays(analysis: Analysis, full: bool) -> Iterator[tuple[str, str]]:
         delay
         for delay in analysis.delays
         if math.isfinite(delay.delay_s)
-        and (delay.corrected or abs(delay.delay_s) >= SIGNIFICANT * delay.delay_s_se)
+        and (delay.corrected or abs(delay.delay_s) >= max(LEAST_S, SIGNIFICANT * delay.delay_s_se))
     ]
     late.sort(key=lambda delay: -abs(delay.delay_s))
     for delay in late if full else late[:1]:
