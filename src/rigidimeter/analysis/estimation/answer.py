@@ -31,8 +31,8 @@ from rigidimeter.analysis.estimation import score as by
 from rigidimeter.analysis.estimation import terms as of
 from rigidimeter.analysis.estimation.checks import found as said
 from rigidimeter.analysis.estimation.grid import SAME_TIME, Array, Complex
-from rigidimeter.analysis.estimation.methods import DEPENDS
-from rigidimeter.analysis.estimation.observation import Observation, torque_filter_of
+from rigidimeter.analysis.estimation.methods import DEPENDS, opened
+from rigidimeter.analysis.estimation.observation import LEAST, Observation, torque_filter_of
 from rigidimeter.analysis.estimation.score import EVERY, Part, Place, Score, real
 from rigidimeter.analysis.estimation.signals import values_at, velocity_at
 from rigidimeter.analysis.estimation.solve import Problem, Solution, noise_powers
@@ -178,11 +178,11 @@ class Found(NamedTuple):
     term: Term
     p: float
     size: float
-    values: Array = NONE
-    half: Array = NONE
-    covariance: Array = NONE
-    inner: Array = NONE
-    inner_half: Array = NONE
+    values: Array
+    half: Array
+    covariance: Array
+    inner: Array
+    inner_half: Array
 
 
 class Answer(NamedTuple):
@@ -190,12 +190,11 @@ class Answer(NamedTuple):
 
     Attributes
     ----------
-    joint, half : array, shape (3,)
-        J, B, K and half their 95 % intervals.
+    joint, half, away : array, shape (3,)
+        J, B, K, half their 95 % intervals, and what of these is neither noise nor the drive's: what
+        low lines change where something remains, and half a tick where the drive is not known.
     covariance : array, shape (3, 3)
     found : tuple of Found
-    p : dict
-        Of every term beside J, B and K alone, by Holm's method.
     remains, left : float
         p of what is linear and remains, NaN without a perturbation; its share of the torque, or
         without terms if they are not told.
@@ -214,9 +213,9 @@ class Answer(NamedTuple):
 
     joint: Array
     half: Array
+    away: Array
     covariance: Array
     found: tuple[Found, ...]
-    p: dict[str, float]
     remains: float
     left: float
     change: Array
@@ -231,15 +230,13 @@ class Answer(NamedTuple):
     def better(self) -> bool:
         """Whether J, B and K beside the terms are to be preferred to those without.
 
-        Without a perturbation a subject who gives way looks like a linear term.
+        Without a perturbation a subject who gives way looks like a linear term: beside one none is.
         """
         linear = any(one.term.linear for one in self.found)
         return self.answered and bool(self.found) and (self.case.caused or not linear)
 
 
-def answer(
-    solution: Solution, *, person: bool = True, more: Sequence[Term] = (), chance: float = CHANCE
-) -> Answer:
+def answer(solution: Solution, *, person: bool = True) -> Answer:
     """Return what the torque of a condition holds, and J, B and K beside it.
 
     Parameters
@@ -248,29 +245,24 @@ def answer(
         J, B and K of all epochs together.
     person : bool
         Whether one is on the axis; without, no reflex is looked for.
-    more : sequence of Term
-        To be tested beside the usual ones.
-    chance : float
-        Probability of any false term.
     """
     state = State(solution.values, list(solution.powers))
     case = with_phases(case_of(solution.problems), state)
     if not case.caused and case.measured[0].phase is not None:
         state = _also(case, state, of.MOVEMENT)
-    offered = [one for one in (*TERMS, *more) if _offered(case, one, person)]
-    first: dict[str, float] = {}
-    found: list[Found] = []
+    offered = [one for one in TERMS if _offered(case, one, person)]
+    found: list[tuple[Term, float, float]] = []
+    nameless: Score | None = None
     little: set[str] = set()
     strongest = 0.0
     while True:
         tested = _tested(case, state, offered)
         names = [one.name for one in offered]
         p = dict(zip(names, by.holm([tested.scores[one].p for one in names]), strict=True))
-        if not first:
-            first, nameless = p, tested.scores[of.ANY_LINEAR.name]
+        nameless = nameless or tested.scores[of.ANY_LINEAR.name]
         if len(found) == MOST_TERMS:
             break
-        sure = [one for one in offered if p[one.name] < chance]
+        sure = [one for one in offered if p[one.name] < CHANCE]
         if not case.caused and any(not one.linear for one in sure):
             sure = [one for one in sure if not one.linear]
         # A free filter holds any drive.
@@ -278,7 +270,7 @@ def answer(
                  if case.caused or one.linear}  # fmt: skip
         others = [*_other_drives(case, state, tested.model, named)][1:] if named else []
         for _, other in others:
-            sure = [one for one in sure if len(names) * other.get(one.name, 0.0) < chance]
+            sure = [one for one in sure if len(names) * other.get(one.name, 0.0) < CHANCE]
         gains = _gains(case, state, tested, sure)
         strongest = strongest or max((gain for gain, _ in gains.values()), default=0.0)
         # The gain of a coupling is that of a straight column, and it bends.
@@ -289,13 +281,12 @@ def answer(
             break
         state, size = chosen
         term = state.taken[-1].term
-        found.append(Found(term, p.get(term.name, min(p.values())), size))
+        found.append((term, p[of.DELAY.name if term is of.FILTER else term.name], size))
         if term.name in of.FINER:
             state = _also(case, state, of.FINER[term.name])
         gone = {term.name, *NOT_BESIDE.get(term.name, ())}
         offered = [one for one in offered if one.name not in gone]
-    made = _answered(case, state, tested, found, first, nameless)
-    return made._replace(little=frozenset(little), differs=_differs(state, tested.model))
+    return _answered(case, state, tested, found, nameless, little)
 
 
 def case_of(problems: Sequence[Problem]) -> Case:
@@ -577,7 +568,7 @@ def _chosen(
     rivals = [one for one in ranked[:RIVALS] if gains[one.name][0] >= RIVAL * first]
     if any(_linear(one) for one in rivals):
         rivals += [one for one in ranked if one.name in _LATE and one not in rivals]
-        rivals.append(of.FILTER)
+        rivals += [of.FILTER] if of.DELAY.name in tested.scores else []
     found: list[tuple[State, float]] = []
     for term in [*rivals, *(one for one in ranked if one not in rivals)]:
         if found and term not in rivals:
@@ -712,9 +703,9 @@ def _answered(
     case: Case,
     state: State,
     tested: _Tested,
-    found: Sequence[Found],
-    p: dict[str, float],
+    found: Sequence[tuple[Term, float, float]],
     nameless: Score,
+    little: set[str],
 ) -> Answer:
     model, fit = tested.model, tested.fit
     covariance, half_of_all = fit.uncertain(fit.blocks())
@@ -741,18 +732,18 @@ def _answered(
         remains = max([linear.p, *(p for _, one in others[1:] for p in one.values())])
         change = _otherwise(model, fit.values, low)
     # A linear term beside which something linear remains has not its name.
-    named = {one.term.name: one for one in found if not remains < REMAINS or not _linear(one.term)}
+    named = {one[0].name: one for one in found if not remains < REMAINS or not _linear(one[0])}
     plain = linear if len(named) == len(found) or not case.caused else nameless
-    left, follows = float(np.sqrt(2 * np.mean(plain.values**2))), np.nan
-    if not case.caused and linear.p < REMAINS:
-        hinges = np.max(np.abs(_otherwise(model, fit.values, low) / joint)) > MUCH
-        follows = linear.p if hinges else np.nan
-    little = np.max(np.abs(change / joint)) < LITTLE and len(named) == len(found)
-    answered = bool(remains >= REMAINS or not case.caused or little)
-    if remains < REMAINS:
-        half = half + np.abs(change)
-    if any(one.term.name in _LATE for one in found):
-        half = half + unsure_s(case) * np.append(np.abs(joint[1:]), 0.0)
+    follows = np.nan
+    if not case.caused and np.max(np.abs(_otherwise(model, fit.values, low) / joint)) > MUCH:
+        plain = _follows(case, state, tested) or plain
+        follows = plain.p
+    left = float(np.sqrt(2 * np.mean(plain.values**2)))
+    harmless = np.max(np.abs(change / joint)) < LITTLE and len(named) == len(found)
+    answered = bool(remains >= REMAINS or not case.caused or harmless)
+    away = np.abs(change) if remains < REMAINS else np.zeros(3)
+    if any(one.name in _LATE for one, *_ in found):
+        away = away + unsure_s(case) * np.append(np.abs(joint[1:]), 0.0)
     told = []
     for one, own, slopes in zip(state.taken, model.of_terms, model.of_slopes, strict=True):
         if one.term.name not in named:
@@ -760,14 +751,38 @@ def _answered(
         inner_half = np.full(one.inner.size, np.nan)
         inner_half[one.moving] = half_of_all[slopes]
         values = one.inner[: own.stop - own.start] if one.term.bent else fit.values[own]
-        told.append(named[one.term.name]._replace(
-            values=values, half=half_of_all[own], covariance=covariance[own, own],
-            inner=one.inner, inner_half=inner_half,
+        told.append(Found(
+            *named[one.term.name], values, half_of_all[own], covariance[own, own], one.inner,
+            inner_half,
         ))  # fmt: skip
     return Answer(
-        joint, half, of_joint, tuple(told), p, remains, left, change, answered, frozenset(), False,
-        follows, case, state,
+        joint, half + away, away, of_joint, tuple(told), remains, left, change, answered,
+        frozenset(little), _differs(state, model), follows, case, state,
     )  # fmt: skip
+
+
+def _follows(case: Case, state: State, tested: _Tested) -> Score | None:
+    """Return the score of anything linear without a perturbation; None where no loop is known.
+
+    What is left comes back by the loop as motion: that is taken from the motion.
+    """
+    places, parts = tested.model.tested[of.ANY_LINEAR.name], []
+    columns = [column for column, _ in places]
+    each = zip(case.observations, case.measured, tested.model.parts, tested.fit.left, state.powers,
+               strict=True)  # fmt: skip
+    for one, motion, part, left, power in each:
+        if one.loop is None:
+            return None
+        back = opened(one).motion_per_torque(np.maximum(state.joint, LEAST).tolist())
+        rest = motion.lines - (back * left * np.sqrt(power)).T
+        looked = part.instruments.copy()
+        alone = motion._replace(lines=rest, joint=state.joint)
+        looked[:3], looked[columns] = (
+            lines / np.sqrt(power) for lines in (rest.T, of.any_linear(alone, NONE))
+        )
+        parts.append(part._replace(instruments=looked))
+    name = of.ANY_LINEAR.name
+    return _scores(tested.model._replace(parts=parts), {name: places})[1][name]
 
 
 def _linear(term: Term) -> bool:
@@ -905,10 +920,13 @@ def findings_of(
 
 
 def _without(found: Answer, names: set[str]) -> Array:
-    """Return J, B and K if these terms are left out."""
+    """Return J, B and K if these terms are left out; NaN where what is left does not settle."""
     state = found.state
     rest = tuple(one for one in state.taken if one.term.name.removesuffix(", finer") not in names)
-    return settled(found.case, state._replace(taken=rest), 3).joint
+    try:
+        return settled(found.case, state._replace(taken=rest), 3).joint
+    except ValueError:
+        return np.full(3, np.nan)
 
 
 def _kind(term: Term, case: Case) -> str:
@@ -940,9 +958,9 @@ def _told(
     for one in own:
         slow = one.term.muscle and one.inner[1] > 0
         more = "reflex-second-order" if slow else "reflex"
-        asked.append(one.term.asked.replace("reflex", more))
-    if "directional-damping" in asked:
-        asked.remove("damping")  # the whole and its two halves are one too many
+        asked += [one.term.asked.replace("reflex", more)] if one.term.asked else []
+    # The whole and its two halves are one too many.
+    asked = [one for one in asked if f"directional-{one}" not in asked]
     sizes = []
     for one in own:
         late = f" {1e3 * one.inner[0]:.0f} ms late" if one.term.muscle else ""

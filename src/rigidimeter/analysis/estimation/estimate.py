@@ -7,8 +7,6 @@
 4. What the torque holds beside J, B and K, by condition, and J, B and K beside it.
 5. J is held at the median of all included epochs of all conditions, and B and K are found again
    (Eq. 7, Sec. 2.4.4).
-
-What is computed is an argument of what follows, and nothing is kept elsewhere.
 """
 
 from __future__ import annotations
@@ -16,6 +14,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -247,9 +246,10 @@ def prepare(
         for one in ready
     ]
     delays = []
-    for source in sources if clocks else ():
+    for source in sources:
         own = [i for i, one in enumerate(ready) if one.epoch.source == source]
-        delays.append(_delay_of(source, [ready[i] for i in own], [observed[i] for i in own]))
+        if clocks:
+            delays.append(_delay_of(source, [ready[i] for i in own], [observed[i] for i in own]))
         progress(1.0 / len(sources))
     return Recorded(
         everyone, settings, tuple(ready), tuple(imposed), tuple(delays), tuple(observed)
@@ -486,34 +486,35 @@ def estimate_recorded(
     epochs, imposed = every[: len(recorded.perturbed)], every[len(recorded.perturbed) :]
     observed = observed_for(estimator, epochs, recorded)
     progress(0.2)
-    fitted = _fitted(estimator, epochs, observed, None, delays, pooled=not fits_alone)
+    stage = partial(_fitted, estimator, observed=observed, delays=delays)
+    fitted = stage(epochs, pooled=not fits_alone)
     progress(0.1)
     pulls = [_pull(estimator, seen, fit) for seen, fit in zip(observed, fitted.fits, strict=True)]
     fits = [
         _checked(estimator, *each, delays)
         for each in zip(epochs, observed, fitted.fits, pulls, strict=True)
     ]
-    counted = [_closed_as(one, fit) for one, fit in zip(epochs, fits, strict=True)]
-    if not fits_alone and any(a is not b for a, b in zip(counted, epochs, strict=True)):
-        # What a check excludes must not be in the pool either.
-        fitted = _fitted(estimator, counted, observed, None, delays, pooled=True)
-    told: list[Told] = []
-    bands: list[BandEstimate] = []
+    pooled, bands, parts = fitted.pooled, list[BandEstimate](), list[Part]()
     if not fits_alone:
-        told = _told(estimator, epochs, observed, fits, fitted)
-    pooled = [_beside(estimator, one, told) for one in fitted.pooled]
-    fits = [_beside(estimator, one, told) for one in fits]
-    if not fits_alone:
-        fits, pooled, bands = _together(estimator, counted, fits, pooled, told, pulls, delays)
+        counted = [_closed_as(one, fit) for one, fit in zip(epochs, fits, strict=True)]
+        if any(a is not b for a, b in zip(counted, epochs, strict=True)):
+            # What a check excludes must not be in the pool either.
+            fitted = stage(counted, pooled=True)
+        parts = _parts(estimator, epochs, observed, fits, fitted)
+        if any(part.beside for part in parts):
+            fitted = stage(counted, parts, pooled=True)
+            fits = [_as_checked(*both, parts) for both in zip(fits, fitted.fits, strict=True)]
+        pooled = [_as_checked(one, one, parts) for one in fitted.pooled]
+        fits, pooled, bands = _together(estimator, counted, fits, pooled, parts, pulls, delays)
     progress(0.6)
     included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
     inertia_kg_m2 = float(np.median(included)) if included else float("nan")
     fixed = [Fit(fit.source, fit.epoch, fit.condition, fit.method, fit.outcome) for fit in fits]
     if included:
-        second = _fitted(estimator, epochs, observed, inertia_kg_m2, delays, pooled=False).fits
+        second = stage(epochs, parts, inertia_kg_m2, pooled=False).fits
         # What did not count in the first stage does not in the second.
         fixed = [
-            _beside(estimator, two, told, inertia_kg_m2)
+            _as_checked(two, two, parts)
             if one.outcome.included
             else replace(two, outcome=one.outcome)
             for one, two in zip(fits, second, strict=True)
@@ -582,14 +583,17 @@ def fit_epoch(
 def _fitted(
     method: Method,
     epochs: Sequence[Ready],
-    observed: Sequence[Observation | str],
-    inertia_kg_m2: float | None,
-    delays: Sequence[Delay],
+    parts: Sequence[Part] = (),
+    inertia_kg_m2: float | None = None,
     *,
+    observed: Sequence[Observation | str],
+    delays: Sequence[Delay],
     pooled: bool,
 ) -> Fitted:
-    """Return fits whose intervals hold the error of the clocks."""
+    """Return fits beside the terms of `parts`; their intervals hold the error of the clocks."""
     fitted = fit_epochs(method, epochs, observed, inertia_kg_m2, pooled=pooled)
+    pools = [_beside(method, one, parts, inertia_kg_m2) for one in fitted.pooled]
+    fits = [_beside(method, one, parts, inertia_kg_m2) for one in fitted.fits]
 
     def again(by_s: Sequence[float]) -> list[Fit]:
         moved = [one.moved(late_s) for one, late_s in zip(epochs, by_s, strict=True)]
@@ -597,9 +601,13 @@ def _fitted(
             one.late(late_s) if isinstance(one, Observation) else one
             for one, late_s in zip(observed, by_s, strict=True)
         ]
-        return fit_epochs(method, moved, seen, inertia_kg_m2, pooled=False).fits
+        found = fit_epochs(method, moved, seen, inertia_kg_m2, pooled=False).fits
+        return [
+            _beside(method, one, parts, inertia_kg_m2, late_s)
+            for one, late_s in zip(found, by_s, strict=True)
+        ]
 
-    alone, together = with_clock_error(epochs, fitted.fits, fitted.pooled, delays, again)
+    alone, together = with_clock_error(epochs, fits, pools, delays, again)
     return fitted._replace(fits=alone, pooled=together)
 
 
@@ -668,68 +676,55 @@ def _with_active(method: Method, ready: Ready) -> Fit | None:
 
 
 class Part(NamedTuple):
-    """Epochs that hold the same terms.
+    """Epochs of a condition that count and hold the same terms.
 
     Attributes
     ----------
-    epochs : tuple of (str, str)
-        Source and label of each.
+    condition : str
     answer : Answer
     problems : list of Problem
         Of J, B and K, with the torque of the terms taken from their targets where `beside`.
     powers : list of array
+    values : list of array, shape (3,)
+        J, B and K of each epoch without terms.
     beside : bool
         Whether J, B and K are given beside the terms.
     """
 
-    epochs: tuple[tuple[str, str], ...]
+    condition: str
     answer: Answer
     problems: list[Problem]
     powers: list[Array]
+    values: list[Array]
     beside: bool
 
     @property
     def labels(self) -> tuple[str, ...]:
         """What the epochs are called."""
-        return tuple(label for _, label in self.epochs)
+        return tuple(one.observation.epoch.label for one in self.problems)
+
+    def places(self, fit: Fit) -> list[int]:
+        """Return which of its epochs a fit is made of: of one, of the condition, or of all."""
+        if fit.condition not in ("", self.condition):
+            return []
+        epochs = [one.observation.epoch for one in self.problems]
+        both = (fit.source, fit.epoch)
+        return [i for i, one in enumerate(epochs)
+                if fit.epoch == "pooled" or (one.source, one.label) == both]  # fmt: skip
 
 
-class Told(NamedTuple):
-    """What the epochs of a condition that count say together.
-
-    Attributes
-    ----------
-    condition : str
-    solution : Solution
-        Without terms.
-    values : list of array, shape (3,)
-        J, B and K of each epoch without terms.
-    parts : list of Part
-        One of all epochs, or one of each where a term is not the same in all.
-    """
-
-    condition: str
-    solution: Solution
-    values: list[Array]
-    parts: list[Part]
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """What the epochs are called."""
-        return tuple(one.observation.epoch.label for one in self.solution.problems)
-
-
-def _told(
+def _parts(
     method: Method,
     epochs: Sequence[Ready],
     observed: Sequence[Observation | str],
     fits: Sequence[Fit],
     fitted: Fitted,
-) -> list[Told]:
+) -> list[Part]:
     """Return what the torque of each condition holds beside J, B and K.
 
     By the perturbation where all epochs recorded it, whatever the method: at J, B and K of least
-    squares the subject's own torque would show in the residual as well.
+    squares the subject's own torque would show in the residual as well. Epochs in which a term is
+    not the same are parts of their own.
     """
     counting = [i for i, fit in enumerate(fits) if fit.outcome.included]
     epochs, seen = [epochs[i] for i in counting], [observed[i] for i in counting]
@@ -739,98 +734,95 @@ def _told(
         seen = observed_for(own, epochs)
         fitted = fit_epochs(own, epochs, seen, pooled=False)
         shared, fits = fitted.shared, fitted.fits
-    values = {(f.condition, f.source, f.epoch): f.value for f in fits if f.outcome.included}
+    known = {(one.source, one.epoch): one.value for one in fits if one.outcome.included}
 
-    def part_of(solution: Solution) -> Part:
+    def part_of(condition: str, solution: Solution) -> Part:
         those = [one.observation for one in solution.problems]
         found = answer(solution, person=those[0].settings.diagnostics.subject_present)
         better = own is method and found.better
+        keys = [(one.epoch.source, one.epoch.label) for one in those]
         return Part(
-            tuple((one.epoch.source, one.epoch.label) for one in those),
+            condition,
             found,
             beside(found) if better else list(solution.problems),
             list(found.state.powers if better else solution.powers),
+            [known.get(one, solution.values) for one in keys],
             better,
         )
 
-    told = []
+    parts = []
     for condition, solution in shared.items():
-        parts = [part_of(solution)]
-        if parts[0].answer.differs:
+        part = part_of(condition, solution)
+        alone: list[Solution | None] = [solution]
+        if part.answer.differs:
             alone = [
                 fit_epochs(own, [one], [each], pooled=False).shared.get(condition)
                 for one, each in zip(epochs, seen, strict=True)
-                if (one.epoch.source, one.epoch.label) in parts[0].epochs
+                if one.epoch.condition == condition
             ]
-            parts = [part_of(one) for one in alone if one is not None]
-        each_value = [
-            values.get((condition, p.observation.epoch.source, p.observation.epoch.label),
-                       solution.values)
-            for p in solution.problems
-        ]  # fmt: skip
-        told.append(Told(condition, solution, each_value, parts))
-    return told
-
-
-def _parts_of(fit: Fit, told: Sequence[Told]) -> list[Part]:
-    """Return the parts that an epoch, or a pool of one condition or of all, is made of."""
-    return [
-        part
-        for one in told
-        for part in one.parts
-        if fit.condition in ("", one.condition)
-        and (fit.epoch == "pooled" or (fit.source, fit.epoch) in part.epochs)
-    ]
+        parts += [part] if len(alone) == 1 else [part_of(condition, x) for x in alone if x]
+    return parts
 
 
 def _beside(
-    method: Method, fit: Fit, told: Sequence[Told], inertia_kg_m2: float | None = None
+    method: Method,
+    fit: Fit,
+    parts: Sequence[Part],
+    inertia_kg_m2: float | None = None,
+    late_s: float = 0.0,
 ) -> Fit:
-    """Return a fit with J, B and K beside the terms that its conditions hold.
+    """Return a fit with J, B and K beside the terms that its epochs hold.
 
-    Its intervals hold the error of the terms too.
+    Its intervals hold the error of the terms too. `late_s` is by how much the torque is moved.
     """
-    parts = _parts_of(fit, told)
-    if not any(one.beside for one in parts) or not fit.outcome.included:
+    own = [(part, places) for part in parts if (places := part.places(fit))]
+    if not any(part.beside for part, _ in own) or not fit.outcome.included:
         return fit
     held = () if inertia_kg_m2 is None else (inertia_kg_m2,)
     free = slice(len(held), None)
     problems: list[Problem] = []
     powers: list[Array] = []
-    variance: Array = np.zeros(3 - len(held))
-    for part in parts:
+    variance, away = np.zeros((2, 3 - len(held)))
+    for part, places in own:
         given = [
             p._replace(
                 instruments=p.instruments[:, free],
                 regressors=p.regressors[:, free],
-                target=p.target - p.regressors[:, : len(held)] @ np.array(held),
+                target=p.target * np.exp(1j * p.observation.grid.omega_rad_s * late_s)
+                - p.regressors[:, : len(held)] @ np.array(held),
                 held=held,
             )
             for p in part.problems
         ]
-        mine = [i for i, one in enumerate(part.epochs)
-                if fit.epoch == "pooled" or one == (fit.source, fit.epoch)]  # fmt: skip
         if part.beside:
             # What the terms' own error adds to that of J, B and K with the terms given.
             known = np.diag(solve_once(given, part.powers).covariance)
             more = np.maximum(np.diag(part.answer.covariance)[free] - known, 0.0)
-            variance = variance + len(mine) ** 2 * more
-        problems += [given[i] for i in mine]
-        powers += [part.powers[i] for i in mine]
-    made = fit_of(method, solve_once(problems, powers), inertia_kg_m2, beside=True)
-    wider = np.append(np.zeros(len(held)), np.sqrt(variance) / len(problems))
-    numbers = widened(made, list(np.diag(wider)))
+            variance = variance + len(places) ** 2 * more
+            away = away + len(places) * part.answer.away[free]
+        problems += [given[i] for i in places]
+        powers += [part.powers[i] for i in places]
+    count = len(problems)
+    made = fit_of(method, solve_once(problems, powers), inertia_kg_m2, away / count, beside=True)
+    wider = np.append(np.zeros(len(held)), np.sqrt(variance) / count)
     return replace(
-        numbers,
+        widened(made, list(np.diag(wider))),
         source=fit.source,
         epoch=fit.epoch,
         condition=fit.condition,
         outcome=fit.outcome,
-        findings=(
-            *(one for one in fit.findings if not _explained(one, numbers)),
-            *of_fit.values(problems[0].observation, numbers),
-        ),
-        activity=fit.activity,
+    )
+
+
+def _as_checked(checked: Fit, fit: Fit, parts: Sequence[Part]) -> Fit:
+    """Return a fit beside terms with what its checks say still holds of it."""
+    own = [part for part in parts if part.places(checked)]
+    if not any(part.beside for part in own) or not checked.outcome.included:
+        return checked
+    still = [one for one in checked.findings if not _explained(one, fit)]
+    more = of_fit.values(own[0].problems[0].observation, fit)
+    return replace(
+        fit, outcome=checked.outcome, activity=checked.activity, findings=(*still, *more)
     )
 
 
@@ -846,39 +838,33 @@ def _together(
     epochs: Sequence[Ready],
     fits: Sequence[Fit],
     pooled: Sequence[Fit],
-    told: Sequence[Told],
+    parts: Sequence[Part],
     pulls: Sequence[Pull],
     delays: Sequence[Delay],
 ) -> tuple[list[Fit], list[Fit], list[BandEstimate]]:
     """Return fits and pooled fits with what epochs of a condition show together, and bands."""
-    found_in: dict[tuple[tuple[str, str], ...], list[Finding]] = {}
     bands: list[BandEstimate] = []
-    rubs = set()
-    for one in told:
-        seen = [p.observation for p in one.solution.problems]
-        pool = next((fit for fit in pooled if fit.condition == one.condition), None)
+    labels: dict[str, tuple[str, ...]] = {}
+    for condition in dict.fromkeys(part.condition for part in parts):
+        those = [part for part in parts if part.condition == condition]
+        seen = [p.observation for part in those for p in part.problems]
+        labels[condition] = tuple(label for part in those for label in part.labels)
+        pool = next((fit for fit in pooled if fit.condition == condition), None)
         if seen[0].cause is not None:
-            bands += band_estimates(seen, one.values, pool if method.uses_perturbation else None)
-        for part in one.parts:
-            found_in[part.epochs] = [
-                replace(finding, condition=one.condition, epochs=part.labels)
-                for finding in findings_of(
-                    part.answer, seen[0].settings, None if part.beside else _shown(fits, part)
-                )
-            ]
-            rubs |= set(part.epochs) if "friction" in part.answer.little else set()
+            values = [value for part in those for value in part.values]
+            bands += band_estimates(seen, values, pool if method.uses_perturbation else None)
+    told = [_told(part, fits) for part in parts]
 
     def with_shared(fit: Fit, more: Sequence[Finding], settings: Settings) -> Fit:
         by_name: dict[str, Finding] = {}
-        for part in _parts_of(fit, told):
-            for finding in found_in[part.epochs]:
+        for part, findings in zip(parts, told, strict=True):
+            for finding in findings if part.places(fit) else ():
                 by_name.setdefault(finding.name, finding)
         shared = list(by_name.values())
         own = [band for band in bands if band.condition == fit.condition]
         if own and by_name.keys() <= {"lack_of_fit"}:  # what has no other name
-            labels = next(one.labels for one in told if one.condition == fit.condition)
             shared += [
-                replace(finding, condition=fit.condition, epochs=labels)
+                replace(finding, condition=fit.condition, epochs=labels[fit.condition])
                 for finding in band_finding(fit, own, settings.diagnostics)
             ]
         outcome = fit.outcome
@@ -897,7 +883,8 @@ def _together(
         more: list[Finding] = []
         if ready.drive is None:
             more = of_fit.between_samples(ready.epoch, fit, pull, ready.settings, delay)
-        if not more and (fit.source, fit.epoch) in rubs:
+        rubs = any("friction" in part.answer.little for part in parts if part.places(fit))
+        if not more and rubs:
             more = of_fit.friction_of_drive(ready.epoch, fit, ready.settings)
         alone.append(with_shared(fit, more, ready.settings))
     together = []
@@ -923,11 +910,18 @@ def _together(
     return alone, together, bands
 
 
-def _shown(fits: Sequence[Fit], part: Part) -> tuple[Array, Array]:
-    """Return the mean J, B and K of the epochs of a part, and half their intervals."""
-    own = [one for one in fits if (one.source, one.epoch) in part.epochs]
-    halves = [(np.asarray(one.high) - np.asarray(one.low)) / 2 for one in own]
-    return np.mean([one.value for one in own], axis=0), np.mean(halves, axis=0)
+def _told(part: Part, fits: Sequence[Fit]) -> list[Finding]:
+    """Return the findings of what a part holds; where J, B and K are not beside it, of theirs."""
+    shown = None
+    if not part.beside:
+        own = [fit for fit in fits if part.places(fit)]
+        halves = [(np.asarray(one.high) - np.asarray(one.low)) / 2 for one in own]
+        shown = np.mean([one.value for one in own], axis=0), np.mean(halves, axis=0)
+    settings = part.problems[0].observation.settings
+    return [
+        replace(finding, condition=part.condition, epochs=part.labels)
+        for finding in findings_of(part.answer, settings, shown)
+    ]
 
 
 def _of_every(pool: Fit, own: Sequence[Fit]) -> list[Finding]:

@@ -261,10 +261,10 @@ def loop_pull(
     observations = [one.observation for one in problems]
     if any(one.cause is not None or one.loop is None for one in observations):
         return bias
-    opened = [_opened(one) for one in observations]
+    loops = [opened(one) for one in observations]
     for _ in range(PULL_ITERATIONS):
         moment = np.zeros(values.size)
-        for one, power, loop in zip(problems, powers, opened, strict=True):
+        for one, power, loop in zip(problems, powers, loops, strict=True):
             joint = np.concatenate([np.array(one.held), values - bias])
             J, B, K = np.maximum(joint, LEAST).tolist()
             back = loop.motion_per_torque((J, B, K)).real[len(one.held) :]
@@ -278,7 +278,8 @@ def loop_pull(
     return np.full(values.size, np.nan)
 
 
-def _opened(observation: Observation) -> OpenLoop:
+def opened(observation: Observation) -> OpenLoop:
+    """Return the loop that an epoch ran in, opened, at its lines."""
     loop, grid = observation.loop, observation.grid
     assert loop is not None  # else there is no b
     spacing_hz = float(f"{1 / grid.duration_s:.9g}")
@@ -302,8 +303,7 @@ class Fitted(NamedTuple):
         One for each condition with an epoch that counts; of several one for all of them together,
         without a condition.
     shared : dict of str to Solution
-        What the epochs of each condition share, where they were fitted at their lines; of all of
-        them without a condition.
+        What the epochs of each condition share, where they were fitted at their lines.
     """
 
     fits: list[Fit]
@@ -370,12 +370,14 @@ def fit_epochs(
             except ValueError as error:
                 fits[i] = _failed(epochs[i].epoch, method, str(error))
     together: list[Fit] = []
-    for condition in [*conditions, *([""] if len(conditions) > 1 else [])] if pooled else ():
+    pools = [[one] for one in conditions] if pooled else []
+    for own in [*pools, *([conditions] if len(pools) > 1 else [])]:
         members = [
             i
             for i, one in enumerate(epochs)
-            if one.epoch.closed.included and condition in ("", one.epoch.condition)
+            if one.epoch.closed.included and one.epoch.condition in own
         ]
+        condition = own[0] if len(own) == 1 else ""
         observations = [one for i in members if isinstance(one := observed[i], Observation)]
         sound = [epochs[i] for i in members if fits[i].outcome.included]
         fit: Fit | None = None
@@ -383,10 +385,11 @@ def fit_epochs(
             fit = _by_function(method, sound, inertia_kg_m2)
         elif pose is not None and observations:
             with suppress(ValueError):  # as each epoch says
-                if condition not in shared:
+                together_of = shared.get(condition) if len(own) == 1 else None
+                if together_of is None:
                     begin = _begin(observations, inertia_kg_m2)
-                    shared[condition] = solve(observations, pose, begin)
-                fit = fit_of(method, shared[condition], inertia_kg_m2)
+                    together_of = solve(observations, pose, begin)
+                fit = fit_of(method, together_of, inertia_kg_m2)
         if fit is not None and fit.n_samples:
             findings = fit.findings if condition else ()
             together.append(replace(fit, epoch="pooled", condition=condition, findings=findings))
@@ -421,11 +424,17 @@ def _failed(epoch: Epoch, method: Method, reason: str) -> Fit:
 
 
 def fit_of(
-    method: Method, solution: Solution, inertia_kg_m2: float | None = None, *, beside: bool = False
+    method: Method,
+    solution: Solution,
+    inertia_kg_m2: float | None = None,
+    away: Array | float = 0.0,
+    *,
+    beside: bool = False,
 ) -> Fit:
     """Return a solution as it is recorded, named after the first of its epochs.
 
-    `beside` says that the targets are torque less that of terms, which then counts as explained.
+    Both ends of its intervals are further out by `away`. `beside` says that the targets are torque
+    less that of terms, which then counts as explained.
     """
     observations = [one.observation for one in solution.problems]
     epoch = observations[0].epoch
@@ -437,7 +446,7 @@ def fit_of(
         solution.degrees,
         np.sqrt(np.diag(solution.bound)),
         inertia_kg_m2,
-        elsewhere + np.nan_to_num(np.abs(pulled)),
+        elsewhere + np.nan_to_num(np.abs(pulled)) + away,
     )
     left = total = moved = 0.0
     samples = sum(one.grid.samples for one in observations)
