@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from rigidimeter.analysis.estimation import score as by
 from rigidimeter.analysis.estimation import terms as of
 from rigidimeter.analysis.estimation.checks import found as said
+from rigidimeter.analysis.estimation.drive import passed
 from rigidimeter.analysis.estimation.grid import SAME_TIME, Array, Complex
 from rigidimeter.analysis.estimation.methods import DEPENDS, opened
 from rigidimeter.analysis.estimation.observation import LEAST, Observation, torque_filter_of
@@ -41,7 +42,6 @@ from rigidimeter.core.findings import UNKNOWN_EFFECT, Effect, Fact, Finding
 from rigidimeter.core.records import PARAMETERS
 from rigidimeter.core.settings import DiagnosticsSettings, Settings
 from rigidimeter.core.words import series
-from rigidimeter.model import lowpass
 
 CHANCE, MOST_TERMS = 1e-3, 3
 REMAINS, LITTLE, MUCH = 1e-3, 0.01, 0.1
@@ -298,14 +298,11 @@ def case_of(problems: Sequence[Problem]) -> Case:
         torque = grid.lines(values_at(channel, grid.time_s, SAME_TIME), 2).T
         # Where the torque of an observation was made earlier, its lines alone were turned.
         torque = torque * (one.target / torque[:, 0])[:, None]
-        through: Complex | float = 1.0
-        if (through_filter := torque_filter_of(seen.settings)) is not None:
-            through = lowpass(np.asarray(1j * grid.omega_rad_s), *through_filter)
+        through = passed(torque_filter_of(seen.settings), grid.omega_rad_s)
         velocity, angle = seen.coarse
         motion = Motion(grid, velocity, angle, one.regressors, torque, np.zeros(3), through)
-        unseen = -seen.changes[0] if len(seen.changes) else 0.0
         every = velocity_at(seen.epoch, grid.time_s)
-        measured.append(motion._replace(unseen=unseen, every=every))
+        measured.append(motion._replace(unseen=-seen.changes[0], every=every))
     observations = [one.observation for one in problems]
     caused = all(one.cause is not None for one in observations)
     return Case(observations, measured, [one.instruments for one in problems], caused)
@@ -718,7 +715,7 @@ def _answered(
     linear, name = tested.scores[of.ANY_LINEAR.name], of.ANY_LINEAR.name
     lines = {name: model.tested[name]} if case.caused and linear.p < REMAINS else {}
     others = [*_other_drives(case, state, model, lines)]
-    without, *moved = [np.abs(one.values - fit.values)[:3] for one, _ in others] or [np.zeros(3)]
+    without, *moved = [np.abs(one.values - fit.values)[:3] for one, _ in others]
     most = np.max([np.zeros(3), *moved], axis=0)
     depends = most > DEPENDS * np.abs(joint)
     half = half + np.where(depends, np.maximum(most, 2 * without), most)

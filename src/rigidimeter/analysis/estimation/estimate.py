@@ -435,7 +435,7 @@ def impedance(epochs: Sequence[Ready]) -> Impedance | None:
     groups: dict[tuple[int, ...], list[Observation]] = {}
     for one in observed_for(SPECTRAL, epochs):
         if isinstance(one, Observation):
-            lines_hz = one.grid.omega_rad_s[one.excited] / (2 * np.pi)
+            lines_hz = motion.hertz(one.grid)[one.excited]
             groups.setdefault(tuple(np.rint(1e3 * lines_hz).astype(int)), []).append(one)
     if not groups:
         return None
@@ -449,7 +449,7 @@ def impedance(epochs: Sequence[Ready]) -> Impedance | None:
         between = np.where(at, np.nan, np.abs(one.torque_nm) ** 2)
         beside = sliding_window_view(np.pad(between, 2, constant_values=np.nan), 5)
         noise += np.nanmean(beside[at], axis=1)
-    frequency_hz = seen[0].grid.omega_rad_s[seen[0].excited] / (2 * np.pi)
+    frequency_hz = motion.hertz(seen[0].grid)[seen[0].excited]
     coherence = np.clip(1 - noise / np.abs(sums[0]) ** 2, 0.0, 1.0)
     return Impedance(frequency_hz, np.asarray(sums[0] / sums[1]), coherence, len(seen))
 

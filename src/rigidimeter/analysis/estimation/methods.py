@@ -184,9 +184,12 @@ def direct(observations: Sequence[Observation], values: Array) -> list[Problem]:
 
 
 def instrumental(observations: Sequence[Observation], values: Array) -> list[Problem]:
-    """Return the problems with what the perturbation causes at J, B and K as the instruments."""
+    """Return the problems with what the perturbation causes at J, B and K as the instruments.
+
+    Lines that it does not excite show the noise alone.
+    """
     return [
-        Problem(one.of_lines(caused.lines), one.motion, one.torque_nm, one)
+        Problem(one.of_lines(caused.lines) * one.excited[:, None], one.motion, one.torque_nm, one)
         for one, caused in zip(observations, all_caused(observations, values), strict=True)
     ]
 
@@ -196,14 +199,6 @@ def all_caused(observations: Sequence[Observation], joint: Array) -> list[Caused
     causes = [one.cause for one in observations]
     made = {id(one): one.at(joint[:3]) for one in dict.fromkeys(causes) if one is not None}
     return [made[id(one)] for one in causes]
-
-
-def excited(observations: Sequence[Observation], values: Array) -> list[Problem]:
-    """Return `instrumental` at the excited lines: the others show the noise alone."""
-    return [
-        one._replace(instruments=one.instruments * one.observation.excited[:, None])
-        for one in instrumental(observations, values)
-    ]
 
 
 def holding(pose: Pose, inertia_kg_m2: float) -> Pose:
@@ -233,8 +228,6 @@ def by_other_drives(solution: Solution) -> Array:
     """Return δ, shape (p,)."""
     values = solution.values
     count = max(len(one.observation.changes) for one in solution.problems)
-    if count < 2:
-        return np.zeros(values.size)
     grams = np.repeat(solution.gram[None], count, axis=0)
     moments = grams @ values
     for one, power in zip(solution.problems, solution.powers, strict=True):
@@ -491,13 +484,12 @@ def between_samples(
     channels, most = observation.epoch.channels, settings.diagnostics.max_between_samples_percent
     if not known and (observation.cause is not None or "velocity_command_rad_s" in channels):
         return ()  # the check of the drive says more
-    share = np.append(np.zeros(held), 100.0 * elsewhere / np.abs(solution.values))
-    shows = np.where(np.append(np.zeros(held), elsewhere > solution.se), share, 0.0)
+    share = np.pad(100.0 * elsewhere / np.abs(solution.values), (held, 0))
+    shows = np.where(np.pad(elsewhere > solution.se, (held, 0)), share, 0.0)
     # Of a drive that is not known J says most: it is what the torque does not see between samples.
     about = int(np.argmax(shows)) if known else 0
     if shows[about] <= most:
         return ()
-    J, B, K = share.tolist()
     return (
         found(
             "between_samples",
@@ -505,7 +497,7 @@ def between_samples(
             float(share[about]),
             most,
             condition=observation.epoch.condition,
-            effect=Effect((J, B, K)),
+            effect=Effect((share[0], share[1], share[2])),
             facts={
                 "symbol": "JBK"[about],
                 "bandwidth_hz": settings.rig.drive_bandwidth_hz,
@@ -546,7 +538,7 @@ SPECTRAL = Method(
     title="instrumental variables at the lines of a periodic perturbation",
     needs=("perturbation_nm",),
     methods_text="by instrumental variables at the lines of the periodic perturbation",
-    pose=excited,
+    pose=instrumental,
     periodic=True,
     intervals_text=_INTERVALS,
     pooled_text=_POOLED,

@@ -77,10 +77,6 @@ class Signals:
         """Acceleration, velocity and angle, shape (n, 3)."""
         return np.column_stack([self.acceleration_rad_s2, self.velocity_rad_s, self.angle_rad])
 
-    def unexplained_nm(self, values: Array) -> Array:
-        """Return the subject's own torque, M_sub of Eq. 5: what J, B and K do not explain."""
-        return np.asarray(self.motion @ values - self.torque_nm)
-
     def part(self, rows: slice) -> Signals:
         """Return the same of some of the samples in a row."""
         return replace(self, **{name: getattr(self, name)[rows] for name in COLUMNS})
