@@ -236,7 +236,7 @@ class Answer(NamedTuple):
         return self.answered and bool(self.found) and (self.case.caused or not linear)
 
 
-def answer(solution: Solution, *, person: bool = True) -> Answer:
+def answer(solution: Solution, *, person: bool = True, most: int = MOST_TERMS) -> Answer:
     """Return what the torque of a condition holds, and J, B and K beside it.
 
     Parameters
@@ -245,6 +245,8 @@ def answer(solution: Solution, *, person: bool = True) -> Answer:
         J, B and K of all epochs together.
     person : bool
         Whether one is on the axis; without, no reflex is looked for.
+    most : int
+        Terms that are looked for.
     """
     state = State(solution.values, list(solution.powers))
     case = with_phases(case_of(solution.problems), state)
@@ -260,7 +262,7 @@ def answer(solution: Solution, *, person: bool = True) -> Answer:
         names = [one.name for one in offered]
         p = dict(zip(names, by.holm([tested.scores[one].p for one in names]), strict=True))
         nameless = nameless or tested.scores[of.ANY_LINEAR.name]
-        if len(found) == MOST_TERMS:
+        if len(found) == most:
             break
         sure = [one for one in offered if p[one.name] < CHANCE]
         if not case.caused and any(not one.linear for one in sure):

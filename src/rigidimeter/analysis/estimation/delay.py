@@ -389,7 +389,8 @@ def _of_other_terms(used: Sequence[Observation], pose: Pose, delay_s: float) -> 
     by_s = delay_s if abs(delay_s) > TURNS_S else 0.0
     turned = [one.late(by_s) for one in used] if by_s else used
     try:
-        told = answer(solve(turned, pose, start_of(turned)))
+        person = used[0].settings.diagnostics.subject_present
+        told = answer(solve(turned, pose, start_of(turned)), person=person, most=1)
     except ValueError as error:
         return str(error)
     first = next((one.term for one in told.found), None)
