@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.scenarios.catalogue import SCENARIOS
+from tests.scenarios.recordings import measured_alone
 
 import rigidimeter as rm
 
@@ -88,3 +90,16 @@ def test_where_no_loop_is_known_none_is_assumed():
     stated, found = fitted(TORQUE + push, settings={"controller": controller})
     assert "not_known" not in str(found["loop_bias"].facts if "loop_bias" in found else "")
     assert stated.high[2] - stated.low[2] > 1.01 * (bare.high[2] - bare.low[2])
+
+
+@pytest.mark.parametrize(
+    ("name", "follows"),
+    [("tremor 1.0 N·m", False), ("voluntary 0.2 N·m, soft skirts", False),
+     ("cogwheel 0.3 N·m", True)],
+)  # fmt: skip
+def test_what_the_subject_adds_comes_back_by_the_loop_and_is_no_misfit(name, follows):
+    one = SCENARIOS[name]
+    epochs = [measured_alone(epoch) for epoch in one.simulated(0, 4)[0]]
+    fits = rm.estimate(epochs, settings=one.analysed_with()).fits
+    raised = {finding.name for fit in fits for finding in fit.findings if finding.level != "note"}
+    assert ("lack_of_fit" in raised) is follows
