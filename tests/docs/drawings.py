@@ -64,7 +64,7 @@ QUESTIONS = (
             ("no", "read lack_of_fit, missing_term"),
             (
                 "yes, perturbation recorded",
-                "iv is not biased by it; pool epochs.\nA reflex: rigidimeter model",
+                "iv is not biased by it; pool epochs.\nA reflex is named: J, B, K are beside it",
             ),
             ("yes, not recorded", "read loop_bias, unweighted_fit;\nboth silent: use bandlimited"),
             ("yes, EMG recorded", "active stretches are left out"),
