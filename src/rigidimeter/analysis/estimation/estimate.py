@@ -330,12 +330,20 @@ def observed_for(
     return found
 
 
-def choose_method(epochs: Sequence[Ready]) -> tuple[str, str]:
+def choose_method(
+    epochs: Sequence[Ready], observed: Sequence[Observation | str] = ()
+) -> tuple[str, str]:
     """Return the method that suits what was recorded, and why.
 
     With a perturbation that the motion follows, instrumental variables, which a subject who pushes
     does not bias. An epoch that lacks it then fails, unless most do. Without it only least squares
     is possible.
+
+    Parameters
+    ----------
+    epochs : sequence of Ready
+    observed : sequence of Observation or str, optional
+        The same at their lines, where they were observed already.
     """
     if not epochs:
         return "bandlimited", "there is no epoch to fit"
@@ -347,9 +355,9 @@ def choose_method(epochs: Sequence[Ready]) -> tuple[str, str]:
     if 2 * len(missing) > len(epochs):
         shown = f"{missing[0]} (in {len(missing)} of {len(epochs)} epochs)"
         return "bandlimited", f"{shown}, {least_squares}"
-    able = [one for one in epochs if not one.obstacle and not no_instrument(one.epoch)]
-    tried = able[:MOST_TRIED]
-    unanswered = [one for one in tried if not _follows(one)]
+    able = [i for i, one in enumerate(epochs) if not one.obstacle and not no_instrument(one.epoch)]
+    tried = [(epochs[i], observed[i] if observed else "") for i in able[:MOST_TRIED]]
+    unanswered = [one for one, seen in tried if not _follows(one, seen)]
     if 2 * len(unanswered) > len(tried):
         return "bandlimited", (
             f"the motion does not follow perturbation_nm (in {len(unanswered)} of "
@@ -365,7 +373,7 @@ def choose_method(epochs: Sequence[Ready]) -> tuple[str, str]:
     )
 
 
-def _follows(ready: Ready) -> bool:
+def _follows(ready: Ready, observed: Observation | str) -> bool:
     """Return whether any of the motion answers the perturbation, beyond chance.
 
     The velocity is regressed on the perturbation with one complex factor in each group of n_g
@@ -375,9 +383,8 @@ def _follows(ready: Ready) -> bool:
 
     has Fisher's distribution, each group divided by its noise.
     """
-    try:
-        seen = _observation(ready, None)
-    except ValueError:
+    seen = observed if isinstance(observed, Observation) else _observed(ready, None)
+    if isinstance(seen, str):
         return True  # the fit says why
     cause, velocity = motion.perturbation_lines(seen), seen.motion[:, 1]
     edges = [0]
@@ -479,7 +486,7 @@ def estimate_recorded(
     """
     settings, reason = recorded.settings, ""
     if method == "auto":
-        method, reason = choose_method(recorded.perturbed)
+        method, reason = choose_method(recorded.perturbed, recorded.observed)
     estimator = method_named(method)
     delays = () if estimator.as_recorded else recorded.delays
     every = recorded.analysed(as_recorded=estimator.as_recorded)
