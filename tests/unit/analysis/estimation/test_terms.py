@@ -1,10 +1,9 @@
-"""What each term makes of a motion, in closed form: with noise no scenario tells it to three digits."""
+"""What each term makes of a motion, in closed form: scenarios tell it to their noise alone."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from numpy.polynomial.legendre import legval
 from numpy.typing import NDArray
 
