@@ -1,4 +1,8 @@
-"""From epochs to J, B and K, to scores, and to what else the torque holds: offline and pure."""
+"""From epochs to J, B and K, to scores, and to what else the torque holds: offline and pure.
+
+Code from outside adds to `METHODS`, `CHECKS` and `TERMS`; a term's columns are made of a `Motion`.
+`chance` is the p value of what else the torque holds, `between_epochs` compares fits.
+"""
 
 from rigidimeter.analysis.estimation.between import between_epochs
 from rigidimeter.analysis.estimation.checks import at_most

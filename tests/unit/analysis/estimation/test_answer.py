@@ -75,6 +75,31 @@ def test_what_has_no_name_is_told_and_moves_little_or_the_answer_is_withheld():
         assert "lack_of_fit" in names(fit)
 
 
+@pytest.mark.parametrize("method", ["iv", "bandlimited"])
+def test_an_interval_beside_friction_holds_what_its_form_is_off(method):
+    """Without the error of its width B would seem to be known better than it is."""
+    epochs, truth = scenario("a joint", joint={"coulomb_nm": 0.1}).simulated(0, 4)
+    epochs = epochs if method == "iv" else [measured_alone(one) for one in epochs]
+    found = estimated(epochs, method=method)
+    assert_right([*found.fits, *found.pooled], truth[0])
+
+
+@pytest.mark.parametrize(
+    "between",
+    [
+        {"torque": {"late_s": 0.006}},
+        {"path": {"lowpass_hz": 100.0}},
+        {"joint": {"cuff_nm_rad": 60.0, "cuff_nm_s_rad": 0.05}},
+    ],
+    ids=["delay", "filter", "coupling"],
+)
+def test_what_lies_between_the_joint_and_the_sensor_is_undone(between):
+    epochs, truth = scenario("a joint", **between).simulated(0, 2)
+    found = estimated(epochs)
+    assert_right([*found.fits, *found.pooled], truth[0], percent=0.5)
+    assert ("missing_term" in names(found.fits[0])) == ("joint" in between)
+
+
 def test_the_pool_of_all_conditions_has_the_terms_of_each():
     plain, truth = RELAXED.simulated(0, 2)
     reflex = [
