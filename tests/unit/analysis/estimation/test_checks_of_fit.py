@@ -151,6 +151,10 @@ def test_numbers_that_no_joint_has_are_told(epoch):
     facts = found["implausible_parameters"].facts
     assert (facts["symbol"], facts["side"]) == ("J", "large")
     assert found["unstable_loop"].value > 0
+    noise = np.random.default_rng(3).normal(size=len(epoch.channels["torque_nm"]))
+    nothing = said(with_torque(epoch, lambda _, x: noise))["negative_parameters"]
+    assert (nothing.value, nothing.level) == (3.0, "caution")
+    assert nothing.facts["variant"] == "noise"
 
 
 def test_what_the_loop_does_is_told_by_what_is_known_of_it(epoch):
