@@ -17,7 +17,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.paired import REPEATS, Row, in_ms, paired
-from rigidimeter.analysis.estimation import CHECKS, estimate, estimate_recorded, prepare
+from rigidimeter.analysis import estimation
+from rigidimeter.analysis.estimation import CHECKS, estimate_recorded, prepare
 from rigidimeter.analysis.reading import ReadOptions, read_recording
 from rigidimeter.core.records import Epoch
 from rigidimeter.core.settings import Settings, parse_settings
@@ -69,7 +70,7 @@ def rows(count: int = 6, repeats: int = REPEATS) -> list[Row]:
 
 def _row(name: str, epochs: Sequence[Epoch], repeats: int) -> Row:
     times_s = paired(
-        lambda: estimate(epochs, Settings()),
+        lambda: estimation.estimate(epochs, Settings()),
         lambda: fits_alone(epochs),
         repeats,
         clock=time.process_time,

@@ -1,11 +1,9 @@
 """What an estimation costs on rigs that are not the virtual one: CPU, cold start, memory kept.
 
     OPENBLAS_NUM_THREADS=1 python -m benchmarks.estimation_cost
-    OPENBLAS_NUM_THREADS=1 python -m benchmarks.estimation_cost --new package.module:function
 
-A function takes epochs, settings and the name of a method and returns an `Analysis`; old and new
-run by turns. CPU is of an epoch of 20 s at 1 kHz with every check, in multiples of
-numpy.linalg.lstsq on 20,000 × 3 beside it. The cold start is the CPU time of a process that reads a
+CPU is of an epoch of 20 s at 1 kHz with every check, in multiples of numpy.linalg.lstsq on
+20,000 × 3 beside it. The cold start is the CPU time of a process that reads a
 CSV of two such epochs and prints an estimate, in multiples of one that imports numpy and
 scipy.signal; both from bytecode. Memory is what a process keeps after so many recordings of one
 epoch, each with its own samples, beyond what it has after five.
@@ -17,7 +15,6 @@ import argparse
 import contextlib
 import gc
 import os
-import pkgutil
 import resource
 import statistics
 import subprocess
@@ -31,9 +28,9 @@ import numpy as np
 from tests.scenarios.catalogue import SCENARIOS
 from tests.scenarios.late_drive_rig import LateRig, simulate
 
+import rigidimeter as rm
 from benchmarks.house import small_csv
 from benchmarks.paired import cpu_in_regressions, paired
-from benchmarks.shipped import NAME, Estimation, named
 from rigidimeter.core.records import Epoch
 from rigidimeter.core.settings import Settings, parse_settings
 
@@ -63,30 +60,25 @@ RECORDINGS: dict[str, Callable[[], Made]] = {
 }
 
 COLD = """
-import pkgutil, sys
+import sys
 import rigidimeter
-epochs = rigidimeter.read(sys.argv[1])
-found = pkgutil.resolve_name(sys.argv[2])(epochs.epochs, epochs.settings, "auto")
-print(found.fits[0].value)
+print(rigidimeter.estimate(rigidimeter.read(sys.argv[1])).fits[0].value)
 """
 
 
-def cpu(functions: Sequence[str], make: Callable[[], Made], repeats: int) -> list[float]:
-    """Return the CPU time of an epoch by each function, in regressions, in turn."""
+def cpu(make: Callable[[], Made], repeats: int) -> float:
+    """Return the CPU time of an epoch, in regressions."""
     epochs, settings = make()
-    costs: list[list[float]] = [[] for _ in functions]
-    for turn in range(repeats + 1):
-        for own, name in zip(costs, functions, strict=True):
-            function: Estimation = pkgutil.resolve_name(name)
-            fresh = [replace(epoch) for epoch in epochs]
-            cost = cpu_in_regressions(lambda f=function, e=fresh: f(e, settings, "auto"))
-            if turn:  # after what is loaded and compiled once
-                own.append(cost / len(epochs))
-    return [statistics.median(own) for own in costs]
+    costs = []
+    for _ in range(repeats + 1):
+        fresh = [replace(epoch) for epoch in epochs]
+        costs.append(cpu_in_regressions(lambda e=fresh: rm.estimate(e, settings=settings)))
+    # The first loads and compiles.
+    return statistics.median(costs[1:]) / len(epochs)
 
 
-def cold_starts(functions: Sequence[str], repeats: int) -> Iterator[tuple[str, list[float]]]:
-    """Yield the cold start of each function, and that of the command, by the import of SciPy."""
+def cold_starts(repeats: int) -> Iterator[tuple[str, float]]:
+    """Yield the cold start of Python and of the command, by the import of SciPy."""
     with tempfile.TemporaryDirectory() as folder:
         path = small_csv(Path(folder) / "elbow.csv")
         environment = {
@@ -108,12 +100,8 @@ def cold_starts(functions: Sequence[str], repeats: int) -> Iterator[tuple[str, l
             command = [sys.executable, *map(str, words)]
             subprocess.run(command, check=True, env=environment, stdout=subprocess.DEVNULL)
 
-        yield (
-            "cold start, CSV to a printed estimate",
-            [ratio("-c", COLD, path, f) for f in functions],
-        )
-        command = ratio("-m", "rigidimeter", "estimate", path)
-        yield "cold start, `rigidimeter estimate CSV`", [command] * len(functions)
+        yield "cold start, CSV to a printed estimate", ratio("-c", COLD, path)
+        yield "cold start, `rigidimeter estimate CSV`", ratio("-m", "rigidimeter", "estimate", path)
 
 
 def of_children_s() -> float:
@@ -122,9 +110,8 @@ def of_children_s() -> float:
     return usage.ru_utime + usage.ru_stime
 
 
-def kept_mb(name: str, recordings: int) -> float:
+def kept_mb(recordings: int) -> float:
     """Return the memory that this process keeps after so many recordings."""
-    function: Estimation = pkgutil.resolve_name(name)
     (epoch,), settings = late(1)
     torque = epoch.channels["torque_nm"]
     before_mb = 0.0
@@ -133,7 +120,7 @@ def kept_mb(name: str, recordings: int) -> float:
         channels = {key: replace(one, values=one.values.copy(), time_s=one.time_s.copy())
                     for key, one in epoch.channels.items()}  # fmt: skip
         channels["torque_nm"] = replace(torque, values=torque.values + noise)
-        function([replace(epoch, source=f"{number}", channels=channels)], settings, "auto")
+        rm.estimate([replace(epoch, source=f"{number}", channels=channels)], settings=settings)
         if number == FIRST - 1:
             before_mb = resident_mb()
     return resident_mb() - before_mb
@@ -150,9 +137,9 @@ def resident_mb() -> float:
     return pages * os.sysconf("SC_PAGESIZE") / 1e6
 
 
-def kept_apart_mb(name: str, recordings: int) -> float:
+def kept_apart_mb(recordings: int) -> float:
     """Return the same of a process of its own."""
-    words = ["-m", "benchmarks.estimation_cost", "--kept", name, "--memory", str(recordings)]
+    words = ["-m", "benchmarks.estimation_cost", "--kept", "--memory", str(recordings)]
     ran = subprocess.run([sys.executable, *words], check=True, capture_output=True, text=True)
     return float(ran.stdout)
 
@@ -160,33 +147,30 @@ def kept_apart_mb(name: str, recordings: int) -> float:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--old", type=named, default=NAME, metavar="MODULE:FUNCTION")
-    parser.add_argument("--new", type=named, metavar="MODULE:FUNCTION")
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--memory", type=int, default=100, help="recordings; 0 for no such row")
     parser.add_argument("--only", nargs="+", default=[""], help="words in names of rows")
-    parser.add_argument("--kept", type=named, help=argparse.SUPPRESS)
+    parser.add_argument("--kept", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.kept:
-        print(kept_mb(options.kept, options.memory))
+        print(kept_mb(options.memory))
         return
-    functions = [options.old] + [options.new] * bool(options.new)
 
     def wanted(name: str) -> bool:
         return any(word in name for word in options.only)
 
-    def say(name: str, values: Sequence[float]) -> None:
-        print(f"| {name} | {' | '.join(f'{value:.3g}' for value in values)} |", flush=True)
+    def say(name: str, value: float) -> None:
+        print(f"| {name} | {value:.3g} |", flush=True)
 
-    print(f"| what | {' | '.join(functions)} |\n| --- |{' ---: |' * len(functions)}")
+    print("| what | |\n| --- | ---: |")
     for name, make in RECORDINGS.items():
         if wanted(name):
-            say(f"CPU of an epoch, {name} (lstsq)", cpu(functions, make, options.repeats))
+            say(f"CPU of an epoch, {name} (lstsq)", cpu(make, options.repeats))
     if wanted("cold start"):
-        for name, ratios in cold_starts(functions, options.repeats):
-            say(f"{name} (import of NumPy and SciPy)", ratios)
+        for name, ratio in cold_starts(options.repeats):
+            say(f"{name} (import of NumPy and SciPy)", ratio)
     if options.memory and wanted("memory"):
-        kept = [kept_apart_mb(name, options.memory) for name in functions]
+        kept = kept_apart_mb(options.memory)
         say(f"memory kept after {options.memory} recordings (MB)", kept)
 
 

@@ -12,7 +12,8 @@ from tests.scenarios.recordings import measured_alone
 from tests.scenarios.scenario import scenario
 
 from benchmarks.known_joint import TRUTH, sessions, settings_with
-from rigidimeter.analysis.estimation import estimate, fit_epoch
+from rigidimeter.analysis import estimation
+from rigidimeter.analysis.estimation import fit_epoch
 from rigidimeter.core.records import Channel, Epoch
 from rigidimeter.core.settings import Settings
 
@@ -78,7 +79,7 @@ def pushed_rows(n: int) -> Iterator[Sequence[object]]:
             for number in range(max(n // EPOCHS, 1)):
                 epochs, (truth, *_) = case.simulated(number, EPOCHS)
                 alone = list(map(measured_alone, epochs))
-                fits = estimate(alone, settings, "bandlimited").fits
+                fits = estimation.estimate(alone, settings, "bandlimited").fits
                 for fit in fits:
                     errors.append(fit.value / truth - 1)
                     held.append((fit.low <= truth) & (truth <= fit.high))

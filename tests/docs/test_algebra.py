@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from rigidimeter.analysis.estimation.grid import grid_of
-from rigidimeter.analysis.estimation.score import chance
-from rigidimeter.core.records import Channel
+from rigidimeter.analysis.estimation import chance, prepare
+from rigidimeter.core.records import Channel, Epoch
 from rigidimeter.core.settings import parse_settings
 from rigidimeter.model import Loop
 
@@ -51,7 +50,9 @@ def test_lines_of_derivatives_are_those_of_the_derivatives() -> None:
     time_s = np.arange(8000) / 500
     turn = 2 * np.pi * 3.21
     sine = np.sin(turn * time_s)
-    grid = grid_of([Channel("angle_rad", time_s, sine)], (0.15, 30.0), 1.0)
+    both = {name: Channel(name, time_s, sine) for name in ("torque_nm", "angle_rad")}
+    ready = prepare([Epoch("made", "1", both, task="prbs")], parse_settings({}))
+    grid = ready.observed[0].grid
     x, rate, bend = grid.lines(sine, 2)
     of_rate = grid.lines(turn * np.cos(turn * time_s))[0]
     assert np.max(np.abs(rate - of_rate)) < 1e-6 * np.max(np.abs(of_rate))
@@ -78,3 +79,11 @@ def test_p_of_a_term_is_that_of_the_page_and_holds_whatever_the_sizes_of_blocks(
 
 def test_no_term_is_surer_than_the_signs_of_its_blocks() -> None:
     assert chance(np.ones((12, 1))) == pytest.approx(2.0**-11)
+    assert chance(np.ones((3, 3))) == 1.0
+
+
+def test_signs_alone_do_not_reach_a_small_p_too_often() -> None:
+    rng = np.random.default_rng(1)
+    sizes = np.exp(rng.normal(0.0, 2.0, (60, 3)))
+    p = [chance(sizes * rng.choice([-1.0, 1.0], 60)[:, None]) for _ in range(400)]
+    assert all(np.mean(np.array(p) < level) <= level for level in (0.3, 0.1, 0.01))

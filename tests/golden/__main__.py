@@ -4,7 +4,7 @@
     python -m tests.golden --compare [CASE …]   print old and new in two columns, write nothing
 
 `--compare` prints the case that differs most first: `!` is beyond the tolerance, `=` beyond it as
-expected (`rebuilt.txt`).
+expected (`rebuilt.toml`).
 """
 
 from __future__ import annotations

@@ -23,10 +23,10 @@ difference is printed as a list of the values that changed. `make golden` writes
 page anew; a commit that changes the table says which answers and why. `python -m tests.golden
 --compare` prints old and new side by side, the largest difference first, and writes nothing.
 
-A room that is built anew has other rounding and another search. While `tests/golden/rebuilt.toml`
-names it, what goes through it may differ by 0.05 standard errors, and errors and intervals by 5 %;
-findings are compared by name and level. What differs beyond that, as where the program answers what
-it did not, is listed in `tests/golden/rebuilt.txt`, a line with its reason each.
+A room that is built anew has other rounding and another search. What goes through commands that
+`tests/golden/rebuilt.toml` names may differ by 0.05 standard errors, and errors and intervals by
+5 %; findings are compared by name and level. What differs beyond that, as where the program answers
+what it did not, is listed there, a line with its reason each.
 
 ## What each input shows
 

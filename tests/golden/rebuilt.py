@@ -1,30 +1,18 @@
-"""A room that is being built anew: whose answers may differ by more, and what is to be another.
-
-`rebuilt.toml` names the room. `rebuilt.txt` lists what differs beyond the second tolerance and is
-right by the truth of the input, a line each: ``case: what gone: reason``; `what` is a finding, a
-key of the table or the last word of a row, and instead of ``gone`` stands ``new``, or ``other`` for
-another value or level.
-"""
+"""A room that is being built anew: its answers have a second tolerance (`rebuilt.toml`)."""
 
 from __future__ import annotations
 
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 from tests.golden.case import Case
 from tests.golden.table import REBUILT, TIGHT, Difference, Row, Tolerance, differences
 
-HERE = Path(__file__).parent
-USES: Mapping[str, tuple[str, ...]] = {
-    "": (),
-    "analysis.estimation": ("estimate", "model", "compare", "batch"),
-}
-"""The commands that go through a room."""
-
+LISTED = Path(__file__).with_name("rebuilt.toml")
 _LINE = re.compile(r"(?P<case>.+): (?P<name>\S+) (?P<how>gone|new|other): (?P<reason>.+)")
 
 
@@ -40,14 +28,14 @@ class Expected(NamedTuple):
 
 
 class Rebuilt(NamedTuple):
-    """The room, empty if none, and the reasons of what is expected to differ."""
+    """The commands that go through the room, and the reasons of what is expected to differ."""
 
-    room: str = ""
+    commands: Collection[str] = ()
     expected: Mapping[Expected, str] = {}
 
     def tolerance(self, case: Case) -> Tolerance:
         """Return by how much the answers of a case may differ."""
-        return REBUILT if case.commands[-1][0] in USES[self.room] else TIGHT
+        return REBUILT if case.commands[-1][0] in self.commands else TIGHT
 
     def reason(self, case: Case, found: Difference) -> str:
         """Return why it differs; empty if that is not expected."""
@@ -59,20 +47,18 @@ class Rebuilt(NamedTuple):
         seen = {(one.name, one.how) for one in found}
         lines = [str(one) for one in found if not self.reason(case, one)]
         missing = [one for one in self.expected if one.case == case.name and one[1:] not in seen]
-        return lines + [f"{one}: is expected in rebuilt.txt, and is not so" for one in missing]
+        return lines + [f"{one}: is expected in {LISTED.name}, and is not so" for one in missing]
 
 
-def read_rebuilt(folder: Path = HERE) -> Rebuilt:
+def read_rebuilt(path: Path = LISTED) -> Rebuilt:
     """Return what is being built anew."""
-    lines = (folder / "rebuilt.txt").read_text(encoding="utf-8").splitlines()
-    expected = {}
-    for line in filter(None, lines):
+    listed, expected = tomllib.loads(path.read_text(encoding="utf-8")), {}
+    for line in listed["expected"]:
         parts = _LINE.fullmatch(line)
         if not parts:
-            raise ValueError(f"rebuilt.txt: {line!r} is no `case: what gone|new|other: reason`")
+            raise ValueError(f"{path.name}: {line!r} is no `case: what gone|new|other: reason`")
         expected[Expected(parts["case"], parts["name"], parts["how"])] = parts["reason"]
-    room = tomllib.loads((folder / "rebuilt.toml").read_text(encoding="utf-8"))["room"]
-    return Rebuilt(room, expected)
+    return Rebuilt(listed["commands"], expected)
 
 
 def columns(case: Case, kept: Mapping[str, Row], now: Mapping[str, Row]) -> Iterator[str]:

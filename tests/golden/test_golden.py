@@ -13,7 +13,7 @@ import pytest
 from tests.golden.cases import CASES
 from tests.golden.page import PAGE, page_of
 from tests.golden.rebuilt import Expected, Rebuilt, columns, read_rebuilt
-from tests.golden.table import REBUILT, TIGHT, differences, read, text_of
+from tests.golden.table import differences, read, text_of
 from tests.shared_files import skip_without
 
 from rigidimeter.core.settings import DiagnosticLevels
@@ -86,15 +86,9 @@ KEPT = {
 class TestRoomBuiltAnew:
     """Its answers have a second tolerance; what differs beyond it is listed by name."""
 
-    def unexpected(self, row: dict, *, room: str = "analysis.estimation", **expected: str) -> list:
+    def unexpected(self, row: dict, *commands: str, **expected: str) -> list:
         said = {Expected(CASE.name, *key.split("__")): why for key, why in expected.items()}
-        return Rebuilt(room, said).unexpected(CASE, KEPT, KEPT | row)
-
-    def test_only_commands_that_go_through_it(self) -> None:
-        rebuilt = Rebuilt("analysis.estimation")
-        assert rebuilt.tolerance(CASE) is REBUILT
-        assert rebuilt.tolerance(CASES["design: searched"]) is TIGHT
-        assert Rebuilt().tolerance(CASE) is TIGHT
+        return Rebuilt(commands or ["estimate"], said).unexpected(CASE, KEPT, KEPT | row)
 
     @pytest.mark.parametrize(
         ("key", "value", "same"),
@@ -116,7 +110,7 @@ class TestRoomBuiltAnew:
     def test_findings_are_compared_by_name_and_level(self) -> None:
         finding = "epochs 0/findings missing_term"
         assert self.unexpected({finding: {"level": "caution", "value": 9.0}}) == []
-        assert self.unexpected({finding: {"level": "caution", "value": 9.0}}, room="")
+        assert self.unexpected({finding: {"level": "caution", "value": 9.0}}, "design")
         note = {finding: {"level": "note", "value": 40.0}}
         assert self.unexpected(note)
         assert self.unexpected(note, missing_term__other="the term is answered") == []
@@ -126,7 +120,7 @@ class TestRoomBuiltAnew:
         assert self.unexpected(row)
         assert self.unexpected(row, reflex__new="the joint has one") == []
         (line,) = self.unexpected({}, reflex__new="the joint has one")
-        assert line.endswith("reflex new: is expected in rebuilt.txt, and is not so")
+        assert line.endswith("reflex new: is expected in rebuilt.toml, and is not so")
 
     def test_both_columns_the_largest_first(self) -> None:
         row = {"epochs 0": {**KEPT["epochs 0"], "stiffness_nm_rad": 1.752, "p": 0.03}}
@@ -137,15 +131,15 @@ class TestRoomBuiltAnew:
         assert re.fullmatch(r"! epochs 0 +p +0\.02 +0\.03  \+50 %", lines[1])
 
     def test_a_list_is_read_by_case_name_and_how(self, tmp_path: Path) -> None:
-        (tmp_path / "rebuilt.toml").write_text('room = "analysis.estimation"\n')
-        path = tmp_path / "rebuilt.txt"
-        path.write_text("joint: reflex 60 ms, 0.3, iv: lack_of_fit gone: a reflex: answered\n")
-        expected = Expected("joint: reflex 60 ms, 0.3, iv", "lack_of_fit", "gone")
-        assert read_rebuilt(tmp_path).expected == {expected: "a reflex: answered"}
-        path.write_text("lack_of_fit is gone\n")
+        path = tmp_path / "rebuilt.toml"
+        line = f"{CASE.name}: lack_of_fit gone: a reflex: answered"
+        path.write_text(f'commands = ["estimate"]\nexpected = ["{line}"]\n')
+        expected = Expected(CASE.name, "lack_of_fit", "gone")
+        assert read_rebuilt(path) == (["estimate"], {expected: "a reflex: answered"})
+        path.write_text('commands = []\nexpected = ["lack_of_fit is gone"]\n')
         with pytest.raises(ValueError, match="is no `case: what gone"):
-            read_rebuilt(tmp_path)
+            read_rebuilt(path)
 
     def test_the_list_is_of_cases_that_exist_while_a_room_is_built_anew(self) -> None:
         assert {one.case for one in BUILT_ANEW.expected} <= set(CASES)
-        assert BUILT_ANEW.room or not BUILT_ANEW.expected
+        assert BUILT_ANEW.commands or not BUILT_ANEW.expected

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimation import estimate, estimate_recorded, prepare
+import rigidimeter as rm
+from rigidimeter.analysis.estimation import estimate_recorded, prepare
 from rigidimeter.analysis.reading import ReadOptions, Recording, read_recording
 from rigidimeter.analysis.study import fit_terms
 from rigidimeter.core.records import Channel
@@ -70,7 +71,7 @@ def test_a_fault_of_the_sensor_is_found(ankle, fault, name, level):
 @pytest.mark.parametrize("name", ["z_df", "z_df2", "z_pf"])
 def test_the_reflex_that_is_left_out_is_named_and_beside_it_k_is_as_estimated(shared_data, name):
     epochs = epochs_of(shared_data, name)
-    (pooled,) = estimate(epochs, SETTINGS, "bandlimited").pooled
+    (pooled,) = rm.estimate(epochs, "bandlimited", settings=SETTINGS).pooled
     (finding,) = (f for f in pooled.findings if f.name == "missing_term")
     asked, percent = finding.facts["asked"], finding.effect.percent[2]
     assert "reflex" in asked

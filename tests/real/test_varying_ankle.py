@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimation import estimate
+import rigidimeter as rm
 from rigidimeter.analysis.reading.formats.read_options import ReadOptions
 from rigidimeter.analysis.reading.formats.readers import read_recording
 from rigidimeter.core.records import Channel
@@ -21,7 +21,7 @@ OPTIONS = ReadOptions(
 def varying(epochs):
     return [
         {f.name: f.details for f in fit.findings if f.name.startswith("varying")}
-        for fit in estimate(epochs, Settings(), "bandlimited").fits
+        for fit in rm.estimate(epochs, "bandlimited", settings=Settings()).fits
     ]
 
 

@@ -15,10 +15,8 @@ import pytest
 from benchmarks import batch, between_samples
 from benchmarks.loop import late_and_missed
 from benchmarks.quiet import Beside, Others, quiet_words, ratio_words
-from benchmarks.rebuilt import worse
 from benchmarks.scenarios.__main__ import PAGE
 from benchmarks.scenarios.page import measured, table
-from tests.scenarios.catalogue import SCENARIOS
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
@@ -43,7 +41,6 @@ SMALLEST = {
     "late_drive": "1",
     "model_terms": "--epochs 1 --only relaxed",
     "null_studies": "--studies 1 --processes 1",
-    "rebuilt": "--only relaxed --recordings 1 --methods bandlimited",
     "scenarios.__main__": "--only relaxed --recordings 1 --methods bandlimited",
     "tick": "--repeats 1",
     "torque_channel": "--repeats 1",
@@ -172,52 +169,3 @@ def test_a_table_is_written_as_it_stands_in_its_page() -> None:
     header, rule = table({})
     assert "\n".join(["<details><summary>The table</summary>", "", header, rule]) in of_scenarios
     assert measured({}).strip().startswith("<details>")
-
-
-class TestOldAndNew:
-    """Of 30 recordings of four epochs; each error, 2 % of the truth by chance, is of both."""
-
-    TRUTH = np.array([0.0045, 0.137, 1.75])
-
-    def recordings(self, *, factor=1.0, half=0.04, doubts=(), answered=True):
-        errors = 0.02 * np.random.default_rng(0).standard_normal((30, 4, 3))
-        found = []
-        for own in errors:
-            values = self.TRUTH * (1 + factor * own + (factor - 1) * 0.02)
-            fits = [
-                {
-                    "value": list(value) if answered else [None] * 3,
-                    "low": list(value - half * self.TRUTH) if answered else [None] * 3,
-                    "high": list(value + half * self.TRUTH) if answered else [None] * 3,
-                    "doubts": [*doubts],
-                }
-                for value in values
-            ]
-            found.append({"truth": [list(self.TRUTH)] * 4, "fits": fits, "pooled": []})
-        return found
-
-    def test_the_same_is_neither_worse_nor_better(self) -> None:
-        assert worse(SCENARIOS["relaxed"], self.recordings(), self.recordings()) == []
-
-    @pytest.mark.parametrize(
-        ("change", "words"),
-        [
-            ({"half": 0.01}, [f"epochs: coverage of {name}" for name in "JBK"]),
-            ({"factor": 2.0, "half": 0.2}, [f"bias of {name}" for name in "JBK"]),
-            ({"doubts": ["tremor"]}, ["false findings"]),
-            ({"answered": False}, ["epochs without an answer"]),
-            ({"factor": 1.001}, []),
-        ],
-    )
-    def test_what_is_worse_beyond_chance_is_named(self, change, words) -> None:
-        old, new = self.recordings(), self.recordings(**change)
-        found = worse(SCENARIOS["relaxed"], new, old)
-        assert set(words) <= set(found)
-        assert bool(words) == bool(found)
-        assert worse(SCENARIOS["relaxed"], old, new) == []
-
-    def test_a_wrong_answer_that_is_no_longer_reported_is_worse(self) -> None:
-        said = self.recordings(half=0.001, doubts=["missing_term"])
-        silent = self.recordings(half=0.001)
-        assert worse(SCENARIOS["reflex 60 ms, 0.3"], silent, said) == ["wrong, silent"]
-        assert worse(SCENARIOS["reflex 60 ms, 0.3"], said, silent) == []

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rigidimeter.analysis.estimation import estimate
+import rigidimeter as rm
 from rigidimeter.analysis.reading import read
 from rigidimeter.analysis.study import compare
 from rigidimeter.cli.progress import LEAST_SHARE, Meter
@@ -119,7 +119,7 @@ def simulated(delay_s: float) -> tuple[list[Epoch], Settings]:
 def test_the_time_left_of_an_analysis_is_never_off_by_more_than_three(delay_s: float) -> None:
     """On the processor's clock, so that a busy machine changes nothing."""
     epochs, settings = simulated(delay_s)
-    estimate(epochs[:2], settings)  # what is loaded once does not count
+    rm.estimate(epochs[:2], settings=settings)  # what is loaded once does not count
     clock, start_s = Clock(), time.process_time()
     clock.now_s = start_s
     meter = Meter("estimate", 1.0, clock)
@@ -131,7 +131,7 @@ def test_the_time_left_of_an_analysis_is_never_off_by_more_than_three(delay_s: f
         if meter.left_s is not None:
             shown.append((clock.now_s, meter.left_s))
 
-    estimate(epochs, settings, progress=progress)
+    rm.estimate(epochs, settings=settings, progress=progress)
     end_s = time.process_time()
     assert meter.share == pytest.approx(1.0)
     now_s, left_s = np.array(shown).T

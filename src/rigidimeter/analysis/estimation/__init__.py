@@ -1,12 +1,15 @@
-"""From epochs to J, B and K, to scores, and to what else the torque holds: offline and pure."""
+"""From epochs to J, B and K, to scores, and to what else the torque holds: offline and pure.
 
-from rigidimeter.analysis.estimation.answer import Answer, answer
-from rigidimeter.analysis.estimation.checks import Pull, at_least, at_most, found
+Code from outside adds to `METHODS`, `CHECKS` and `TERMS`; a term's columns are made of a `Motion`.
+`chance` is the p value of what else the torque holds, `between_epochs` compares fits.
+"""
+
+from rigidimeter.analysis.estimation.between import between_epochs
+from rigidimeter.analysis.estimation.checks import at_most
 from rigidimeter.analysis.estimation.delay import aligned
 from rigidimeter.analysis.estimation.estimate import (
     CHECKS,
     METHODS,
-    Impedance,
     Progress,
     Recorded,
     choose_method,
@@ -40,13 +43,13 @@ from rigidimeter.analysis.estimation.published import (
     epoch_signals,
     fit_inertia_damping_stiffness,
 )
+from rigidimeter.analysis.estimation.score import chance
 from rigidimeter.analysis.estimation.scores import (
     Cycles,
-    find_motion,
     loop_area_j,
     score_epoch,
     scoring_cycles,
 )
-from rigidimeter.analysis.estimation.signals import Signals, band_hz, zero_phase_band
+from rigidimeter.analysis.estimation.signals import Signals, zero_phase_band
 from rigidimeter.analysis.estimation.stretches import longest_part
-from rigidimeter.analysis.estimation.terms import TERMS, Term
+from rigidimeter.analysis.estimation.terms import TERMS, Motion, Term

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.estimation.scores import find_motion, line_shares, score_epoch
+from rigidimeter.analysis.estimation import score_epoch, scoring_cycles, task_of
 from rigidimeter.core.records import Channel, Epoch, Motion, Outcome
-from rigidimeter.core.settings import EstimationSettings, ScoreSettings
+from rigidimeter.core.settings import EstimationSettings, ScoreSettings, Settings
 
 A, JOINT = math.radians(20.0), (0.0045, 0.1368, 1.751)
 
@@ -44,28 +44,30 @@ def test_a_delay_makes_work_depend_on_stiffness():
     assert found.work_j == pytest.approx(-2 * math.pi * A**2 * math.sin(0.02 * math.pi), rel=5e-3)
 
 
+def of_angle(t, x):
+    """Return an epoch without a word of its task; the torque is that of a spring."""
+    both = Channel("torque_nm", t, 1.751 * x), Channel("angle_rad", t, x)
+    return Epoch("file", "1", {one.name: one for one in both})
+
+
 def test_the_motion_is_found_where_it_is_not_said():
     t = np.arange(20_001) / 1000.0
     angle = np.where((t >= 3) & (t <= 13), A * np.sin(2 * np.pi * 1.1 * (t - 3)), 0.0)
-    epoch = Epoch("file", "1", {"angle_rad": Channel("angle_rad", t, angle)})
-    found = find_motion(epoch)
+    epoch, once = of_angle(t, angle), ScoreSettings(cycles=1000)
+    found = score_epoch(epoch, once, EstimationSettings())
     assert found.frequency_hz == pytest.approx(1.1, abs=0.005)
-    assert (found.start_s, found.duration_s) == pytest.approx((3.0, 10.0), abs=0.4)
-    assert line_shares(epoch).angle > 0.9
+    assert found.n_cycles == 8  # of 8.8 without the first and the last second
+    assert scoring_cycles(epoch, once).time_s[0] == pytest.approx(4.0, abs=0.4)
+    assert task_of(epoch, Settings()) == "sinusoid"
 
 
 def test_steps_to_and_fro_are_no_sinusoid_and_one_with_a_tremor_is():
+    """The line of a trapezoid holds 92 % of the angle, and 25 % of the velocity."""
     t, r = np.arange(20_000) / 1000.0, 0.08
     there = np.clip((t % 2.0) / 2.0 / r, 0, 1) - np.clip(((t % 2.0) / 2.0 - 0.5) / r, 0, 1)
     both = 0.1 * np.sin(2 * np.pi * 1.1 * t) + 0.01 * np.sin(2 * np.pi * 5.0 * t)
-    steps, tremor = (
-        line_shares(Epoch("file", "1", {"angle_rad": Channel("angle_rad", t, x)}))
-        for x in (there, both)
-    )
-    # The first line of a trapezoid whose ramps take r of the period, and of its two pulses.
-    assert steps.angle == pytest.approx(8 / np.pi**2 * np.sinc(r) ** 2 / (1 - 4 * r / 3), abs=0.005)
-    assert steps.velocity == pytest.approx(4 * r * np.sinc(r) ** 2, abs=0.05)
-    assert (steps.single(0.7), tremor.single(0.85)) == (False, True)
+    tasks = [task_of(of_angle(t, x), Settings()) for x in (0.1 * there, both)]
+    assert tasks == ["prbs", "sinusoid"]
 
 
 @pytest.mark.parametrize(

@@ -1,29 +1,22 @@
-"""Samples brought together, filtered alike, and the power of their lines."""
+"""Samples brought together and filtered alike."""
 
 import numpy as np
 import pytest
 from scipy import signal
 
-from rigidimeter.analysis.estimation.signals import (
-    bandlimited_signals,
-    kinematics,
-    power_lines,
-    sampled,
-    uniform_grid,
-    values_at,
-    zero_phase_band,
-)
+from rigidimeter.analysis.estimation import epoch_signals, zero_phase_band
 from rigidimeter.core.records import Channel, Epoch, LeftOut
-from rigidimeter.core.settings import EstimationSettings
+from rigidimeter.core.settings import parse_settings
 from rigidimeter.model import JointDynamics
 
 W = 2 * np.pi * 1.3
+WIDE = parse_settings({"estimation": {"band_high_unknown_hz": 20.0}})
 
 
 def sine(rate_hz, jitter_s=0.0):
-    t = np.arange(round(10 * rate_hz)) / rate_hz
+    t = np.arange(round(40 * rate_hz)) / rate_hz
     t = t + np.random.default_rng(0).uniform(0, jitter_s, t.size)
-    return t, np.sin(W * t), W * np.cos(W * t), -(W**2) * np.sin(W * t)
+    return t, np.sin(W * t), W * np.cos(W * t)
 
 
 def epoch(left_out=(), **channels):
@@ -31,41 +24,41 @@ def epoch(left_out=(), **channels):
     return Epoch("file", "1", made, left_out=left_out)
 
 
-def test_derivatives_and_integrals_are_those_of_the_signal():
-    t, x, v, a = sine(1000.0)
-    inner = slice(20, -20)
-    of_angle = kinematics(epoch(angle_rad=(t, x)), t)[:, inner]
-    np.testing.assert_allclose(of_angle, np.stack([a, v, x])[:, inner], atol=1e-4)
-    of_velocity = kinematics(epoch(velocity_rad_s=(t, v)), t)[:, inner]
-    np.testing.assert_allclose(of_velocity, np.stack([a, v, x])[:, inner], atol=1e-4)
+def found_in(made, settings=WIDE):
+    return epoch_signals(made, settings, "bandlimited")
+
+
+def of_motion(made):
+    """Return motion and torque, a sine, far from the ends, where the filter has settled."""
+    found = found_in(made)
+    inner = slice(len(found.torque_nm) // 3, 2 * len(found.torque_nm) // 3)
+    slope = np.gradient(found.torque_nm, found.time_s)[inner]
+    x = found.torque_nm[inner]
+    return found.motion[inner], np.column_stack([-(W**2) * x, slope, x])
+
+
+@pytest.mark.parametrize("motion", ["angle_rad", "velocity_rad_s"])
+def test_derivatives_and_integrals_are_those_of_the_signal(motion):
+    t, x, v = sine(1000.0)
+    recorded = {"angle_rad": (t, x), "velocity_rad_s": (t, v)}[motion]
+    found, true = of_motion(epoch(torque_nm=(t, x), **{motion: recorded}))
+    np.testing.assert_allclose(found, true, atol=1e-3)
 
 
 def test_jittered_stamps_are_read_as_they_are():
-    t, _, v, _ = sine(50.0, jitter_s=0.005)
-    times = np.linspace(1.0, 9.0, 801)
-    found = values_at(Channel("velocity_rad_s", t, v), times)
-    np.testing.assert_allclose(found, W * np.cos(W * times), atol=W * 5e-4)
-
-
-def test_samples_at_the_times_asked_for_are_taken_as_they_are():
-    t, x, _, _ = sine(100.0)
-    channel = Channel("angle_rad", t + 7.0, x)
-    inner = channel.time_s[20:60]
-    assert sampled(channel, inner + 1e-9) == slice(20, 60)
-    assert sampled(channel, inner + 1e-6) is None
-    assert sampled(channel, inner[::2]) is None
-    np.testing.assert_array_equal(values_at(channel, inner), x[20:60])
+    t, x, _ = sine(1000.0)
+    at, _, jittered = sine(50.0, jitter_s=0.005)
+    found, true = of_motion(epoch(torque_nm=(t, x), velocity_rad_s=(at, jittered)))
+    np.testing.assert_allclose(found[:, 1], true[:, 1], atol=W * 1e-3)
 
 
 def test_the_grid_is_where_all_channels_are():
-    early = Channel("torque_nm", np.arange(0.0, 10.0, 0.01), np.zeros(1000))
-    late = Channel("angle_rad", np.arange(0.5, 12.0, 0.02), np.zeros(575))
-    grid = uniform_grid([early, late], 100.0)
-    assert (grid[0], grid.size) == (0.5, 950)
-    assert (
-        uniform_grid([early, Channel("angle_rad", np.arange(20.0, 30.0), np.zeros(10))], 1).size
-        == 0
-    )
+    rng = np.random.default_rng(4)
+    early, late = np.arange(0.0, 10.0, 0.01), np.arange(0.5, 12.0, 0.02)
+    noise = {"torque_nm": early, "angle_rad": late}
+    found = found_in(epoch(**{n: (t, rng.standard_normal(t.size)) for n, t in noise.items()}))
+    trimmed_s = WIDE.estimation.trim_s
+    assert found.time_s[[0, -1]] == pytest.approx([0.5 + trimmed_s, 9.99 - trimmed_s], abs=0.01)
 
 
 @pytest.mark.parametrize("f", [0.15, 1.0, 10.0])
@@ -81,21 +74,12 @@ def test_the_band_has_no_phase_and_half_its_edges(f):
 
 def test_signals_are_those_of_one_joint_without_ends_and_what_is_left_out():
     rng, joint = np.random.default_rng(1), JointDynamics(0.0045, 0.1368, 1.751)
-    t = np.arange(4000) / 200.0
-    x = signal.sosfiltfilt(signal.butter(4, 5.0, fs=200.0, output="sos"), rng.normal(size=4000))
-    a, v, x = kinematics(epoch(angle_rad=(t, x)), t)
-    made = epoch((LeftOut(8.0, 9.0),), torque_nm=(t, joint.torque_nm(x, v, a)), angle_rad=(t, x))
-    found = bandlimited_signals(made, EstimationSettings())
-    assert found.time_s.size / found.rate_hz == pytest.approx(20 - 2 - 3, abs=0.02)
-    left = np.std(found.motion @ np.array([0.0045, 0.1368, 1.751]) - found.torque_nm)
-    assert left < 2e-3 * np.std(found.torque_nm)
-
-
-def test_power_sums_to_the_variance_and_a_line_is_where_it_is():
-    rng = np.random.default_rng(2)
-    values = rng.normal(size=2000) + 3.0
-    _, power = power_lines(values, 100.0)
-    assert power.sum() == pytest.approx(np.var(values))
-    f, power = power_lines(np.sin(2 * np.pi * 7.3 * np.arange(2000) / 100), 100.0, tapered=True)
-    assert f[np.argmax(power)] == pytest.approx(7.3, abs=0.05)
-    assert power.sum() == pytest.approx(0.5, rel=1e-3)
+    t, dt = np.arange(8000) / 200.0, 1 / 200.0
+    x = signal.sosfiltfilt(signal.butter(4, 5.0, fs=200.0, output="sos"), rng.normal(size=8000))
+    v = np.gradient(x, dt, edge_order=2)
+    torque = joint.torque_nm(x, v, np.gradient(v, dt, edge_order=2))
+    made = epoch((LeftOut(8.0, 9.0),), torque_nm=(t, torque), angle_rad=(t, x))
+    found = found_in(made, parse_settings({}))
+    assert found.time_s.size / found.rate_hz == pytest.approx(40 - 2 - 3, abs=0.02)
+    left = np.std(found.unexplained_nm(np.array([0.0045, 0.1368, 1.751])))
+    assert left < 0.02 * np.std(found.torque_nm)
