@@ -17,11 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigidimeter.analysis.estimation import (
-    epoch_signals,
-    estimate,
-    fit_inertia_damping_stiffness,
-)
+from rigidimeter.analysis import estimation
 from rigidimeter.core.records import Fit
 from rigidimeter.core.settings import Settings, SubjectSettings, parse_settings
 from rigidimeter.core.words import number
@@ -103,7 +99,8 @@ def _noise_runs(context: Context) -> NoiseRuns:
     batch = simulate_epochs(settings, runs, joints=[printed.SEC_34] * runs, conditions="OFF")
     epochs = [batch.epoch(i) for i in range(runs)]
     errors, as_printed = (
-        np.array([_fitted(fit) for fit in estimate(epochs, settings, method).fits]) - TRUTH
+        np.array([_fitted(fit) for fit in estimation.estimate(epochs, settings, method).fits])
+        - TRUTH
         for method in ("iv", "published")
     )
     perturbation = prbs_nm(settings.prbs, settings.rig.tick_rate_hz)
@@ -226,11 +223,13 @@ def _voluntary(context: Context) -> Mapping[str, Triple]:
     found = {"expected": errors_percent(TRUTH + np.array(bias))}
     # As the paper fits them: without weights.
     ordinary = [
-        fit_inertia_damping_stiffness(epoch_signals(epoch, settings, "bandlimited"))
+        estimation.fit_inertia_damping_stiffness(
+            estimation.epoch_signals(epoch, settings, "bandlimited")
+        )
         for epoch in epochs
     ]
     found["least squares"] = errors_percent(np.mean([fit.value for fit in ordinary], axis=0))
-    pooled = estimate(epochs, settings, "iv").pooled[0]
+    pooled = estimation.estimate(epochs, settings, "iv").pooled[0]
     found["iv"] = errors_percent(_fitted(pooled))
     return found
 

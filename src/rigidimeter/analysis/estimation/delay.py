@@ -399,6 +399,6 @@ def _of_other_terms(used: Sequence[Observation], pose: Pose, delay_s: float) -> 
             f"{first.label} explains the torque better; `rigidimeter model --compare` fits "
             "such terms"
         )
-    if by_s and not told.answered:
-        return "with the torque moved by it, something else is left that follows the motion"
+    if not told.answered:
+        return "beside it something else is left that follows the motion"
     return ""

@@ -113,16 +113,6 @@ SINGLE_FREQUENCY_SHARE = 0.85
 velocity shows steps to and fro. A sinusoid that fills half the epoch reaches 0.95, a PRBS in the
 closed loop 0.5."""
 
-WITHOUT_TERMS = (
-    "residual_perturbation",
-    "torque_delay",
-    "unweighted_fit",
-    "gravity",
-    "negative_parameters",
-    "implausible_parameters",
-)
-"""Findings of what J, B and K are, or leave, without terms that were found later."""
-
 DIFFERENT_INERTIA_PERCENT = 15.0
 """Recordings whose median J differ by more hardly are of one joint."""
 
@@ -510,8 +500,10 @@ def estimate_recorded(
         parts = _parts(estimator, epochs, observed, fits, fitted)
         if any(part.beside for part in parts):
             fitted = stage(counted, parts, pooled=True)
-            fits = [_as_checked(*both, parts) for both in zip(fits, fitted.fits, strict=True)]
-        pooled = [_as_checked(one, one, parts) for one in fitted.pooled]
+            each = zip(observed, fits, pulls, fitted.fits, strict=True)
+            both = [_checked_beside(estimator, *one, parts) for one in each]
+            fits, pulls = [fit for fit, _ in both], [pull for _, pull in both]
+        pooled = [_with_values(one, parts) for one in fitted.pooled]
         fits, pooled, bands = _together(estimator, counted, fits, pooled, parts, pulls, delays)
     progress(0.6)
     included = [fit.inertia_kg_m2 for fit in fits if fit.outcome.included]
@@ -521,9 +513,7 @@ def estimate_recorded(
         second = stage(epochs, parts, inertia_kg_m2, pooled=False).fits
         # What did not count in the first stage does not in the second.
         fixed = [
-            _as_checked(two, two, parts)
-            if one.outcome.included
-            else replace(two, outcome=one.outcome)
+            _with_values(two, parts) if one.outcome.included else replace(two, outcome=one.outcome)
             for one, two in zip(fits, second, strict=True)
         ]
     scores = [
@@ -821,23 +811,41 @@ def _beside(
     )
 
 
-def _as_checked(checked: Fit, fit: Fit, parts: Sequence[Part]) -> Fit:
-    """Return a fit beside terms with what its checks say still holds of it."""
-    own = [part for part in parts if part.places(checked)]
-    if not any(part.beside for part in own) or not checked.outcome.included:
-        return checked
-    still = [one for one in checked.findings if not _explained(one, fit)]
-    more = of_fit.values(own[0].problems[0].observation, fit)
+def _checked_beside(
+    method: Method,
+    seen: Observation | str,
+    checked: Fit,
+    pull: Pull,
+    fit: Fit,
+    parts: Sequence[Part],
+) -> tuple[Fit, Pull]:
+    """Return the fit of an epoch beside terms, checked again at the torque less theirs, and pull.
+
+    What was checked stays where there are no terms, and whether the epoch counts.
+    """
+    own = [part.problems[i] for part in parts if part.beside for i in part.places(checked)]
+    if not own or isinstance(seen, str):
+        return checked, pull
+    rest = replace(seen, torque_nm=own[0].target, motion=own[0].regressors)
+    pull = _pull(method, rest, fit)
+    found = [one for check in CHECKS for one in check(rest, fit, pull)]
+    # How active stretches change the fit was asked of both without terms.
+    kept = [one for one in checked.findings if one.name == "emg_activity"]
     return replace(
-        fit, outcome=checked.outcome, activity=checked.activity, findings=(*still, *more)
-    )
+        fit,
+        outcome=checked.outcome,
+        activity=checked.activity,
+        findings=(*fit.findings, *found, *kept),
+    ), pull
 
 
-def _explained(finding: Finding, fit: Fit) -> bool:
-    """Return whether a finding without terms is none beside them."""
-    if finding.name == "voluntary_torque":
-        return 100.0 - fit.vaf_percent < finding.limit
-    return finding.name in WITHOUT_TERMS
+def _with_values(fit: Fit, parts: Sequence[Part]) -> Fit:
+    """Return a fit beside terms with whether a joint can have these numbers."""
+    own = [part for part in parts if part.beside and part.places(fit)]
+    if not own or not fit.outcome.included:
+        return fit
+    more = of_fit.values(own[0].problems[0].observation, fit)
+    return replace(fit, findings=(*fit.findings, *more))
 
 
 def _together(

@@ -168,7 +168,6 @@ def test_nothing_is_said_beside_terms_of_what_was_without_them():
         assert weight.value == pytest.approx(truth[0, 2], rel=0.01)
 
 
-@pytest.mark.xfail(strict=True, reason="both are told of the fit without the reflex")
 def test_what_a_strong_reflex_takes_is_no_movement_of_the_subject_and_no_low_r_squared():
     both = {"reflex_nm_s_rad": 0.4, "reflex_delay_s": 0.06, "reflex_sides": 2.0}
     epochs, _ = scenario("a joint", joint=both).simulated(0, 2)

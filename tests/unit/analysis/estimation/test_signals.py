@@ -81,5 +81,5 @@ def test_signals_are_those_of_one_joint_without_ends_and_what_is_left_out():
     made = epoch((LeftOut(8.0, 9.0),), torque_nm=(t, torque), angle_rad=(t, x))
     found = found_in(made, parse_settings({}))
     assert found.time_s.size / found.rate_hz == pytest.approx(40 - 2 - 3, abs=0.02)
-    left = np.std(found.unexplained_nm(np.array([0.0045, 0.1368, 1.751])))
+    left = np.std(found.motion @ np.array([0.0045, 0.1368, 1.751]) - found.torque_nm)
     assert left < 0.02 * np.std(found.torque_nm)
