@@ -826,7 +826,8 @@ def _checked_beside(
     own = [part.problems[i] for part in parts if part.beside for i in part.places(checked)]
     if not own or isinstance(seen, str):
         return checked, pull
-    rest = replace(seen, torque_nm=own[0].target, motion=own[0].regressors)
+    terms_nm = seen.torque_nm - own[0].target
+    rest = replace(seen, motion=own[0].regressors, terms_nm=terms_nm)
     pull = _pull(method, rest, fit)
     found = [one for check in CHECKS for one in check(rest, fit, pull)]
     # How active stretches change the fit was asked of both without terms.

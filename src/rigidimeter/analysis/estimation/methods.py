@@ -179,7 +179,7 @@ def direct(observations: Sequence[Observation], values: Array) -> list[Problem]:
         if one.noise is not None:
             apart = one.noise * np.where(one.grid.line % 2, 1.0, -1.0)[:, None]
             motion, instruments = one.motion + apart, one.motion - apart
-        problems.append(Problem(instruments, motion, one.torque_nm, one))
+        problems.append(Problem(instruments, motion, one.torque_nm - one.terms_nm, one))
     return problems
 
 

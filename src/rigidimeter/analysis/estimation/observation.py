@@ -145,6 +145,8 @@ class Observation:
     settings : Settings
     grid : Grid
     torque_nm : complex array, shape (m,)
+    terms_nm : complex array, shape (m,)
+        What of the torque terms beside J, B and K take.
     motion : complex array, shape (m, 3)
         Acceleration, velocity and angle.
     coarse : array, shape (2, n)
@@ -171,6 +173,7 @@ class Observation:
     settings: Settings
     grid: Grid
     torque_nm: Complex
+    terms_nm: Complex
     motion: Complex
     coarse: Array
     noise: Complex | None
@@ -185,6 +188,10 @@ class Observation:
     def excited(self) -> NDArray[np.bool_]:
         """At which lines the perturbation has power, shape (m,)."""
         return np.asarray(self.grid.line % self.periods == 0)
+
+    def left(self, values: Array) -> Complex:
+        """Return the torque that J, B and K, and the terms beside them, leave, shape (m,)."""
+        return np.asarray(self.torque_nm - self.terms_nm - self.motion @ values)
 
     def of_lines(self, lines: Complex) -> Complex:
         """Return those of `cause` that are lines of this grid, shape (m, ...)."""
@@ -207,6 +214,7 @@ class Observation:
             motion=self.motion[lines],
             noise=None if self.noise is None else self.noise[lines],
             changes=self.changes[:, lines],
+            terms_nm=self.terms_nm[lines],
         )
 
 
@@ -347,6 +355,7 @@ def _at_lines(
         settings,
         grid,
         grid.lines(values_at(torque, time_s, SAME_TIME))[0],
+        np.zeros(grid.line.size, dtype=np.complex128),
         motion,
         grid.coarse(np.stack([velocity, angle])),
         apart,

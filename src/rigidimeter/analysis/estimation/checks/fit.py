@@ -118,7 +118,7 @@ def residual(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
     the second half's torque.
     """
     seen, settings = checked_lines(observation), observation.settings.diagnostics
-    power = np.abs(seen.torque_nm - seen.motion @ fit.value)[in_band(seen, hertz(seen.grid))] ** 2
+    power = np.abs(seen.left(fit.value))[in_band(seen, hertz(seen.grid))] ** 2
     groups = max(power.size // LINES_TOGETHER, 1)
     means = power[: groups * LINES_TOGETHER].reshape(groups, -1).mean(axis=1)
     value, more = math.nan, pull.told(fit, settings)
@@ -127,7 +127,8 @@ def residual(observation: Observation, fit: Fit, pull: Pull) -> list[Finding]:
         value = min(float(np.exp(np.mean(np.log(means)) + made_up) / np.mean(means)), 1.0)
     least = settings.min_residual_flatness
     results = at_least("residual_whiteness", settings, value, least, **more)
-    _, (torque, *columns), _ = in_time(seen.grid, np.stack([seen.torque_nm, *seen.motion.T]))
+    joints = seen.torque_nm - seen.terms_nm
+    _, (torque, *columns), _ = in_time(seen.grid, np.stack([joints, *seen.motion.T]))
     half, motion = torque.size // 2, np.stack(columns, axis=1)
     first, second = motion[:half], motion[half:]
     joint = shortest(first.T @ first, first.T @ torque[:half])

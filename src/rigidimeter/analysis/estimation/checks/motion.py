@@ -93,7 +93,12 @@ def checked_lines(seen: Observation) -> Observation:
     band = band_hz(seen.epoch, seen.settings.estimation)
     part = seen.part(slice(int(np.searchsorted(hertz(seen.grid), 2.0 * band[1]))))
     share = gain(part.grid, band)
-    return replace(part, torque_nm=share * part.torque_nm, motion=share[:, None] * part.motion)
+    return replace(
+        part,
+        torque_nm=share * part.torque_nm,
+        motion=share[:, None] * part.motion,
+        terms_nm=np.asarray(share * part.terms_nm),
+    )
 
 
 def in_band(seen: Observation, frequency_hz: Array) -> NDArray[np.bool_]:
@@ -183,7 +188,7 @@ def residual_perturbation(seen: Observation, cause: Complex, fit: Fit, pull: Pul
     them where torque of the subject does not: a single epoch is no proof.
     """
     settings, grid = seen.settings.diagnostics, seen.grid
-    left = seen.torque_nm - seen.motion @ fit.value
+    left = seen.left(fit.value)
     a, b, of_torque = (np.abs(lines) ** 2 for lines in (left, cause, seen.torque_nm))
     power, size = a * b, math.sqrt(np.sum(a) * np.sum(b))
     if size == 0.0 or not np.any(of_torque):
@@ -310,7 +315,8 @@ def _to_tremor(observation: Observation) -> Observation:
     grid = grid_of(channels, (low_hz, beyond_hz), settings.estimation.trim_s, holes_s)
     motion = grid.lines(kinematics(epoch, grid.time_s))[0].T
     torque_nm = grid.lines(values_at(channels[0], grid.time_s, SAME_TIME))[0]
-    return replace(observation, grid=grid, motion=motion, torque_nm=torque_nm)
+    none = np.zeros_like(torque_nm)
+    return replace(observation, grid=grid, motion=motion, torque_nm=torque_nm, terms_nm=none)
 
 
 def _steady(seen: Observation, values: Array) -> Complex:
@@ -323,7 +329,7 @@ def _steady(seen: Observation, values: Array) -> Complex:
     powers = np.asarray(np.polynomial.legendre.legvander(x, COURSE)[:, 1:].T, dtype=np.float64)
     course = grid.coarse_lines(powers).T
     course *= gain(grid, band_hz(seen.epoch, seen.settings.estimation))[:, None]
-    left = (seen.motion @ values.T).T - seen.torque_nm
+    left = -np.stack([seen.left(one) for one in values])
     gram, moments = ((lines @ course.conj()).real for lines in (course.T, left))
     return np.asarray(left - shortest(gram, moments) @ course.T)
 
