@@ -122,6 +122,55 @@ def test_without_the_command_the_interval_holds_what_the_drive_of_the_settings_t
     assert fit.high[0] - fit.low[0] < 0.03 * TRUTH[0]
 
 
+def first_epoch(name: str, recording: int):
+    """Return the first epoch of a scenario's recording, by instruments, and its joint."""
+    scenario = SCENARIOS[name]
+    epochs, truth = scenario.simulated(recording, 1)
+    (fit,) = estimate_recorded(prepare(epochs, scenario.analysed_with()), "iv").fits
+    return fit, truth[0]
+
+
+@pytest.mark.parametrize("recording", range(3))
+@pytest.mark.parametrize(
+    "name",
+    [
+        "encoder 0.05°, no velocity",
+        "encoder noise 0.2 mrad, no velocity",
+        "encoder noise 0.5 mrad, no velocity",
+    ],
+)
+def test_a_noisy_angle_shows_the_drive_as_far_as_the_interval_says(name, recording):
+    """A pole with a delay in place of two poles made J 5 to 40 % wrong; 40 epochs scatter by .1."""
+    fit, truth = first_epoch(name, recording)
+    assert fit.value[0] == pytest.approx(truth[0], rel=0.005)
+    assert fit.low[0] <= truth[0] <= fit.high[0]
+
+
+@pytest.mark.parametrize("recording", range(2))
+def test_the_angle_shows_the_drive_where_the_velocity_is_coarse(recording):
+    """What rounding leaves of the velocity is not white, and hides other drives: ±3 % of J."""
+    fit, truth = first_epoch("velocity in steps of 2°/s", recording)
+    assert fit.low[0] <= truth[0] <= fit.high[0]
+    assert fit.high[0] - fit.low[0] < 0.01 * truth[0]
+    assert "between_samples" not in {finding.name for finding in fit.findings}
+
+
+@pytest.mark.parametrize("name", ["torque motor", "torque motor, torque 5 ms late"])
+def test_a_motor_that_holds_its_torque_hides_nothing_of_j(name):
+    fit, truth = first_epoch(name, 0)
+    assert np.all((fit.low <= truth) & (truth <= fit.high))
+    assert "between_samples" not in {finding.name for finding in fit.findings}
+
+
+@pytest.mark.parametrize("bandwidth_hz", [20.0, 50.0])
+def test_behind_a_drive_without_its_command_the_range_of_j_is_told(bandwidth_hz):
+    recorded = run(DriveRig("PI", 1000.0, bandwidth_hz), 1)
+    kept = {n: one for n, one in recorded.channels.items() if n != "velocity_command_rad_s"}
+    (fit,) = estimate([replace(recorded, channels=kept)], "iv").fits
+    (finding,) = (one for one in fit.findings if one.name == "between_samples")
+    assert finding.facts["low_j"] < TRUTH[0] < finding.facts["high_j"]
+
+
 @pytest.fixture(scope="module")
 def scattered():
     scenario = SCENARIOS["5 % lost, stamps ±0.3 ms"]

@@ -66,6 +66,7 @@ LONGEST_S, LONGEST_TICKS, SHORTEST_TICKS = 0.1, 4.0, 0.25  # of delays
 PASSED_HZ = 10.0  # an angle is used as the velocity through a low-pass with this corner
 # Of stretches of past commands, ever longer the longer ago.
 EDGES_TICKS = (0, 1, *sorted(step << octave for octave in range(13) for step in (2, 3)))
+EACH = 4
 MOST_STEPS, ENOUGH = 12, 1e-4  # of a search; the last share of the power to gain
 STEP = 1e-4  # of a coordinate, for its slope
 FAR = 1e3  # a delay is not searched where more times the power of others is left near it
@@ -77,8 +78,10 @@ AS_GOOD, UNSEEN = 1.05, 2e-5
 # If what the best leaves is correlated by so much from sample to sample it is not noise, and one
 # that leaves so many times its power might be there.
 RIVAL, COLOURED = 4.0, 1 / 3
-# Where it is noise and no pole is faster than so many rad a tick, a drive whose information
-# criterion is above the best by more (Kass and Raftery 1995: strong evidence) is no rival.
+# Where it is noise the drive with the least information criterion is chosen: in much noise a pole
+# and a delay leave 1 % more than two poles, which is not as good. If no pole is faster than so many
+# rad a tick, one whose criterion is above the least by more (Kass and Raftery 1995: strong
+# evidence) is no rival.
 UNLIKELY, SLOW = 6.0, 1.0
 # Shares of the velocity's SD: where noise is larger the angle may show the drive better; where
 # more is left the command does not explain it.
@@ -165,7 +168,8 @@ def _lengths_s(command: Channel) -> float | Array:
 def find_drive(epochs: Sequence[Epoch], settings: Settings) -> Drive | None:
     """Return the drive that the first of some epochs shows; None where none does.
 
-    The motion is the velocity, or the angle where that is all there is or has less noise.
+    The motion is the velocity, or the angle where that is all there is, or where a drive leaves
+    less of it and that is noise.
 
     Parameters
     ----------
@@ -185,10 +189,11 @@ def find_drive(epochs: Sequence[Epoch], settings: Settings) -> Drive | None:
     for epoch in epochs[:MOST_TRIED]:
         found: list[tuple[float, bool, Drive]] = []
         for motion in motion_channels(epoch):  # the velocity first
-            if not found or (found[0][1] and found[0][0] > NOISY**2):
+            if not found or found[0][0] > NOISY**2:
                 found += _identified(epoch, motion, start)
         if found:
-            return min(found, key=lambda one: one[0])[2]
+            noise = [one for one in found if one[1]] or found[:1]
+            return min(noise, key=lambda one: one[0])[2]
     return None
 
 
@@ -302,12 +307,16 @@ def _identified(
     if slowly and _power_of_lines(found) < STAIRS * best.power:
         return []
     found = [one for one in found if _fastest(one) < SEEN]  # the samples show every pole
-    best = min(found, key=_power, default=best)
-    alike = (one for one in found if one.power <= times * best.power + UNSEEN**2)
-    chosen = next(alike, None)
-    if chosen is None or chosen.power > MISFIT**2 or not 0.5 < chosen.model.gain < 2.0:
+    if not found:
         return []
+    best = min(found, key=_power)
     noise = bool(best.left[1:] @ best.left[:-1] < COLOURED * best.left.size * best.power)
+    if noise and len(best.record.inputs) == 1:
+        chosen = min(found, key=_information)
+    else:
+        chosen = next(one for one in found if one.power <= times * best.power + UNSEEN**2)
+    if chosen.power > MISFIT**2 or not 0.5 < chosen.model.gain < 2.0:
+        return []
     most, likely = (times if noise else RIVAL) * best.power + UNSEEN**2, math.inf
     if noise and _fastest(chosen) < SLOW:
         likely = min(map(_information, found)) + UNLIKELY
@@ -523,11 +532,18 @@ def _coordinates(drive: DriveModel, interval_s: float, poles: int, beside: float
 @lru_cache(maxsize=2)
 def _past(record: _Record) -> Array:
     """Return independent sums of past commands at the stamps, shape (n, e)."""
-    sums = np.append(0.0, np.cumsum(record.command.values))
-    tick, _ = _since(record, 0.0)
-    edges = [sums[np.maximum(tick + 1 - lag, 0)] for lag in EDGES_TICKS if lag <= tick[-1]]
-    table = np.diff(edges, axis=0).T
+    table = past_sums(record.command.values, _since(record, 0.0)[0])
     return np.linalg.qr(table / (np.linalg.norm(table, axis=0) + TINY))[0]
+
+
+def past_sums(sent: Array, tick: Rows) -> Array:
+    """Return sums of what was sent up to each tick, ever longer the longer ago, shape (n, e).
+
+    The first `EACH` of them hold one tick each.
+    """
+    sums = np.append(0.0, np.cumsum(sent))
+    edges = [sums[np.maximum(tick + 1 - lag, 0)] for lag in EDGES_TICKS if lag <= tick[-1]]
+    return -np.diff(edges, axis=0).T
 
 
 def _explainable(one: _Fitted) -> float:
