@@ -122,42 +122,47 @@ def test_without_the_command_the_interval_holds_what_the_drive_of_the_settings_t
     assert fit.high[0] - fit.low[0] < 0.03 * TRUTH[0]
 
 
-def first_epoch(name: str, recording: int):
-    """Return the first epoch of a scenario's recording, by instruments, and its joint."""
+def pooled_fit(name: str, recording: int, method: str = "iv"):
+    """Return what a scenario's recording of four epochs gives, and its joint."""
     scenario = SCENARIOS[name]
-    epochs, truth = scenario.simulated(recording, 1)
-    (fit,) = estimate_recorded(prepare(epochs, scenario.analysed_with()), "iv").fits
-    return fit, truth[0]
-
-
-@pytest.mark.parametrize("recording", range(3))
-@pytest.mark.parametrize(
-    "name",
-    [
-        "encoder 0.05°, no velocity",
-        "encoder noise 0.2 mrad, no velocity",
-        "encoder noise 0.5 mrad, no velocity",
-    ],
-)
-def test_a_noisy_angle_shows_the_drive_as_far_as_the_interval_says(name, recording):
-    """A pole with a delay in place of two poles made J 5 to 40 % wrong; 40 epochs scatter by .1."""
-    fit, truth = first_epoch(name, recording)
-    assert fit.value[0] == pytest.approx(truth[0], rel=0.005)
-    assert fit.low[0] <= truth[0] <= fit.high[0]
+    epochs, truth = scenario.simulated(recording, 4)
+    recorded = prepare(epochs, scenario.analysed_with())
+    return estimate_recorded(recorded, method).pooled[0], truth[0]
 
 
 @pytest.mark.parametrize("recording", range(2))
-def test_the_angle_shows_the_drive_where_the_velocity_is_coarse(recording):
-    """What rounding leaves of the velocity is not white, and hides other drives: ±3 % of J."""
-    fit, truth = first_epoch("velocity in steps of 2°/s", recording)
+@pytest.mark.parametrize(
+    "name", ["encoder 0.05°, no velocity", "encoder noise 0.2 mrad, no velocity"]
+)
+def test_a_noisy_angle_shows_the_drive_over_four_epochs(name, recording):
+    """A pole with a delay in place of two poles made J 5 to 40 % wrong."""
+    fit, truth = pooled_fit(name, recording)
     assert fit.low[0] <= truth[0] <= fit.high[0]
-    assert fit.high[0] - fit.low[0] < 0.01 * truth[0]
+    assert fit.high[0] - fit.low[0] < 0.03 * truth[0]
     assert "between_samples" not in {finding.name for finding in fit.findings}
+
+
+@pytest.mark.parametrize("recording", range(2))
+def test_a_drive_that_noise_of_the_angle_hides_is_in_the_interval(recording):
+    fit, truth = pooled_fit("encoder noise 0.5 mrad, no velocity", recording)
+    assert fit.value[0] == pytest.approx(truth[0], rel=0.02)
+    assert fit.low[0] <= truth[0] <= fit.high[0]
+    assert "between_samples" in {finding.name for finding in fit.findings}
+
+
+@pytest.mark.parametrize("method", ["iv", "bandlimited"])
+def test_the_angle_is_used_where_the_velocity_is_coarse(method):
+    """What rounding leaves of the velocity hides other drives and takes .1 % off J."""
+    fits = [pooled_fit("velocity in steps of 2°/s", number, method) for number in range(3)]
+    for fit, truth in fits:
+        assert fit.high[0] - fit.low[0] < 0.005 * truth[0]
+        assert "between_samples" not in {finding.name for finding in fit.findings}
+    assert sum(fit.low[0] <= truth[0] <= fit.high[0] for fit, truth in fits) >= 2
 
 
 @pytest.mark.parametrize("name", ["torque motor", "torque motor, torque 5 ms late"])
 def test_a_motor_that_holds_its_torque_hides_nothing_of_j(name):
-    fit, truth = first_epoch(name, 0)
+    fit, truth = pooled_fit(name, 0)
     assert np.all((fit.low <= truth) & (truth <= fit.high))
     assert "between_samples" not in {finding.name for finding in fit.findings}
 

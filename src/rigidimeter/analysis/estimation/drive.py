@@ -50,7 +50,9 @@ from rigidimeter.model import (
 
 Values = Array | Complex
 
-MOST_TRIED = 5  # epochs of a recording, before its drive is taken for unknown
+# Epochs of a recording, before its drive is taken for unknown, or over which noise is averaged;
+# together if their rates differ by a smaller share.
+MOST_TRIED, SAME_RATE = 5, 0.01
 # Of the velocity, and of command and angle; more do not make a drive known any better that is not
 # quite linear.
 FEWEST_SAMPLES, MOST_SAMPLES, MOST_TICKS = 50, 3000, 8000
@@ -66,7 +68,7 @@ LONGEST_S, LONGEST_TICKS, SHORTEST_TICKS = 0.1, 4.0, 0.25  # of delays
 PASSED_HZ = 10.0  # an angle is used as the velocity through a low-pass with this corner
 # Of stretches of past commands, ever longer the longer ago.
 EDGES_TICKS = (0, 1, *sorted(step << octave for octave in range(13) for step in (2, 3)))
-EACH = 4
+EACH = 4  # of them hold one tick
 MOST_STEPS, ENOUGH = 12, 1e-4  # of a search; the last share of the power to gain
 STEP = 1e-4  # of a coordinate, for its slope
 FAR = 1e3  # a delay is not searched where more times the power of others is left near it
@@ -119,10 +121,13 @@ class Drive:
         From command to velocity.
     rivals : tuple of DriveModel
         Others that explain the velocity as well.
+    by_angle : bool
+        Whether the angle showed it: the velocity was not recorded or holds more noise.
     """
 
     model: DriveModel
     rivals: tuple[DriveModel, ...] = ()
+    by_angle: bool = False
 
     def motion(self, command: Channel, time_s: Array) -> Array:
         """Return acceleration, velocity, angle that the command causes from rest, shape (3, n)."""
@@ -186,11 +191,12 @@ def find_drive(epochs: Sequence[Epoch], settings: Settings) -> Drive | None:
     """
     rig = settings.rig
     start = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
-    for epoch in epochs[:MOST_TRIED]:
+    tried = epochs[:MOST_TRIED]
+    for number, epoch in enumerate(tried):
         found: list[tuple[float, bool, Drive]] = []
         for motion in motion_channels(epoch):  # the velocity first
             if not found or found[0][0] > NOISY**2:
-                found += _identified(epoch, motion, start)
+                found += _identified(tried[number:], motion.name, start)
         if found:
             noise = [one for one in found if one[1]] or found[:1]
             return min(noise, key=lambda one: one[0])[2]
@@ -216,6 +222,8 @@ class _Record:
         Its SD.
     every_s : float
         Where the angle was measured and `measured` is `_from_angle`: the interval of its stamps.
+    others : tuple of _Record
+        Of further epochs that show the same drive, in units of the same SD.
     """
 
     command: Channel
@@ -226,14 +234,21 @@ class _Record:
     measured: Array
     scale: float
     every_s: float = 0.0
+    others: tuple[_Record, ...] = ()
+
+    @property
+    def everything(self) -> Array:
+        """What was measured in all epochs."""
+        return np.concatenate([self.measured, *(one.measured for one in self.others)])
 
 
-def _record(epoch: Epoch, motion: Channel) -> _Record | None:
+def _record(epoch: Epoch, name: str) -> _Record | None:
     """Return what the drive is identified from; None where there is too little."""
-    command, stamps_s = epoch.channels.get("velocity_command_rad_s"), motion.time_s
-    if command is None or len(command) < 2 * FEWEST_SAMPLES:
+    command, motion = epoch.channels.get("velocity_command_rad_s"), epoch.channels.get(name)
+    if command is None or motion is None or len(command) < 2 * FEWEST_SAMPLES:
         return None
-    of_angle, last_s = motion.name == "angle_rad", command.time_s[:MOST_TICKS][-1]
+    of_angle, stamps_s = name == "angle_rad", motion.time_s
+    last_s = command.time_s[:MOST_TICKS][-1]
     holes = [one._replace(stop_s=one.stop_s + SETTLED_S * one.lost) for one in epoch.left_out]
     inside = sound(replace(epoch, left_out=tuple(holes)), stamps_s)
     inside &= (stamps_s >= command.time_s[0] + SETTLED_S) & (stamps_s <= last_s)
@@ -294,24 +309,29 @@ _power = attrgetter("power")
 
 
 def _identified(
-    epoch: Epoch, motion: Channel, start: DriveModel
+    epochs: Sequence[Epoch], motion: str, start: DriveModel
 ) -> list[tuple[float, bool, Drive]]:
-    """Return the drive that one channel shows, the power it leaves and whether that is noise."""
-    record = _record(epoch, motion)
+    """Return the drive that one channel shows, the power it leaves and whether that is noise.
+
+    That is of the first epoch; much noise is averaged over the others too.
+    """
+    record = _record(epochs[0], motion)
     if record is None:
         return []
     found = _climbed(record, start)
-    times = AS_GOOD if len(found[0].record.inputs) == 1 else RUBBED
-    best = min(found, key=_power)
-    slowly = epoch.ticks is None and best.power > QUIET**2 and _explainable(best) > 0.5 * STAIRS
+    rubs, best = len(found[0].record.inputs) > 1, min(found, key=_power)
+    slowly = epochs[0].ticks is None and best.power > QUIET**2
+    slowly = slowly and _explainable(best) > 0.5 * STAIRS
     if slowly and _power_of_lines(found) < STAIRS * best.power:
         return []
+    if best.power > NOISY**2 and _is_noise(best) and not rubs:
+        found = _climbed(_with_others(best, epochs[1:], motion), start)
     found = [one for one in found if _fastest(one) < SEEN]  # the samples show every pole
     if not found:
         return []
-    best = min(found, key=_power)
-    noise = bool(best.left[1:] @ best.left[:-1] < COLOURED * best.left.size * best.power)
-    if noise and len(best.record.inputs) == 1:
+    best, times = min(found, key=_power), RUBBED if rubs else AS_GOOD
+    noise = _is_noise(best)
+    if noise and not rubs:
         chosen = min(found, key=_information)
     else:
         chosen = next(one for one in found if one.power <= times * best.power + UNSEEN**2)
@@ -322,7 +342,28 @@ def _identified(
         likely = min(map(_information, found)) + UNLIKELY
     rivals = [one for one in found if one.power <= most and _information(one) <= likely]
     others = [one.model for one in (*rivals, *_neighbours(chosen)) if one is not chosen]
-    return [(chosen.power, noise, Drive(chosen.model, tuple(others)))]
+    drive = Drive(chosen.model, tuple(others), by_angle=motion == "angle_rad")
+    return [(chosen.power, noise, drive)]
+
+
+def _with_others(best: _Fitted, epochs: Sequence[Epoch], motion: str) -> _Record:
+    """Return the record with those of epochs that came as often and that the drive explains too."""
+    own = best.record
+    records = (_record(epoch, motion) for epoch in epochs)
+    others = tuple(
+        replace(one, measured=one.measured * (one.scale / own.scale))
+        for one in records
+        if one is not None
+        and math.isclose(one.interval_s, own.interval_s, rel_tol=SAME_RATE)
+        and math.isclose(one.every_s, own.every_s, rel_tol=SAME_RATE)
+        and _answer(one, best.place, best.zeros).power < RIVAL * best.power
+    )
+    return replace(own, others=others)
+
+
+def _is_noise(one: _Fitted) -> bool:
+    """Return whether what a drive leaves is not correlated from sample to sample."""
+    return bool(one.left[1:] @ one.left[:-1] < COLOURED * one.left.size * one.power)
 
 
 def _fastest(one: _Fitted) -> float:
@@ -363,7 +404,8 @@ def _climbed(record: _Record, start: DriveModel) -> list[_Fitted]:
         if rubs:
             continue
         share, before = _explainable(best), spent
-        rubbed = best.power > QUIET**2 and _rubbed(found[1], best.power * (1.0 - share))
+        alone = not record.others  # else what one leaves is noise, and no friction
+        rubbed = alone and best.power > QUIET**2 and _rubbed(found[1], best.power * (1.0 - share))
         if rubbed:
             return _climbed(rubbed.record, rubbed.model)
         spent = share < WORTH
@@ -394,7 +436,7 @@ def _best(record: _Record, begins: Sequence[Array], zeros: int, least: float) ->
     if ticks.size and late.power > FAR * (least + UNSEEN**2):
         return still
     moved = _searched(record, late.place, zeros, True)
-    shown = 1.0 - ERRORS**2 / record.measured.size if len(record.inputs) == 1 else 1.0 / RUBBED
+    shown = 1.0 - ERRORS**2 / still.left.size if len(record.inputs) == 1 else 1.0 / RUBBED
     return moved if moved.place[-1] > 0 and moved.power < shown * still.power else still
 
 
@@ -430,8 +472,9 @@ def _answer(record: _Record, place: Array, zeros: int) -> _Fitted:
     table = _table(record, place, zeros)
     size = np.linalg.norm(table, axis=1) + TINY
     scaled = table / size[:, None]
-    numerator = np.linalg.lstsq(scaled @ scaled.T, scaled @ record.measured)[0] / size
-    left = numerator @ table - record.measured
+    measured = record.everything
+    numerator = np.linalg.lstsq(scaled @ scaled.T, scaled @ measured)[0] / size
+    left = numerator @ table - measured
     return _Fitted(record, place, zeros, numerator, table, left, float(left @ left) / left.size)
 
 
@@ -451,10 +494,11 @@ def _table(record: _Record, place: Array, zeros: int) -> Array:
     for which, terms in enumerate((zeros + 1, place.size - 1)[: len(record.inputs)]):
         modes = [_mode(record, which, pole, 0.0 if which else delay_s) for pole in poles]
         parts.append(((_shapes(poles, terms - 1).T * twice) @ np.stack(modes)).real)
-    return np.concatenate(parts)
+    own = np.concatenate(parts)
+    return np.hstack([own, *(_table(one, place, zeros) for one in record.others)])
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _mode(record: _Record, which: int, pole: complex, delay_s: float) -> Values:
     """Return x of x' = λ x + c at the stamps; for an angle what `_from_angle` makes of ∫ x dt."""
     values, (tick, held_s) = record.inputs[which], _since(record, delay_s)
@@ -472,7 +516,7 @@ def _mode(record: _Record, which: int, pole: complex, delay_s: float) -> Values:
     return _from_angle((state - summed[tick] - held_s * mean[tick]) / growth, record.every_s)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def _since(record: _Record, delay_s: float) -> tuple[Rows, Array | float]:
     tick, after_s = since_ticks(record.command, record.time_s, delay_s, even=0.0)
     return tick, same_time(after_s)
@@ -532,7 +576,8 @@ def _coordinates(drive: DriveModel, interval_s: float, poles: int, beside: float
 @lru_cache(maxsize=2)
 def _past(record: _Record) -> Array:
     """Return independent sums of past commands at the stamps, shape (n, e)."""
-    table = past_sums(record.command.values, _since(record, 0.0)[0])
+    each = [past_sums(one.command.values, _since(one, 0.0)[0]) for one in (record, *record.others)]
+    table = np.vstack([one[:, : min(len(one.T) for one in each)] for one in each])
     return np.linalg.qr(table / (np.linalg.norm(table, axis=0) + TINY))[0]
 
 

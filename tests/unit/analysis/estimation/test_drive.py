@@ -93,6 +93,26 @@ def test_in_noise_a_pole_and_a_delay_do_not_pass_for_two_poles(seed):
     assert found.delay_s == 0.0
 
 
+def test_noise_is_averaged_over_the_epochs_that_show_the_same_drive():
+    """The pole of four epochs scatters half as much as that of one; others add nothing."""
+    model, errors = DriveModel.second_order(50.0, 0.7), []
+    for seed in range(0, 40, 4):
+        epochs = []
+        for number in range(seed, seed + 4):
+            command = sent(3000, 1000.0, number)
+            clean = Drive(model).motion(command, command.time_s)[1]
+            epochs.append(recorded(command, noisy(clean, 0.05, number)))
+        alone, together = (find_drive(some, SETTINGS) for some in (epochs[:1], epochs))
+        poles = [one.model.poles_rad_s[0] - model.poles_rad_s[0] for one in (alone, together)]
+        errors.append(np.abs(poles))
+    one, four = np.sqrt(np.mean(np.square(errors), axis=0))
+    assert four < 0.75 * one
+    unlike = recorded(command, np.random.default_rng(4).standard_normal(3000))
+    slower = recorded(sent(3000, 500.0, 39), clean)
+    found = find_drive([epochs[0], unlike, slower], SETTINGS)
+    assert found.model == alone.model
+
+
 @pytest.mark.parametrize("rate_hz", [1000.0, 200.0])
 def test_dry_friction_does_not_bend_the_poles(rate_hz):
     """A PI drive with friction F sgn(v), by steps of a twentieth of a tick."""
