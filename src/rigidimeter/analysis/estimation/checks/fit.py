@@ -356,8 +356,8 @@ def controller_shown(seen: Observation, cause: Complex | None = None) -> Shown:
     def compare(controller: ControllerSettings) -> tuple[float, float, NDArray[np.bool_]]:
         """Return misfit in %, factor, and which lines were compared."""
         J, B = controller.inertia_kg_m2, controller.damping_nm_s_rad
-        decay, gain = admittance(J, B, 1.0 / rate_hz)
-        made = asked * gain / (1.0 - decay / z)
+        decay, share = admittance(J, B, 1.0 / rate_hz)
+        made = asked * share / (1.0 - decay / z)
         apart, power = np.abs(sent - made), np.abs(sent) ** 2
         kept = np.abs(np.arange(sent.size) - np.argmax(apart)) > LINE_BINS
         if not np.sum(power[kept]) > LEAST_LEFT * np.sum(power):
