@@ -6,9 +6,8 @@ a drive of second order and 50 Hz, sampled at 1 kHz at the ticks, it is 0.8 % sm
 drive 14 %, and all of that would be taken from J.
 
 The velocity is linear in the numerator of a drive, so poles and delay alone are searched (variable
-projection; Golub and Pereyra 1973; slopes after Kaufman 1975). With even samples the search begins
-at the poles of v_k = Σ a_i v_(k−i) + Σ b_i c_(k−i) with past commands as instruments. A drive with
-dry friction answers the sign of its velocity as well, with the same poles and another numerator.
+projection; Golub and Pereyra 1973; slopes after Kaufman 1975). A drive with dry friction answers
+the sign of its velocity as well, with the same poles and another numerator.
 
 Torque sampled δ after the ticks holds the acceleration of that time, the samples of the velocity
 give another one. With H the drive, F a low-pass in the torque sensor, z = e^(jωT) and * the
@@ -63,7 +62,9 @@ MOST_POLES = 4  # a velocity PI has two; a lag and a position loop add one each
 # the samples show poles up to the last, of which 1 % is left at the next tick.
 SLOWEST, FASTEST, QUICKEST, SEEN = 5e-4, 6.0, 3.0, 4.6
 DOUBLE = 1e-4  # poles this close, as a share of their size, are taken for so far apart
-BESIDE = 0.3, 4.0  # where the search for a further pole begins, in times the first
+# Where a search begins: the drive of the settings, halved so often; a further pole, in times the
+# first.
+SPEEDS, BESIDE = 6, (0.3, 2.0)
 LONGEST_S, LONGEST_TICKS, SHORTEST_TICKS = 0.1, 4.0, 0.25  # of delays
 PASSED_HZ = 10.0  # an angle is used as the velocity through a low-pass with this corner
 # Of stretches of past commands, ever longer the longer ago.
@@ -385,10 +386,8 @@ def _climbed(record: _Record, start: DriveModel) -> list[_Fitted]:
     With friction instead, where that leaves less than any linear drive would.
     """
     rubs = len(record.inputs) > 1
-    regressed = [] if rubs else _regressed(record)
-    speeds = 2.0 ** -np.arange(1 if rubs or regressed else 6)
+    speeds = 2.0 ** -np.arange(1 if rubs else SPEEDS)
     models = [replace(start, poles_rad_s=tuple(x * p for p in start.poles_rad_s)) for x in speeds]
-    models += regressed
     found: list[_Fitted] = []
     spent = False
     for poles in range(2, MOST_POLES + 1):
@@ -600,25 +599,6 @@ def _explainable(one: _Fitted) -> float:
     n, e = past.shape
     share = np.sum((one.left @ past) ** 2) / (one.power * n + TINY)
     return float(1.0 - (1.0 - share) * n / max(n - e, 1))
-
-
-def _regressed(record: _Record) -> list[DriveModel]:
-    """Return a drive with the poles of a regression on even samples; or none."""
-    tick, held_s = _since(record, 0.0)
-    rows = np.arange(MOST_POLES, tick.size)
-    rows = rows[tick[rows] - tick[rows - MOST_POLES] == MOST_POLES]
-    if np.ndim(held_s) or np.ndim(record.lengths_s) or rows.size < FEWEST_SAMPLES:
-        return []
-    sent, lags = record.command.values, np.arange(MOST_POLES + 2)
-    if record.every_s:
-        sent = np.real(_from_angle(np.cumsum(sent), record.every_s))
-    measured = record.measured[rows[:, None] - lags[:-1]]
-    table = np.hstack([measured, sent[np.maximum(tick[rows][:, None] - lags, 0)]])
-    table = _past(record)[rows].T @ table
-    values = np.linalg.lstsq(table[:, 1:], table[:, 0], rcond=1e-12)[0]
-    shown = np.log(np.roots([1.0, *-values[:MOST_POLES]]) + 0j)
-    shown = shown[(shown.real < 0) & (shown.imag >= 0) & (shown.imag < math.pi)]
-    return [DriveModel(tuple((shown / record.interval_s).tolist()), ())] if shown.size else []
 
 
 def _rubbed(one: _Fitted, least: float) -> _Fitted | None:
