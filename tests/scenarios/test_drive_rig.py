@@ -122,6 +122,60 @@ def test_without_the_command_the_interval_holds_what_the_drive_of_the_settings_t
     assert fit.high[0] - fit.low[0] < 0.03 * TRUTH[0]
 
 
+def pooled_fit(name: str, recording: int, method: str = "iv"):
+    """Return what a scenario's recording of four epochs gives, and its joint."""
+    scenario = SCENARIOS[name]
+    epochs, truth = scenario.simulated(recording, 4)
+    recorded = prepare(epochs, scenario.analysed_with())
+    return estimate_recorded(recorded, method).pooled[0], truth[0]
+
+
+@pytest.mark.parametrize("recording", range(2))
+@pytest.mark.parametrize(
+    "name", ["encoder 0.05°, no velocity", "encoder noise 0.2 mrad, no velocity"]
+)
+def test_a_noisy_angle_shows_the_drive_over_four_epochs(name, recording):
+    """A pole with a delay in place of two poles made J 5 to 40 % wrong."""
+    fit, truth = pooled_fit(name, recording)
+    assert fit.low[0] <= truth[0] <= fit.high[0]
+    assert fit.high[0] - fit.low[0] < 0.03 * truth[0]
+    assert "between_samples" not in {finding.name for finding in fit.findings}
+
+
+@pytest.mark.parametrize("recording", range(2))
+def test_a_drive_that_noise_of_the_angle_hides_is_in_the_interval(recording):
+    fit, truth = pooled_fit("encoder noise 0.5 mrad, no velocity", recording)
+    assert fit.value[0] == pytest.approx(truth[0], rel=0.02)
+    assert fit.low[0] <= truth[0] <= fit.high[0]
+    assert "between_samples" in {finding.name for finding in fit.findings}
+
+
+@pytest.mark.parametrize("method", ["iv", "bandlimited"])
+def test_the_angle_is_used_where_the_velocity_is_coarse(method):
+    """What rounding leaves of the velocity hides other drives and takes .1 % off J."""
+    fits = [pooled_fit("velocity in steps of 2°/s", number, method) for number in range(3)]
+    for fit, truth in fits:
+        assert fit.high[0] - fit.low[0] < 0.005 * truth[0]
+        assert "between_samples" not in {finding.name for finding in fit.findings}
+    assert sum(fit.low[0] <= truth[0] <= fit.high[0] for fit, truth in fits) >= 2
+
+
+@pytest.mark.parametrize("name", ["torque motor", "torque motor, torque 5 ms late"])
+def test_a_motor_that_holds_its_torque_hides_nothing_of_j(name):
+    fit, truth = pooled_fit(name, 0)
+    assert np.all((fit.low <= truth) & (truth <= fit.high))
+    assert "between_samples" not in {finding.name for finding in fit.findings}
+
+
+@pytest.mark.parametrize("bandwidth_hz", [20.0, 50.0])
+def test_behind_a_drive_without_its_command_the_range_of_j_is_told(bandwidth_hz):
+    recorded = run(DriveRig("PI", 1000.0, bandwidth_hz), 1)
+    kept = {n: one for n, one in recorded.channels.items() if n != "velocity_command_rad_s"}
+    (fit,) = estimate([replace(recorded, channels=kept)], "iv").fits
+    (finding,) = (one for one in fit.findings if one.name == "between_samples")
+    assert finding.facts["low_j"] < TRUTH[0] < finding.facts["high_j"]
+
+
 @pytest.fixture(scope="module")
 def scattered():
     scenario = SCENARIOS["5 % lost, stamps ±0.3 ms"]

@@ -66,11 +66,10 @@ TURNS_S = 0.005
 
 
 class Found(NamedTuple):
-    """The delay of epochs, with its standard error, and the solution of which it is the last."""
+    """The delay of epochs, with its standard error."""
 
     delay_s: float
     error_s: float
-    solution: Solution
 
 
 Observe = Callable[[Sequence[Ready]], list[Observation]]
@@ -99,20 +98,20 @@ def delay_of(
         pose = instrumental
     longest_s = estimation.max_delay_s
     try:
-        found = _settled(used, plain, pose, again, longest_s)
+        late = _settled(used, plain, pose, again, longest_s)
     except ValueError as error:
         return Delay(source, remark=f"the delay of the torque was not estimated: {error}")
-    if found is None or abs(found.delay_s) > longest_s - SCAN_STEP_S / 2:
+    if late is None or abs(late.delay_s) > longest_s - SCAN_STEP_S / 2:
         return Delay(
             source,
             remark=f"no delay of the torque within ±{1e3 * longest_s:g} ms explains it "
             "(estimation.max_delay_s)",
         )
-    delay = Delay(source, found.delay_s, found.error_s)
-    if not matters(found.delay_s, found.error_s):
+    delay = Delay(source, *late)
+    if not matters(*late):
         why = f"shorter than {1e3 * LEAST_S:g} ms or not significantly different from zero"
         return replace(delay, remark=f"not corrected: {why}")
-    if why := _of_other_terms(plain, pose, found.delay_s):
+    if why := _of_other_terms(plain, pose, late.delay_s):
         return replace(delay, remark=f"not corrected: {why}")
     if not estimation.correct_delay:
         return replace(delay, remark="not corrected: estimation.correct_delay is false")
@@ -288,7 +287,7 @@ def _settled(
     left_s, error_s = float(first.values[-1]), float(first.se[-1])
     jumps = any(one.drive is not None and one.drive.model.jump for one in used)
     if not matters(left_s, error_s) and (jumps or pose is direct):
-        return Found(left_s, error_s, first)  # it shows without a move
+        return Found(left_s, error_s)  # it shows without a move
     tried, total_s, stretch, solution = [(0.0, left_s)], left_s, 1.0, first
     for _ in range(ROUNDS):
         if abs(left_s) < SETTLED_S or abs(total_s) > longest_s:
@@ -307,7 +306,7 @@ def _settled(
             f"it did not settle in {ROUNDS} rounds: {1e3 * left_s:.2g} ms are left at "
             f"{1e3 * total_s:.3g} ms"
         )
-    return Found(total_s, error_s * max(abs(stretch), 1.0), solution)
+    return Found(total_s, error_s * max(abs(stretch), 1.0))
 
 
 def _searched(observations: Sequence[Observation], pose: Pose, longest_s: float) -> Solution | None:
@@ -325,13 +324,13 @@ def _searched(observations: Sequence[Observation], pose: Pose, longest_s: float)
         turned = [_turned(one, near_s) for one in problems]
         near = shortest(*sums(turned, powers))
         try:
-            found = solve(observations, delayed(pose), np.append(near, near_s))
+            there = solve(observations, delayed(pose), np.append(near, near_s))
         except ValueError:
             continue  # nothing settles from there
-        if abs(found.values[-1]) > longest_s or found.values[0] <= 0:
+        if abs(there.values[-1]) > longest_s or there.values[0] <= 0:
             continue  # no joint has a negative inertia
-        if best is None or likelihood(found) > likelihood(best):
-            best = found
+        if best is None or likelihood(there) > likelihood(best):
+            best = there
     return best
 
 

@@ -6,9 +6,8 @@ a drive of second order and 50 Hz, sampled at 1 kHz at the ticks, it is 0.8 % sm
 drive 14 %, and all of that would be taken from J.
 
 The velocity is linear in the numerator of a drive, so poles and delay alone are searched (variable
-projection; Golub and Pereyra 1973; slopes after Kaufman 1975). With even samples the search begins
-at the poles of v_k = Σ a_i v_(k−i) + Σ b_i c_(k−i) with past commands as instruments. A drive with
-dry friction answers the sign of its velocity as well, with the same poles and another numerator.
+projection; Golub and Pereyra 1973; slopes after Kaufman 1975). A drive with dry friction answers
+the sign of its velocity as well, with the same poles and another numerator.
 
 Torque sampled δ after the ticks holds the acceleration of that time, the samples of the velocity
 give another one. With H the drive, F a low-pass in the torque sensor, z = e^(jωT) and * the
@@ -50,7 +49,9 @@ from rigidimeter.model import (
 
 Values = Array | Complex
 
-MOST_TRIED = 5  # epochs of a recording, before its drive is taken for unknown
+# Epochs of a recording, before its drive is taken for unknown, or over which noise is averaged;
+# together if their rates differ by a smaller share.
+MOST_TRIED, SAME_RATE = 5, 0.01
 # Of the velocity, and of command and angle; more do not make a drive known any better that is not
 # quite linear.
 FEWEST_SAMPLES, MOST_SAMPLES, MOST_TICKS = 50, 3000, 8000
@@ -61,11 +62,14 @@ MOST_POLES = 4  # a velocity PI has two; a lag and a position loop add one each
 # the samples show poles up to the last, of which 1 % is left at the next tick.
 SLOWEST, FASTEST, QUICKEST, SEEN = 5e-4, 6.0, 3.0, 4.6
 DOUBLE = 1e-4  # poles this close, as a share of their size, are taken for so far apart
-BESIDE = 0.3, 4.0  # where the search for a further pole begins, in times the first
+# Where a search begins: the drive of the settings, halved so often; a further pole, in times the
+# first.
+SPEEDS, BESIDE = 6, (0.3, 2.0)
 LONGEST_S, LONGEST_TICKS, SHORTEST_TICKS = 0.1, 4.0, 0.25  # of delays
 PASSED_HZ = 10.0  # an angle is used as the velocity through a low-pass with this corner
 # Of stretches of past commands, ever longer the longer ago.
 EDGES_TICKS = (0, 1, *sorted(step << octave for octave in range(13) for step in (2, 3)))
+EACH = 4  # of them hold one tick
 MOST_STEPS, ENOUGH = 12, 1e-4  # of a search; the last share of the power to gain
 STEP = 1e-4  # of a coordinate, for its slope
 FAR = 1e3  # a delay is not searched where more times the power of others is left near it
@@ -77,8 +81,10 @@ AS_GOOD, UNSEEN = 1.05, 2e-5
 # If what the best leaves is correlated by so much from sample to sample it is not noise, and one
 # that leaves so many times its power might be there.
 RIVAL, COLOURED = 4.0, 1 / 3
-# Where it is noise and no pole is faster than so many rad a tick, a drive whose information
-# criterion is above the best by more (Kass and Raftery 1995: strong evidence) is no rival.
+# Where it is noise the drive with the least information criterion is chosen: in much noise a pole
+# and a delay leave 1 % more than two poles, which is not as good. If no pole is faster than so many
+# rad a tick, one whose criterion is above the least by more (Kass and Raftery 1995: strong
+# evidence) is no rival.
 UNLIKELY, SLOW = 6.0, 1.0
 # Shares of the velocity's SD: where noise is larger the angle may show the drive better; where
 # more is left the command does not explain it.
@@ -116,10 +122,13 @@ class Drive:
         From command to velocity.
     rivals : tuple of DriveModel
         Others that explain the velocity as well.
+    by_angle : bool
+        Whether the angle showed it: the velocity was not recorded or holds more noise.
     """
 
     model: DriveModel
     rivals: tuple[DriveModel, ...] = ()
+    by_angle: bool = False
 
     def motion(self, command: Channel, time_s: Array) -> Array:
         """Return acceleration, velocity, angle that the command causes from rest, shape (3, n)."""
@@ -165,7 +174,8 @@ def _lengths_s(command: Channel) -> float | Array:
 def find_drive(epochs: Sequence[Epoch], settings: Settings) -> Drive | None:
     """Return the drive that the first of some epochs shows; None where none does.
 
-    The motion is the velocity, or the angle where that is all there is or has less noise.
+    The motion is the velocity, or the angle where that is all there is, or where a drive leaves
+    less of it and that is noise.
 
     Parameters
     ----------
@@ -182,13 +192,15 @@ def find_drive(epochs: Sequence[Epoch], settings: Settings) -> Drive | None:
     """
     rig = settings.rig
     start = DriveModel.second_order(rig.drive_bandwidth_hz, rig.drive_damping_ratio)
-    for epoch in epochs[:MOST_TRIED]:
+    tried = epochs[:MOST_TRIED]
+    for number, epoch in enumerate(tried):
         found: list[tuple[float, bool, Drive]] = []
         for motion in motion_channels(epoch):  # the velocity first
-            if not found or (found[0][1] and found[0][0] > NOISY**2):
-                found += _identified(epoch, motion, start)
+            if not found or found[0][0] > NOISY**2:
+                found += _identified(tried[number:], motion.name, start)
         if found:
-            return min(found, key=lambda one: one[0])[2]
+            noise = [one for one in found if one[1]] or found[:1]
+            return min(noise, key=lambda one: one[0])[2]
     return None
 
 
@@ -211,6 +223,8 @@ class _Record:
         Its SD.
     every_s : float
         Where the angle was measured and `measured` is `_from_angle`: the interval of its stamps.
+    others : tuple of _Record
+        Of further epochs that show the same drive, in units of the same SD.
     """
 
     command: Channel
@@ -221,14 +235,21 @@ class _Record:
     measured: Array
     scale: float
     every_s: float = 0.0
+    others: tuple[_Record, ...] = ()
+
+    @property
+    def everything(self) -> Array:
+        """What was measured in all epochs."""
+        return np.concatenate([self.measured, *(one.measured for one in self.others)])
 
 
-def _record(epoch: Epoch, motion: Channel) -> _Record | None:
+def _record(epoch: Epoch, name: str) -> _Record | None:
     """Return what the drive is identified from; None where there is too little."""
-    command, stamps_s = epoch.channels.get("velocity_command_rad_s"), motion.time_s
-    if command is None or len(command) < 2 * FEWEST_SAMPLES:
+    command, motion = epoch.channels.get("velocity_command_rad_s"), epoch.channels.get(name)
+    if command is None or motion is None or len(command) < 2 * FEWEST_SAMPLES:
         return None
-    of_angle, last_s = motion.name == "angle_rad", command.time_s[:MOST_TICKS][-1]
+    of_angle, stamps_s = name == "angle_rad", motion.time_s
+    last_s = command.time_s[:MOST_TICKS][-1]
     holes = [one._replace(stop_s=one.stop_s + SETTLED_S * one.lost) for one in epoch.left_out]
     inside = sound(replace(epoch, left_out=tuple(holes)), stamps_s)
     inside &= (stamps_s >= command.time_s[0] + SETTLED_S) & (stamps_s <= last_s)
@@ -289,31 +310,61 @@ _power = attrgetter("power")
 
 
 def _identified(
-    epoch: Epoch, motion: Channel, start: DriveModel
+    epochs: Sequence[Epoch], motion: str, start: DriveModel
 ) -> list[tuple[float, bool, Drive]]:
-    """Return the drive that one channel shows, the power it leaves and whether that is noise."""
-    record = _record(epoch, motion)
+    """Return the drive that one channel shows, the power it leaves and whether that is noise.
+
+    That is of the first epoch; much noise is averaged over the others too.
+    """
+    record = _record(epochs[0], motion)
     if record is None:
         return []
     found = _climbed(record, start)
-    times = AS_GOOD if len(found[0].record.inputs) == 1 else RUBBED
-    best = min(found, key=_power)
-    slowly = epoch.ticks is None and best.power > QUIET**2 and _explainable(best) > 0.5 * STAIRS
+    rubs, best = len(found[0].record.inputs) > 1, min(found, key=_power)
+    slowly = epochs[0].ticks is None and best.power > QUIET**2
+    slowly = slowly and _explainable(best) > 0.5 * STAIRS
     if slowly and _power_of_lines(found) < STAIRS * best.power:
         return []
+    if best.power > NOISY**2 and _is_noise(best) and not rubs:
+        found = _climbed(_with_others(best, epochs[1:], motion), start)
     found = [one for one in found if _fastest(one) < SEEN]  # the samples show every pole
-    best = min(found, key=_power, default=best)
-    alike = (one for one in found if one.power <= times * best.power + UNSEEN**2)
-    chosen = next(alike, None)
-    if chosen is None or chosen.power > MISFIT**2 or not 0.5 < chosen.model.gain < 2.0:
+    if not found:
         return []
-    noise = bool(best.left[1:] @ best.left[:-1] < COLOURED * best.left.size * best.power)
+    best, times = min(found, key=_power), RUBBED if rubs else AS_GOOD
+    noise = _is_noise(best)
+    if noise and not rubs:
+        chosen = min(found, key=_information)
+    else:
+        chosen = next(one for one in found if one.power <= times * best.power + UNSEEN**2)
+    if chosen.power > MISFIT**2 or not 0.5 < chosen.model.gain < 2.0:
+        return []
     most, likely = (times if noise else RIVAL) * best.power + UNSEEN**2, math.inf
     if noise and _fastest(chosen) < SLOW:
         likely = min(map(_information, found)) + UNLIKELY
     rivals = [one for one in found if one.power <= most and _information(one) <= likely]
     others = [one.model for one in (*rivals, *_neighbours(chosen)) if one is not chosen]
-    return [(chosen.power, noise, Drive(chosen.model, tuple(others)))]
+    drive = Drive(chosen.model, tuple(others), by_angle=motion == "angle_rad")
+    return [(chosen.power, noise, drive)]
+
+
+def _with_others(best: _Fitted, epochs: Sequence[Epoch], motion: str) -> _Record:
+    """Return the record with those of epochs that came as often and that the drive explains too."""
+    own = best.record
+    records = (_record(epoch, motion) for epoch in epochs)
+    others = tuple(
+        replace(one, measured=one.measured * (one.scale / own.scale))
+        for one in records
+        if one is not None
+        and math.isclose(one.interval_s, own.interval_s, rel_tol=SAME_RATE)
+        and math.isclose(one.every_s, own.every_s, rel_tol=SAME_RATE)
+        and _answer(one, best.place, best.zeros).power < RIVAL * best.power
+    )
+    return replace(own, others=others)
+
+
+def _is_noise(one: _Fitted) -> bool:
+    """Return whether what a drive leaves is not correlated from sample to sample."""
+    return bool(one.left[1:] @ one.left[:-1] < COLOURED * one.left.size * one.power)
 
 
 def _fastest(one: _Fitted) -> float:
@@ -335,10 +386,8 @@ def _climbed(record: _Record, start: DriveModel) -> list[_Fitted]:
     With friction instead, where that leaves less than any linear drive would.
     """
     rubs = len(record.inputs) > 1
-    regressed = [] if rubs else _regressed(record)
-    speeds = 2.0 ** -np.arange(1 if rubs or regressed else 6)
+    speeds = 2.0 ** -np.arange(1 if rubs else SPEEDS)
     models = [replace(start, poles_rad_s=tuple(x * p for p in start.poles_rad_s)) for x in speeds]
-    models += regressed
     found: list[_Fitted] = []
     spent = False
     for poles in range(2, MOST_POLES + 1):
@@ -354,7 +403,8 @@ def _climbed(record: _Record, start: DriveModel) -> list[_Fitted]:
         if rubs:
             continue
         share, before = _explainable(best), spent
-        rubbed = best.power > QUIET**2 and _rubbed(found[1], best.power * (1.0 - share))
+        alone = not record.others  # else what one leaves is noise, and no friction
+        rubbed = alone and best.power > QUIET**2 and _rubbed(found[1], best.power * (1.0 - share))
         if rubbed:
             return _climbed(rubbed.record, rubbed.model)
         spent = share < WORTH
@@ -385,7 +435,7 @@ def _best(record: _Record, begins: Sequence[Array], zeros: int, least: float) ->
     if ticks.size and late.power > FAR * (least + UNSEEN**2):
         return still
     moved = _searched(record, late.place, zeros, True)
-    shown = 1.0 - ERRORS**2 / record.measured.size if len(record.inputs) == 1 else 1.0 / RUBBED
+    shown = 1.0 - ERRORS**2 / still.left.size if len(record.inputs) == 1 else 1.0 / RUBBED
     return moved if moved.place[-1] > 0 and moved.power < shown * still.power else still
 
 
@@ -421,8 +471,9 @@ def _answer(record: _Record, place: Array, zeros: int) -> _Fitted:
     table = _table(record, place, zeros)
     size = np.linalg.norm(table, axis=1) + TINY
     scaled = table / size[:, None]
-    numerator = np.linalg.lstsq(scaled @ scaled.T, scaled @ record.measured)[0] / size
-    left = numerator @ table - record.measured
+    measured = record.everything
+    numerator = np.linalg.lstsq(scaled @ scaled.T, scaled @ measured)[0] / size
+    left = numerator @ table - measured
     return _Fitted(record, place, zeros, numerator, table, left, float(left @ left) / left.size)
 
 
@@ -442,10 +493,11 @@ def _table(record: _Record, place: Array, zeros: int) -> Array:
     for which, terms in enumerate((zeros + 1, place.size - 1)[: len(record.inputs)]):
         modes = [_mode(record, which, pole, 0.0 if which else delay_s) for pole in poles]
         parts.append(((_shapes(poles, terms - 1).T * twice) @ np.stack(modes)).real)
-    return np.concatenate(parts)
+    own = np.concatenate(parts)
+    return np.hstack([own, *(_table(one, place, zeros) for one in record.others)])
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _mode(record: _Record, which: int, pole: complex, delay_s: float) -> Values:
     """Return x of x' = λ x + c at the stamps; for an angle what `_from_angle` makes of ∫ x dt."""
     values, (tick, held_s) = record.inputs[which], _since(record, delay_s)
@@ -463,7 +515,7 @@ def _mode(record: _Record, which: int, pole: complex, delay_s: float) -> Values:
     return _from_angle((state - summed[tick] - held_s * mean[tick]) / growth, record.every_s)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def _since(record: _Record, delay_s: float) -> tuple[Rows, Array | float]:
     tick, after_s = since_ticks(record.command, record.time_s, delay_s, even=0.0)
     return tick, same_time(after_s)
@@ -523,11 +575,19 @@ def _coordinates(drive: DriveModel, interval_s: float, poles: int, beside: float
 @lru_cache(maxsize=2)
 def _past(record: _Record) -> Array:
     """Return independent sums of past commands at the stamps, shape (n, e)."""
-    sums = np.append(0.0, np.cumsum(record.command.values))
-    tick, _ = _since(record, 0.0)
-    edges = [sums[np.maximum(tick + 1 - lag, 0)] for lag in EDGES_TICKS if lag <= tick[-1]]
-    table = np.diff(edges, axis=0).T
+    each = [past_sums(one.command.values, _since(one, 0.0)[0]) for one in (record, *record.others)]
+    table = np.vstack([one[:, : min(len(one.T) for one in each)] for one in each])
     return np.linalg.qr(table / (np.linalg.norm(table, axis=0) + TINY))[0]
+
+
+def past_sums(sent: Array, tick: Rows) -> Array:
+    """Return sums of what was sent up to each tick, ever longer the longer ago, shape (n, e).
+
+    The first `EACH` of them hold one tick each.
+    """
+    sums = np.append(0.0, np.cumsum(sent))
+    edges = [sums[np.maximum(tick + 1 - lag, 0)] for lag in EDGES_TICKS if lag <= tick[-1]]
+    return -np.diff(edges, axis=0).T
 
 
 def _explainable(one: _Fitted) -> float:
@@ -539,25 +599,6 @@ def _explainable(one: _Fitted) -> float:
     n, e = past.shape
     share = np.sum((one.left @ past) ** 2) / (one.power * n + TINY)
     return float(1.0 - (1.0 - share) * n / max(n - e, 1))
-
-
-def _regressed(record: _Record) -> list[DriveModel]:
-    """Return a drive with the poles of a regression on even samples; or none."""
-    tick, held_s = _since(record, 0.0)
-    rows = np.arange(MOST_POLES, tick.size)
-    rows = rows[tick[rows] - tick[rows - MOST_POLES] == MOST_POLES]
-    if np.ndim(held_s) or np.ndim(record.lengths_s) or rows.size < FEWEST_SAMPLES:
-        return []
-    sent, lags = record.command.values, np.arange(MOST_POLES + 2)
-    if record.every_s:
-        sent = np.real(_from_angle(np.cumsum(sent), record.every_s))
-    measured = record.measured[rows[:, None] - lags[:-1]]
-    table = np.hstack([measured, sent[np.maximum(tick[rows][:, None] - lags, 0)]])
-    table = _past(record)[rows].T @ table
-    values = np.linalg.lstsq(table[:, 1:], table[:, 0], rcond=1e-12)[0]
-    shown = np.log(np.roots([1.0, *-values[:MOST_POLES]]) + 0j)
-    shown = shown[(shown.real < 0) & (shown.imag >= 0) & (shown.imag < math.pi)]
-    return [DriveModel(tuple((shown / record.interval_s).tolist()), ())] if shown.size else []
 
 
 def _rubbed(one: _Fitted, least: float) -> _Fitted | None:

@@ -24,10 +24,10 @@ import scipy
 from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation.signals import uniform_grid
+from rigidimeter.analysis.estimation.stretches import Array
 from rigidimeter.core.records import Channel
 from rigidimeter.core.settings import FEWEST_LINES
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Holes = tuple[tuple[float, float], ...]
 

@@ -320,11 +320,12 @@ def _at_lines(
     time_s, channels, through = grid.time_s, epoch.channels, torque_filter_of(settings)
     recorded, driven, seen = "angle_rad" in channels, None, epoch
     recorded &= all(sampled(one, time_s, SAME_TIME) for one in motion_channels(epoch))
+    by_angle = "velocity_rad_s" not in channels or (drive is not None and drive.by_angle)
     lines_rad_s = float(grid.omega_rad_s[0]), float(grid.omega_rad_s[-1]), grid.line.size
     at = Sampling(lines_rad_s, 1.0 / ticks_hz(settings.rig, torque), through)
     if drive is not None and command is not None:
         interval_s = float(f"{1.0 / command.mean_rate_hz:.9g}")
-        at = Sampling(lines_rad_s, interval_s, through, "velocity_rad_s" not in channels)
+        at = Sampling(lines_rad_s, interval_s, through, by_angle)
         place = sampled(torque, time_s, SAME_TIME)
         tick, after_s = since_ticks(command, torque.time_s[place] if place else time_s, 0.0)
         recorded &= bool(np.all(np.diff(tick) == 1) and np.ptp(after_s) < 2 * ON_EDGE * interval_s)
@@ -333,7 +334,7 @@ def _at_lines(
             driven, seen = columns_at(torque, caused, time_s, SAME_TIME), drive.beyond(epoch)
     angle, velocity = angle_at(seen, time_s, SAME_TIME), velocity_at(seen, time_s, SAME_TIME)
     angle, passing = angle - np.mean(angle), passed(through, grid.omega_rad_s)[:, None]
-    own = None if recorded and "velocity_rad_s" not in channels else velocity
+    own = None if recorded and by_angle else velocity
     motion, apart = passing * _motion_lines(grid, angle, own), None
     if noise and recorded and grid.rate_hz >= DENSE * grid.band_hz[1]:
         # As far below half the rate as the lines are above zero there is noise alone.

@@ -24,14 +24,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.estimation.stretches import motion_channels, sound
+from rigidimeter.analysis.estimation.stretches import Array, motion_channels, sound
 from rigidimeter.core.records import Channel, Epoch
 from rigidimeter.core.settings import USABLE_FRACTION_OF_RATE, EstimationSettings
 
 if TYPE_CHECKING:
     from rigidimeter.analysis.estimation.drive import Drive
 
-Array = NDArray[np.float64]
 Edge = float | tuple[float, float]
 Kind = Literal["lowpass", "highpass", "bandpass"]
 

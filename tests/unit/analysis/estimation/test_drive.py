@@ -92,6 +92,35 @@ def test_a_pi_drive_is_found_in_noise_and_ticks_that_were_missed():
     assert found.model.delay_s == pytest.approx(2e-4, abs=1e-5)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_in_noise_a_pole_and_a_delay_do_not_pass_for_two_poles(seed):
+    """In noise of 5 % they leave 3 % more power; repeated recordings scatter by 4 % in a pole."""
+    command, model = sent(3000, 1000.0), DriveModel.second_order(50.0, 0.7)
+    clean = driven(model, command, command.time_s)
+    found = drive_of(recorded(command, noisy(clean, 0.05, seed))).model
+    assert found.poles_rad_s == pytest.approx(model.poles_rad_s, rel=0.1)
+    assert found.delay_s == 0.0
+
+
+def test_noise_is_averaged_over_the_epochs_that_show_the_same_drive():
+    """The pole of four epochs scatters half as much as that of one; others add nothing."""
+    model, errors = DriveModel.second_order(50.0, 0.7), []
+    for seed in range(0, 40, 4):
+        epochs = []
+        for number in range(seed, seed + 4):
+            command = sent(3000, 1000.0, number)
+            clean = driven(model, command, command.time_s)
+            epochs.append(recorded(command, noisy(clean, 0.05, number)))
+        alone, together = (drive_of(*some) for some in (epochs[:1], epochs))
+        poles = [one.model.poles_rad_s[0] - model.poles_rad_s[0] for one in (alone, together)]
+        errors.append(np.abs(poles))
+    one, four = np.sqrt(np.mean(np.square(errors), axis=0))
+    assert four < 0.75 * one
+    unlike = recorded(command, np.random.default_rng(4).standard_normal(3000))
+    slower = recorded(sent(3000, 500.0, 39), clean)
+    assert drive_of(epochs[0], unlike, slower).model == alone.model
+
+
 def test_a_velocity_that_the_command_does_not_explain_shows_no_drive_but_the_next_epoch_may():
     command, rng = sent(2000, 1000.0), np.random.default_rng(4)
     other = recorded(command, rng.standard_normal(2000))
