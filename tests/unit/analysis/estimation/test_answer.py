@@ -20,9 +20,7 @@ from rigidimeter.analysis.estimation.terms import (
     FILTER,
     TERMS,
     Motion,
-    hum,
     over_time,
-    weight,
 )
 from rigidimeter.core.records import Channel
 
@@ -171,15 +169,6 @@ def test_slopes_by_inner_parameters(grid: Grid) -> None:
     s = 1j * grid.omega_rad_s
     assert by_lag == pytest.approx(-2 * s / (1 + 0.03 * s) * column, rel=1e-3)
     assert np.max(np.abs(by_delay + s * column)) < 0.02 * np.max(np.abs(s * column))
-
-
-def test_a_weight_has_no_stiffness_and_hum_its_own_line(grid: Grid) -> None:
-    motion = _motion(grid, _torque(_smooth(grid, 8)), _smooth(grid, 8))
-    small = motion._replace(angle=1e-3 * motion.angle)
-    whole, less = (weight(0.8).columns(one, np.zeros((1, 0))) for one in (motion, small))
-    assert np.max(np.abs(less)) < 2e-6 * np.max(np.abs(whole))
-    power = np.abs(hum(10.0).columns(motion, np.zeros((1, 0)))[0])
-    assert grid.omega_rad_s[np.argmax(power)] == pytest.approx(20 * np.pi, rel=0.01)
 
 
 def _solution(perturbation: bool = True, **changes: dict) -> tuple[Solution, np.ndarray]:

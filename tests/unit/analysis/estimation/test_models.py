@@ -7,9 +7,9 @@ import pytest
 from scipy import signal
 from tests.scenarios.scenario import scenario
 
+from rigidimeter.analysis.estimation import TERMS, Term
 from rigidimeter.analysis.estimation.drive import find_drive
 from rigidimeter.analysis.estimation.models import (
-    ASKED,
     better_clock,
     candidates,
     compare_models,
@@ -170,13 +170,13 @@ def test_candidates_are_one_further_term_each():
 
 def test_a_term_from_outside_is_one_record_in_one_list(monkeypatch):
     _, x, _, _ = motion()
-    cubic = next(one for one in ASKED if one.asked == "cubic")
-    own = cubic._replace(
-        name="quintic", asked="quintic", columns=lambda m, inner: m.of(m.angle**5)[None]
-    )
-    monkeypatch.setattr("rigidimeter.analysis.estimation.models.ASKED", [*ASKED, own])
+    own = Term("fifth", "N·m/rad⁵", "spring", lambda m, _: m.of(m.angle**5)[None], asked="quintic")
+    monkeypatch.setattr("rigidimeter.analysis.estimation.terms.TERMS", [*TERMS, own])
     assert "quintic" in term_names()
-    row = fit_model(observed(of_joint(**TRUTH) + 90.0 * x**5), f"{JBK},quintic")
+    torque = (
+        of_joint(**TRUTH) + 90.0 * (x - x.mean()) ** 5
+    )  # a term that is tested is from the mean
+    row = fit_model(observed(torque), f"{JBK},quintic")
     assert row.fit.of("quintic").value == pytest.approx(90.0, rel=1e-4)
 
 
