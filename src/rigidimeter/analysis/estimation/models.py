@@ -27,7 +27,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -75,15 +74,18 @@ LAGS, BARTLETT = 20, 200
 NOTHING, ALIKE = 1e-12, 1e-8
 
 Seen = Sequence[Observation]
+Powers = Sequence[Array]
 Motions = Sequence[tuple[of.Motion, of.Motion]]
 """What is the instrument, and what was measured, of each epoch."""
+
+Made = Callable[[Problem], Problem]
 
 
 # --- Names
 
 
 def _known() -> dict[str, of.Term]:
-    """Return the terms by name, with those that `estimate` tests and that have one of their own."""
+    """Return the terms by what `--terms` calls them: those that are asked for, then tested ones."""
     own = {one.asked: one for one in of.ASKED}
     more = [one for one in of.TERMS if one.asked and "," not in one.asked]
     return own | {one.asked: one for one in more if one.asked not in {*own, *GROUPS}}
@@ -427,14 +429,11 @@ class _Sum(NamedTuple):
     case : Case
     joint : array, shape (3,)
         J, B and K of the loop, where they are no terms.
-    made_of : callable
-        What is fitted of each problem.
     """
 
     placed: list[_Placed]
     case: Case
     joint: Array
-    made_of: Callable[[Problem], Problem] = lambda one: one
 
     def at(self, parameters: Array) -> _Sum:
         """Return it at other parameters."""
@@ -461,8 +460,7 @@ class _Sum(NamedTuple):
         found = []
         for one, both in zip(self.case.observations, motions, strict=True):
             Z, X = (np.concatenate([term.rows(own) for term in self.placed]).T for own in both)
-            target = one.torque_nm + X @ np.concatenate(inner)
-            found.append(self.made_of(Problem(Z, X, target, one)))
+            found.append(Problem(Z, X, one.torque_nm + X @ np.concatenate(inner), one))
         return found
 
     def pose(self, seen: Seen, parameters: Array) -> list[Problem]:
@@ -518,13 +516,12 @@ def fit_model(observations: Seen, names: str | Sequence[str]) -> ModelRow:
         return rows[0]
     # Of max(v, 0) and min(v, 0) the linear half is the same: what is left tells them apart.
     pushes = [any(one.value < 0 for one in _gains(row) if one.term[:-1] == free) for row in rows]
-    (_, better), (_, worse) = sorted(
-        zip(pushes, rows, strict=True), key=lambda pair: (pair[0], pair[1].misfit)
-    )
+    order = sorted(range(2), key=lambda i: (pushes[i], rows[i].misfit))
+    better, worse = (rows[i] for i in order)
     vaf = [row.fit.vaf_percent for row in (better, worse) if row.fit]
     remark = (
         f"{free}: the data decided for stretch by motion toward "
-        f"{'positive' if better is rows[0] else 'negative'} angle (VAF {vaf[0]:.2f} %, the other "
+        f"{'negative' if order[0] else 'positive'} angle (VAF {vaf[0]:.2f} %, the other "
         f"direction {vaf[1]:.2f} %)"
     )
     fit = better.fit and better.fit._replace(remarks=(remark, *better.fit.remarks))
@@ -539,7 +536,7 @@ def _fitted(seen: Seen, names: tuple[str, ...]) -> ModelRow:
     case = case_of(direct(seen, joint))
     own = zip(case.measured, map(_zero, seen), strict=True)
     case = case._replace(measured=[one._replace(zero=zero) for one, zero in own])
-    powers: Sequence[Array] = [np.full(one.grid.line.size, one.grid.energy) for one in seen]
+    powers: Powers = [np.full(one.grid.line.size, one.grid.energy) for one in seen]
     try:
         alone = _sum([known[one] for one in JOINT], case, joint)
         solution = by.solve(seen, alone.pose, joint, powers if alike else None)
@@ -550,7 +547,7 @@ def _fitted(seen: Seen, names: tuple[str, ...]) -> ModelRow:
     model = _sum([known[one] for one in names], case, joint)
     begin = _least_squares(model)
     model = _searched(model, motions, powers)
-    rest, _ = _left(model, motions, powers)
+    rest, _ = _left(model.problems(motions), powers)
     model, solution = _settled(model.at(begin), [rest * s for s in powers] if alike else None)
     solution = replace(solution, powers=by.noise_powers(solution.problems, solution.values))
     left = [one.residual(solution.values) for one in solution.problems]
@@ -584,41 +581,48 @@ def _least_squares(model: _Sum) -> Array:
     return least_squares(both[:, :-1], both[:, -1], names).values
 
 
-def _left(model: _Sum, motions: Motions, powers: Sequence[Array]) -> tuple[float, _Sum]:
-    """Return the mean of |r|²/S of the best coefficients, and the model at them."""
-    problems = model.problems(motions)
+def _left(problems: Sequence[Problem], powers: Powers) -> tuple[float, Array]:
+    """Return the mean of |r|²/S with the best coefficients, and these."""
     values = shortest(*sums(problems, powers))
     each = zip(problems, powers, strict=True)
     left = np.concatenate([np.abs(one.residual(values)) ** 2 / power for one, power in each])
-    return float(np.mean(left)), model.at(values)
+    return float(np.mean(left)), values
 
 
-def _searched(model: _Sum, motions: Motions, powers: Sequence[Array]) -> _Sum:
-    """Return the model with the inner parameters that leave least; more where its term pushes."""
-
-    def moved(inner: Array, place: int) -> _Sum:
-        placed = list(model.placed)
-        placed[place] = placed[place]._replace(inner=inner)
-        return model._replace(placed=placed)
-
-    def left(inner: Array, place: int) -> float:
-        remains, best = _left(moved(inner, place), motions, powers)
-        return remains * (2.0 if best.placed[place].values[0] < 0 else 1.0)
-
+def _searched(model: _Sum, motions: Motions, powers: Powers, made: Made = lambda one: one) -> _Sum:
+    """Return the model with the inner parameters that leave least of what is made of problems."""
     several = [i for i, one in enumerate(model.placed) if one.inner.size]
     for place in several * min(len(several), 2):
-        term = model.placed[place].term
-        best = min(term.inner, key=partial(left, place=place))
-        if best.size > 1:  # a valley that steps of the solution do not find
-            best = scipy.optimize.minimize(
-                left, best, (place,), method="Nelder-Mead", options={"maxfev": MOST_TRIED},
-                bounds=scipy.optimize.Bounds(term.low, term.high),
-            ).x  # fmt: skip
-        model = moved(best, place)
+        placed = list(model.placed)
+        inner = _best(model, place, motions, powers, made)
+        placed[place] = placed[place]._replace(inner=inner)
+        model = model._replace(placed=placed)
     return model
 
 
-def _settled(model: _Sum, powers: Sequence[Array] | None) -> tuple[_Sum, Solution]:
+def _best(model: _Sum, place: int, motions: Motions, powers: Powers, made: Made) -> Array:
+    """Return the inner parameters of a term that leave least; twice as much where it pushes."""
+    term, column = model.placed[place].term, sum(one.values.size for one in model.placed[:place])
+    problems = model.problems(motions)
+
+    def left(inner: Array) -> float:
+        for (Z, X, *_), (looked, own) in zip(problems, motions, strict=True):
+            X[:, column] = term.columns(own, inner[None])[0]
+            same = looked.measured
+            Z[:, column] = X[:, column] if same else term.columns(looked, inner[None])[0]
+        remains, values = _left([made(one) for one in problems], powers)
+        return remains * (2.0 if values[column] < 0 else 1.0)
+
+    best = min(term.inner, key=left)
+    if best.size > 1:  # a valley that steps of the solution do not find
+        best = scipy.optimize.minimize(
+            left, best, method="Nelder-Mead", options={"maxfev": MOST_TRIED},
+            bounds=scipy.optimize.Bounds(term.low, term.high),
+        ).x  # fmt: skip
+    return np.asarray(best)
+
+
+def _settled(model: _Sum, powers: Powers | None) -> tuple[_Sum, Solution]:
     """Return the model at its solution; inner parameters that the data do not tell are held."""
     placed = [one._replace(free=one.inside) for one in model.placed]
     while True:
@@ -725,11 +729,11 @@ def _beyond(row: ModelRow, model: _Sum) -> ModelRow:
         problems = [_freed(one) for one in _no_columns(case.observations)]
         return replace(row, beyond_errors=_block_errors(problems, white))
     motions = [(one, one) for one in case.measured]
-    free = _sum(bent, case, model.joint)._replace(made_of=_freed)
-    free = _searched(free, motions, white)
-    _, free = _left(free, motions, white)
-    free = free._replace(placed=[one._replace(free=one.inside) for one in free.placed])
-    problems = free.problems(motions)
+    free = _searched(_sum(bent, case, model.joint), motions, white, _freed)
+    _, begin = _left([_freed(one) for one in free.problems(motions)], white)
+    placed = [one._replace(free=one.inside) for one in free.at(begin).placed]
+    free = free._replace(placed=placed)
+    problems = [_freed(one) for one in free.problems(motions)]
     gram, moment = sums(problems)
     inverse = _inverse(gram)
     covariance = case.observations[0].grid.spread / 2 * inverse
@@ -847,7 +851,7 @@ def _pushes(one: TermGain) -> str:
     )
 
 
-def _block_errors(problems: Sequence[Problem], powers: Sequence[Array]) -> Array:
+def _block_errors(problems: Sequence[Problem], powers: Powers) -> Array:
     """Return the squared errors of the prediction of each block, shape (b,).
 
     Each is predicted by a fit to the others, without `trim_s` at each side of it, at most a block;

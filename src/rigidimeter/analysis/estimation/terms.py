@@ -370,25 +370,17 @@ def _late(name: str, label: str, bent: Bend, low: float, high: float) -> Term:
 
 
 def _asked(
-    name: str,
-    unit: str,
-    function: Callable[[Array, Array], Array],
-    *,
-    linear: bool = False,
-    bends: bool = False,
+    name: str, unit: str, function: Callable[[Array, Array], Array], linear: bool = False
 ) -> Term:
     """Return the term of a function of velocity and of the angle from the sensor's zero.
 
-    One that bends or jumps is taken at finer samples: at the coarse ones its high harmonics would
-    come back as low ones.
+    It is taken at finer samples: where it bends or jumps, its high harmonics would at the coarse
+    ones come back as low ones.
     """
 
     def columns(motion: Motion, inner: Array) -> Complex:
         del inner
-        both = np.stack([motion.velocity, motion.angle + motion.zero])
-        if not bends:
-            return motion.of(function(*both))[None]
-        n = both.shape[1]
+        both, n = np.stack([motion.velocity, motion.angle + motion.zero]), motion.angle.size
         # Behind it its mirror image, so that nothing jumps where the period closes.
         fine = scipy.signal.resample(np.hstack([both, both[:, ::-1]]), 2 * FINELY * n, axis=1)
         return motion.of(scipy.signal.resample(function(*fine), 2 * n)[:n])[None]
@@ -509,7 +501,7 @@ ASKED: list[Term] = [
         Term(one.title, one.unit, one.title, _of_joint(j), linear=True, asked=one.title)
         for j, one in enumerate(PARAMETERS)
     ),
-    _asked("offset", "N·m", lambda v, x: np.ones_like(v), linear=True),
+    _asked("offset", "N·m", lambda v, x: np.ones_like(v), True),
     *(
         FRICTION._replace(
             columns=_friction(sign), inner=np.geomspace(1e-4, 0.1, 7)[:, None], low=_SHARP,
@@ -519,11 +511,12 @@ ASKED: list[Term] = [
     ),
     _asked("quadratic", "N·m/rad²", lambda v, x: x**2),
     _asked("cubic", "N·m/rad³", lambda v, x: x**3),
-    _asked("damping+", "N·m·s/rad", lambda v, x: np.maximum(v, 0), bends=True),
-    _asked("damping-", "N·m·s/rad", lambda v, x: np.minimum(v, 0), bends=True),
-    _asked("stiffness+", "N·m/rad", lambda v, x: x * (v > 0), bends=True),
-    _asked("stiffness-", "N·m/rad", lambda v, x: x * (v < 0), bends=True),
+    _asked("damping+", "N·m·s/rad", lambda v, x: np.maximum(v, 0)),
+    _asked("damping-", "N·m·s/rad", lambda v, x: np.minimum(v, 0)),
+    _asked("stiffness+", "N·m/rad", lambda v, x: x * (v > 0)),
+    _asked("stiffness-", "N·m/rad", lambda v, x: x * (v < 0)),
     BY_SIDE._replace(
+        columns=lambda m, inner: _by_side(m._replace(angle=m.angle - np.mean(m.angle)), inner),
         inner=np.array([*product((3e-3, 0.01, 0.03, 0.1), (0.0, -0.03, 0.03, -0.1, 0.1))]),
         low=np.array([1e-3, -1.0]), high=np.array([1.0, 1.0]), steps=np.array([5e-4, 1e-3]),
     ),

@@ -91,6 +91,12 @@ def test_lines_count_alike_unless_the_robot_gives_way_to_torque():
     assert by_noise.vaf_percent < alike.vaf_percent - 1e-3
 
 
+def test_a_model_of_one_term_is_fitted():
+    row = fit_model(observed(of_joint(stiffness=3.0)), "stiffness")
+    assert row.problem == ""
+    assert row.fit.of("stiffness").value == pytest.approx(3.0, rel=1e-6)
+
+
 def test_an_offset_is_what_the_mean_is_beyond_the_terms():
     torque = of_joint(**TRUTH, offset=0.5)
     row = fit_model(observed(torque, high_hz=20.0, shift_rad=0.2), f"{JBK},offset")
@@ -150,6 +156,7 @@ def test_what_cannot_be_fitted_says_why(names, words):
     ("names", "words"),
     [
         ("inertia,dampng", "there is no term 'dampng'; known: "),
+        ("inertia,cuff", "there is no term 'cuff'"),
         ("reflex-slow", "followed by + or - for the direction of motion that stretches"),
         ("inertia,inertia", "inertia is named twice"),
         (" , ", "no term is named"),
@@ -221,13 +228,27 @@ def test_the_inertia_is_needed_and_no_more():
     assert "of what damping+stiffness leaves" in compared.reason
 
 
-def pushed(**joint):
+def pushed(high_hz=None, **joint):
     """Return an epoch of a subject who pushes, with the perturbation, and its J, B and K."""
     made = scenario("one", subject={"voluntary_nm": 0.2}, joint=joint)
     ((epoch,), truth), settings = made.simulated(1, 1), made.analysed_with()
     drive = find_drive([epoch], settings)
     loop = loop_of(settings, epoch.channels["torque_nm"].rate_hz, drive)
+    settings = settings if high_hz is None else from_zero(settings, high_hz)
     return [observe(epoch, settings, drive, loop, [])], truth[0]
+
+
+def test_from_zero_the_perturbation_is_the_instrument_of_all_lines_but_that_of_the_means():
+    seen, values = pushed(high_hz=20.0)
+    fit = fit_model(seen, f"{JBK},offset").fit
+    for name, value in zip(JBK.split(","), values, strict=True):
+        one = fit.of(name)
+        assert abs(one.value - value) < 3 * one.standard_error
+    ((grid, torque),) = [(one.grid, one.epoch.channels["torque_nm"].values) for one in seen]
+    weight = grid.window[0] ** 2 / grid.energy
+    angle = seen[0].epoch.channels["angle_rad"].values[: weight.size]
+    mean = weight @ torque[: weight.size] - fit.of("stiffness").value * (weight @ angle)
+    assert fit.of("offset").value == pytest.approx(mean, abs=0.02)
 
 
 @pytest.mark.parametrize(
