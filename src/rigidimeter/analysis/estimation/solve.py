@@ -467,5 +467,5 @@ def _condition_number(problem: Problem, power: Array) -> float:
     alone = problem._replace(regressors=problem.instruments)
     gram, _ = sums([alone], [power] if whitened else None)
     size = np.sqrt(np.diag(gram))
-    least, *_, most = np.linalg.eigvalsh(gram / np.outer(size, size))
+    least, most = np.linalg.eigvalsh(gram / np.outer(size, size))[[0, -1]]
     return float(np.sqrt(most / least)) if least > 0 else np.inf

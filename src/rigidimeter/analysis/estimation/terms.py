@@ -18,9 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import NamedTuple
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
 
@@ -30,6 +32,12 @@ from rigidimeter.core.records import PARAMETERS
 SMOOTH = 0.12
 """Of the RMS of the caused velocity: within so much of zero the instrument of friction turns. The
 best instrument of a jump is smooth where the caused velocity is not quite the true one."""
+
+FIR_LAGS_S, FIR_SPACING_S = np.arange(0.04, 0.441, 0.02), 0.02
+"""Of triangles that overlap. Before 40 ms no stretch reflex can act."""
+
+FINELY, MEMORY_S = 4, 2.0
+"""Samples for a coarse one, where a function jumps or bends; the past that a reflex answers."""
 
 DEGREE, FINER_DEGREE, HARMONICS, MOVEMENT_HARMONICS, PARTS = 3, 9, 2, 6, 10
 """Of polynomials over time, and of those that are fitted beside once a change is known: no other
@@ -61,6 +69,8 @@ class Motion(NamedTuple):
         What `lines` hold of the motion between the samples, as a torque that follows at once sees.
     every : array, shape (n,) or (0,)
         The velocity at all samples of the grid.
+    zero : float
+        The mean of the angle from the sensor's own zero.
     """
 
     grid: Grid
@@ -74,6 +84,7 @@ class Motion(NamedTuple):
     phase: Array | None = None
     unseen: Complex | float = 0.0
     every: Array = np.zeros(0)
+    zero: float = 0.0
 
     def of(self, values: Array, window: Array | None = None) -> Complex:
         """Return the lines of coarse samples, behind the filter of the torque."""
@@ -113,7 +124,10 @@ class Term(NamedTuple):
         The measured slopes by the inner parameters are their own instruments: those of a jump lie
         where the velocity is zero, which for the caused one is not quite the same time.
     finding, asked : str
-        The kind of its finding, and what `rigidimeter model --terms` calls it.
+        The kind of its finding, and what `rigidimeter model --terms` calls it; empty where that
+        does not fit it.
+    inner_names : tuple of (str, str)
+        Names and units of inner parameters.
     tested : bool
         Without being asked for.
     """
@@ -136,6 +150,7 @@ class Term(NamedTuple):
     itself: bool = False
     finding: str = "missing_term"
     asked: str = ""
+    inner_names: tuple[tuple[str, str], ...] = ()
     tested: bool = True
 
     def with_slopes(self, motion: Motion, inner: Array, moving: NDArray[np.bool_]) -> Complex:
@@ -154,15 +169,23 @@ def _of(*functions: Callable[[Array, Array], Array]) -> Columns:
     return lambda m, inner: m.of(np.stack([one(m.velocity, m.angle) for one in functions]))
 
 
-def _friction(motion: Motion, inner: Array) -> Complex:
-    """Return tanh(v/w): its jumps need every sample."""
-    width = inner[:, :1]
-    if motion.every.size:
-        return np.asarray(motion.grid.lines(np.tanh(motion.every / width))[0] * motion.through)
-    if not motion.measured:
-        weight = motion.grid.coarse_window[0] ** 2
-        width = width + SMOOTH * np.sqrt(motion.velocity**2 @ weight / weight.sum())
-    return motion.of(np.tanh(motion.velocity / width))
+def _friction(sign: int) -> Columns:
+    def columns(motion: Motion, inner: Array) -> Complex:
+        """Return tanh(v/w), of one side or, of sign 0, both: its jumps need every sample."""
+        width, ends = inner[:, :1], (-float(sign <= 0), float(sign >= 0))
+        if motion.every.size:
+            rubs = np.clip(np.tanh(motion.every / width), *ends)
+            return np.asarray(motion.grid.lines(rubs)[0] * motion.through)
+        if not motion.measured:
+            weight = motion.grid.coarse_window[0] ** 2
+            width = width + SMOOTH * np.sqrt(motion.velocity**2 @ weight / weight.sum())
+        return motion.of(np.clip(np.tanh(motion.velocity / width), *ends))
+
+    return columns
+
+
+def _of_joint(parameter: int) -> Columns:
+    return lambda motion, inner: motion.lines.T[parameter][None]
 
 
 def _by_side(motion: Motion, inner: Array) -> Complex:
@@ -184,6 +207,23 @@ def _reflex(function: Callable[[Array], Array]) -> Columns:
         parts = motion.of(x - x @ weight / weight.sum(), w)
         late = parts[0] + delay_s * parts[1] + delay_s**2 / 2 * parts[2]
         return np.asarray(np.exp(-s * delay_s) / (1 + s * lag_s) ** 2 * late)
+
+    return columns
+
+
+def _stretched(sign: int, gains: Callable[..., Complex]) -> Columns:
+    """Return the columns of stretch of one side behind filters, functions of s and of φ."""
+    rectified: Callable[[Array, float], Array] = np.maximum if sign > 0 else np.minimum
+
+    def columns(motion: Motion, inner: Array) -> Complex:
+        stretch, rate_hz = rectified(motion.velocity, 0.0), motion.grid.rate_hz / motion.grid.step
+        past = min(stretch.size - 1, round(MEMORY_S * rate_hz))
+        # The past is the mirror image; as many zeros keep the end from coming round to it.
+        whole = np.concatenate([stretch[past:0:-1], stretch, np.zeros(past)])
+        size = scipy.fft.next_fast_len(whole.size, real=True)
+        s = 2j * np.pi * scipy.fft.rfftfreq(size, 1 / rate_hz)
+        behind = scipy.fft.irfft(scipy.fft.rfft(whole, size) * gains(s, *inner.T[:, :, None]), size)
+        return motion.of(behind[:, past : past + stretch.size])
 
     return columns
 
@@ -295,28 +335,6 @@ def any_linear(motion: Motion, inner: Array) -> Complex:
     return np.concatenate([own, 1j * own])
 
 
-def weight(posture_rad: float) -> Term:
-    """Return the term of a limb's weight that is no stiffness, about a posture from hanging."""
-
-    def beyond_stiffness(velocity: Array, angle: Array) -> Array:
-        del velocity
-        bent = np.sin(posture_rad + angle) - np.sin(posture_rad)
-        return np.asarray(bent - angle * np.cos(posture_rad))
-
-    return Term("weight", "N·m", "weight", _of(beyond_stiffness), finding="varying_with_angle")
-
-
-def hum(frequency_hz: float) -> Term:
-    """Return the term of a line of the mains: it is its own instrument."""
-
-    def columns(motion: Motion, inner: Array) -> Complex:
-        del inner
-        turn = 2 * np.pi * frequency_hz * (motion.grid.time_s - motion.grid.time_s[0])
-        return np.asarray(motion.grid.lines(np.stack([np.cos(turn), np.sin(turn)]))[0])
-
-    return Term("hum", "N·m", "hum", columns, own=True, finding="")
-
-
 def _no_columns(motion: Motion, inner: Array) -> Complex:
     del inner
     return np.empty((0, motion.grid.line.size), dtype=np.complex128)
@@ -351,6 +369,47 @@ def _late(name: str, label: str, bent: Bend, low: float, high: float) -> Term:
     )  # fmt: skip
 
 
+def _asked(
+    name: str, unit: str, function: Callable[[Array, Array], Array], linear: bool = False
+) -> Term:
+    """Return the term of a function of velocity and of the angle from the sensor's zero.
+
+    It is taken at finer samples: where it bends or jumps, its high harmonics would at the coarse
+    ones come back as low ones.
+    """
+
+    def columns(motion: Motion, inner: Array) -> Complex:
+        del inner
+        both, n = np.stack([motion.velocity, motion.angle + motion.zero]), motion.angle.size
+        # Behind it its mirror image, so that nothing jumps where the period closes.
+        fine = scipy.signal.resample(np.hstack([both, both[:, ::-1]]), 2 * FINELY * n, axis=1)
+        return motion.of(scipy.signal.resample(function(*fine), 2 * n)[:n])[None]
+
+    return Term(name, unit, name, columns, linear=linear, asked=name)
+
+
+def _asked_reflex(kind: str, sign: int) -> Term:
+    unit, gains, tried, low, high, names = _REFLEXES[kind]
+    name = kind + ("+" if sign > 0 else "-")
+    return Term(
+        name, unit, "reflex", _stretched(sign, gains), inner=np.array([*product(*tried)]),
+        steps=1e-3 * (np.array(high) - low), low=np.array(low), high=np.array(high), resists=True,
+        muscle=True, asked=name, inner_names=names,
+    )  # fmt: skip
+
+
+FRICTION = Term(
+    "friction", "N·m", "friction", _friction(0), first=np.array([[0.02]]), inner=np.array([[0.02]]),
+    steps=np.array([1e-3]), low=np.array([1e-3]), high=np.array([0.2]), resists=True, itself=True,
+    asked="coulomb", inner_names=(("width", "rad/s"),),
+)  # fmt: skip
+BY_SIDE = Term(
+    "stiffness by side", "N·m/rad", "stiffness that differs between sides", _by_side,
+    inner=np.array([[0.01, 0.0], [0.04, 0.0]]), first=np.array([[0.02, 0.0]]),
+    steps=np.array([1e-3, 1e-3]), low=np.array([2e-3, -0.1]), high=np.array([0.2, 0.1]),
+    finding="varying_with_angle", asked="stiffness-by-side",
+    inner_names=(("bend", "rad"), ("middle from the mean angle", "rad")),
+)  # fmt: skip
 MOVEMENT = Term("movement", "N·m", "", _movement, own=True, linear=True, finding="")
 ANY_LINEAR = Term("any linear", "1", "anything linear", any_linear, linear=True, finding="")
 FILTER = _late("filter", "a filter of the torque", _before_filter, 0.0, 0.03)
@@ -359,7 +418,7 @@ CUFF = Term(
     "cuff", "rad/(N·m)", "a soft coupling", _cuff,
     inner=np.array([(0.0, lag) for lag in (0.0, 1e-3, 4e-3)]), first=np.zeros((1, 2)),
     low=np.zeros(2), high=np.array([np.inf, 0.02]), bent=_behind_cuff,
-    resists=True, linear=True, asked="cuff",
+    resists=True, linear=True,
 )  # fmt: skip
 FINER = {
     f"{p} over time": Term(
@@ -371,11 +430,7 @@ FINER = {
 """What is fitted beside a change that was found."""
 
 TERMS: list[Term] = [
-    Term(
-        "friction", "N·m", "friction", _friction, first=np.array([[0.02]]),
-        inner=np.array([[0.02]]), steps=np.array([1e-3]), low=np.array([1e-3]),
-        high=np.array([0.2]), resists=True, itself=True, asked="coulomb",
-    ),
+    FRICTION,
     Term(
         "damping by direction", "N·m·s/rad", "directional damping", _of(lambda v, x: np.abs(v)),
         asked="directional-damping",
@@ -384,12 +439,7 @@ TERMS: list[Term] = [
         "stiffness by direction", "N·m/rad", "directional stiffness",
         _of(lambda v, x: x * np.sign(v)), asked="directional-stiffness",
     ),
-    Term(
-        "stiffness by side", "N·m/rad", "stiffness that differs between sides", _by_side,
-        inner=np.array([[0.01, 0.0], [0.04, 0.0]]), first=np.array([[0.02, 0.0]]),
-        steps=np.array([1e-3, 1e-3]), low=np.array([2e-3, -0.1]), high=np.array([0.2, 0.1]),
-        finding="varying_with_angle", asked="stiffness-by-side",
-    ),
+    BY_SIDE,
     Term(
         "stiffness by angle", "N·m/rad²", "stiffness that goes with the angle",
         _of(lambda v, x: x * x, lambda v, x: x * x * x), finding="varying_with_angle",
@@ -423,3 +473,53 @@ TERMS: list[Term] = [
     ),
 ]  # fmt: skip
 """Code from outside the package may append its own."""
+
+_DELAY = ("delay", "s")
+_REFLEXES: dict[str, tuple[Any, ...]] = {
+    "reflex": (
+        "N·m·s/rad", lambda s, delay_s: np.exp(-s * delay_s),
+        [np.arange(0.02, 0.301, 0.005).tolist()], [0.015], [0.31], (_DELAY,),
+    ),
+    "reflex-fir": (
+        "N·m/rad", lambda s: np.exp(-s * FIR_LAGS_S[:, None]) * FIR_SPACING_S
+        * np.sinc(s.imag / (2 * np.pi) * FIR_SPACING_S) ** 2,
+        [], [], [], (),
+    ),
+    "reflex-second-order": (
+        "N·m·s/rad", lambda s, delay_s, hz, ratio: np.exp(-s * delay_s)
+        / (1 + ratio * s / (np.pi * hz) + (s / (2 * np.pi * hz)) ** 2),
+        [(0.03, 0.045, 0.06, 0.08, 0.1, 0.13), (1.0, 2.0, 4.0, 8.0), (0.5, 1.0)],
+        [0.015, 0.3, 0.2], [0.2, 20.0, 4.0],
+        (_DELAY, ("natural frequency", "Hz"), ("damping ratio", "1")),
+    ),
+}  # fmt: skip
+"""Unit, gains at s, inner parameters that are tried, their bounds, names and units."""
+
+_SHARP = np.array([1e-4])
+ASKED: list[Term] = [
+    *(
+        Term(one.title, one.unit, one.title, _of_joint(j), linear=True, asked=one.title)
+        for j, one in enumerate(PARAMETERS)
+    ),
+    _asked("offset", "N·m", lambda v, x: np.ones_like(v), True),
+    *(
+        FRICTION._replace(
+            columns=_friction(sign), inner=np.geomspace(1e-4, 0.1, 7)[:, None], low=_SHARP,
+            steps=_SHARP / 2, asked=f"coulomb{name}",
+        )
+        for sign, name in ((0, ""), (1, "+"), (-1, "-"))
+    ),
+    _asked("quadratic", "N·m/rad²", lambda v, x: x**2),
+    _asked("cubic", "N·m/rad³", lambda v, x: x**3),
+    _asked("damping+", "N·m·s/rad", lambda v, x: np.maximum(v, 0)),
+    _asked("damping-", "N·m·s/rad", lambda v, x: np.minimum(v, 0)),
+    _asked("stiffness+", "N·m/rad", lambda v, x: x * (v > 0)),
+    _asked("stiffness-", "N·m/rad", lambda v, x: x * (v < 0)),
+    BY_SIDE._replace(
+        columns=lambda m, inner: _by_side(m._replace(angle=m.angle - np.mean(m.angle)), inner),
+        inner=np.array([*product((3e-3, 0.01, 0.03, 0.1), (0.0, -0.03, 0.03, -0.1, 0.1))]),
+        low=np.array([1e-3, -1.0]), high=np.array([1.0, 1.0]), steps=np.array([5e-4, 1e-3]),
+    ),
+    *(_asked_reflex(kind, sign) for kind in _REFLEXES for sign in (1, -1)),
+]  # fmt: skip
+"""Terms that are fitted if they are asked for; nothing tests them."""

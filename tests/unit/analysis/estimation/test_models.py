@@ -7,9 +7,9 @@ import pytest
 from scipy import signal
 from tests.scenarios.scenario import scenario
 
+from rigidimeter.analysis.estimation import TERMS, Term
 from rigidimeter.analysis.estimation.drive import find_drive
 from rigidimeter.analysis.estimation.models import (
-    ASKED,
     better_clock,
     candidates,
     compare_models,
@@ -91,6 +91,12 @@ def test_lines_count_alike_unless_the_robot_gives_way_to_torque():
     assert by_noise.vaf_percent < alike.vaf_percent - 1e-3
 
 
+def test_a_model_of_one_term_is_fitted():
+    row = fit_model(observed(of_joint(stiffness=3.0)), "stiffness")
+    assert row.problem == ""
+    assert row.fit.of("stiffness").value == pytest.approx(3.0, rel=1e-6)
+
+
 def test_an_offset_is_what_the_mean_is_beyond_the_terms():
     torque = of_joint(**TRUTH, offset=0.5)
     row = fit_model(observed(torque, high_hz=20.0, shift_rad=0.2), f"{JBK},offset")
@@ -150,6 +156,7 @@ def test_what_cannot_be_fitted_says_why(names, words):
     ("names", "words"),
     [
         ("inertia,dampng", "there is no term 'dampng'; known: "),
+        ("inertia,cuff", "there is no term 'cuff'"),
         ("reflex-slow", "followed by + or - for the direction of motion that stretches"),
         ("inertia,inertia", "inertia is named twice"),
         (" , ", "no term is named"),
@@ -170,13 +177,13 @@ def test_candidates_are_one_further_term_each():
 
 def test_a_term_from_outside_is_one_record_in_one_list(monkeypatch):
     _, x, _, _ = motion()
-    cubic = next(one for one in ASKED if one.asked == "cubic")
-    own = cubic._replace(
-        name="quintic", asked="quintic", columns=lambda m, inner: m.of(m.angle**5)[None]
-    )
-    monkeypatch.setattr("rigidimeter.analysis.estimation.models.ASKED", [*ASKED, own])
+    own = Term("fifth", "N·m/rad⁵", "spring", lambda m, _: m.of(m.angle**5)[None], asked="quintic")
+    monkeypatch.setattr("rigidimeter.analysis.estimation.terms.TERMS", [*TERMS, own])
     assert "quintic" in term_names()
-    row = fit_model(observed(of_joint(**TRUTH) + 90.0 * x**5), f"{JBK},quintic")
+    torque = (
+        of_joint(**TRUTH) + 90.0 * (x - x.mean()) ** 5
+    )  # a term that is tested is from the mean
+    row = fit_model(observed(torque), f"{JBK},quintic")
     assert row.fit.of("quintic").value == pytest.approx(90.0, rel=1e-4)
 
 
@@ -221,13 +228,38 @@ def test_the_inertia_is_needed_and_no_more():
     assert "of what damping+stiffness leaves" in compared.reason
 
 
-def pushed(**joint):
-    """Return an epoch of a subject who pushes, with the perturbation, and its J, B and K."""
+def pushed(zero_rad=None, **joint):
+    """Return an epoch of a subject who pushes, with the perturbation, and its J, B and K.
+
+    With `zero_rad` in a band from 0 Hz, of a sensor that shows so much more.
+    """
     made = scenario("one", subject={"voluntary_nm": 0.2}, joint=joint)
     ((epoch,), truth), settings = made.simulated(1, 1), made.analysed_with()
     drive = find_drive([epoch], settings)
     loop = loop_of(settings, epoch.channels["torque_nm"].rate_hz, drive)
+    if zero_rad is not None:
+        angle = epoch.channels["angle_rad"]
+        shifted = Channel("angle_rad", angle.time_s, angle.values + zero_rad)
+        epoch = replace(epoch, channels={**epoch.channels, "angle_rad": shifted})
+        settings = from_zero(settings, settings.estimation.band_high_closed_loop_hz)
     return [observe(epoch, settings, drive, loop, [])], truth[0]
+
+
+def test_from_zero_the_perturbation_is_the_instrument_of_all_lines_but_that_of_the_means():
+    (above, _), (seen, values) = pushed(), pushed(zero_rad=0.2)
+    plain = fit_model(above, JBK).fit
+    fit = fit_model(seen, f"{JBK},offset").fit
+    for name, value in zip(JBK.split(","), values, strict=True):
+        one = fit.of(name)
+        assert abs(one.value - value) < 3 * one.standard_error
+        assert one.standard_error == pytest.approx(plain.of(name).standard_error, rel=0.05)
+    grid, channels = seen[0].grid, seen[0].epoch.channels
+    weight = grid.window[0] ** 2 / grid.energy
+    torque, angle = (
+        weight @ channels[name].values[: weight.size] for name in ("torque_nm", "angle_rad")
+    )
+    offset = torque - fit.of("stiffness").value * angle
+    assert fit.of("offset").value == pytest.approx(offset, abs=2e-3)
 
 
 @pytest.mark.parametrize(
