@@ -15,13 +15,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import scipy
 
 from rigidimeter.analysis.estimation.answer import answer
-from rigidimeter.analysis.estimation.checks import found, half_widths
+from rigidimeter.analysis.estimation.checks import found as said
+from rigidimeter.analysis.estimation.checks import half_widths
 from rigidimeter.analysis.estimation.grid import Array
 from rigidimeter.analysis.estimation.methods import (
     Ready,
@@ -65,13 +65,6 @@ TURNS_S = 0.005
 """A delay that is longer turns the upper lines so far that it is no small change of the torque."""
 
 
-class Found(NamedTuple):
-    """The delay of epochs, with its standard error."""
-
-    delay_s: float
-    error_s: float
-
-
 Observe = Callable[[Sequence[Ready]], list[Observation]]
 
 
@@ -101,7 +94,7 @@ def delay_of(
         late = _settled(used, plain, pose, again, longest_s)
     except ValueError as error:
         return Delay(source, remark=f"the delay of the torque was not estimated: {error}")
-    if late is None or abs(late.delay_s) > longest_s - SCAN_STEP_S / 2:
+    if late is None or abs(late[0]) > longest_s - SCAN_STEP_S / 2:
         return Delay(
             source,
             remark=f"no delay of the torque within ±{1e3 * longest_s:g} ms explains it "
@@ -111,7 +104,7 @@ def delay_of(
     if not matters(*late):
         why = f"shorter than {1e3 * LEAST_S:g} ms or not significantly different from zero"
         return replace(delay, remark=f"not corrected: {why}")
-    if why := _of_other_terms(plain, pose, late.delay_s):
+    if why := _of_other_terms(plain, pose, late[0]):
         return replace(delay, remark=f"not corrected: {why}")
     if not estimation.correct_delay:
         return replace(delay, remark="not corrected: estimation.correct_delay is false")
@@ -200,7 +193,7 @@ def late_torque(observation: Observation, fit: Fit, delay: Delay | None) -> list
     if not share > 1.0:
         return []
     return [
-        found(
+        said(
             "torque_delay",
             observation.settings.diagnostics,
             late_ms,
@@ -276,8 +269,8 @@ def _settled(
     pose: Pose,
     observed: Observe,
     longest_s: float,
-) -> Found | None:
-    """Return the delay at which none is left; None where there is none.
+) -> tuple[float, float] | None:
+    """Return the delay at which none is left, with its standard error; None where there is none.
 
     Its zero is sought by secants, and its error is that of what is left over its slope.
     """
@@ -287,7 +280,7 @@ def _settled(
     left_s, error_s = float(first.values[-1]), float(first.se[-1])
     jumps = any(one.drive is not None and one.drive.model.jump for one in used)
     if not matters(left_s, error_s) and (jumps or pose is direct):
-        return Found(left_s, error_s)  # it shows without a move
+        return left_s, error_s  # it shows without a move
     tried, total_s, stretch, solution = [(0.0, left_s)], left_s, 1.0, first
     for _ in range(ROUNDS):
         if abs(left_s) < SETTLED_S or abs(total_s) > longest_s:
@@ -306,7 +299,7 @@ def _settled(
             f"it did not settle in {ROUNDS} rounds: {1e3 * left_s:.2g} ms are left at "
             f"{1e3 * total_s:.3g} ms"
         )
-    return Found(total_s, error_s * max(abs(stretch), 1.0))
+    return total_s, error_s * max(abs(stretch), 1.0)
 
 
 def _searched(observations: Sequence[Observation], pose: Pose, longest_s: float) -> Solution | None:
@@ -319,7 +312,7 @@ def _searched(observations: Sequence[Observation], pose: Pose, longest_s: float)
     # The valleys of the scan that are clearly deeper than none, and none.
     inner = np.r_[True, left[1:] < left[:-1]] & np.r_[left[:-1] < left[1:], True]
     inner &= left < CLEARLY * left[delays_s.size // 2]
-    best: Solution | None = None
+    found = []
     for near_s in dict.fromkeys([0.0, *(round(float(one), 9) for one in delays_s[inner])]):
         turned = [_turned(one, near_s) for one in problems]
         near = shortest(*sums(turned, powers))
@@ -327,11 +320,9 @@ def _searched(observations: Sequence[Observation], pose: Pose, longest_s: float)
             there = solve(observations, delayed(pose), np.append(near, near_s))
         except ValueError:
             continue  # nothing settles from there
-        if abs(there.values[-1]) > longest_s or there.values[0] <= 0:
-            continue  # no joint has a negative inertia
-        if best is None or likelihood(there) > likelihood(best):
-            best = there
-    return best
+        if abs(there.values[-1]) <= longest_s and there.values[0] > 0:  # as any inertia
+            found.append(there)
+    return max(found, key=likelihood, default=None)
 
 
 def likelihood(found: Solution) -> float:

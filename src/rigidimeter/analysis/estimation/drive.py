@@ -224,7 +224,7 @@ class _Record:
     every_s : float
         Where the angle was measured and `measured` is `_from_angle`: the interval of its stamps.
     others : tuple of _Record
-        Of further epochs that show the same drive, in units of the same SD.
+        Of further epochs that show the same drive; what was measured in them is in `measured` too.
     """
 
     command: Channel
@@ -236,11 +236,6 @@ class _Record:
     scale: float
     every_s: float = 0.0
     others: tuple[_Record, ...] = ()
-
-    @property
-    def everything(self) -> Array:
-        """What was measured in all epochs."""
-        return np.concatenate([self.measured, *(one.measured for one in self.others)])
 
 
 def _record(epoch: Epoch, name: str) -> _Record | None:
@@ -316,26 +311,25 @@ def _identified(
 
     That is of the first epoch; much noise is averaged over the others too.
     """
-    record = _record(epochs[0], motion)
+    first, *rest = epochs
+    record = _record(first, motion)
     if record is None:
         return []
     found = _climbed(record, start)
     rubs, best = len(found[0].record.inputs) > 1, min(found, key=_power)
-    slowly = epochs[0].ticks is None and best.power > QUIET**2
-    slowly = slowly and _explainable(best) > 0.5 * STAIRS
+    slowly = first.ticks is None and best.power > QUIET**2 and _explainable(best) > 0.5 * STAIRS
     if slowly and _power_of_lines(found) < STAIRS * best.power:
         return []
     if best.power > NOISY**2 and _is_noise(best) and not rubs:
-        found = _climbed(_with_others(best, epochs[1:], motion), start)
+        found = _climbed(_with_others(best, rest, motion), start)
     found = [one for one in found if _fastest(one) < SEEN]  # the samples show every pole
     if not found:
         return []
     best, times = min(found, key=_power), RUBBED if rubs else AS_GOOD
     noise = _is_noise(best)
+    chosen = next(one for one in found if one.power <= times * best.power + UNSEEN**2)
     if noise and not rubs:
         chosen = min(found, key=_information)
-    else:
-        chosen = next(one for one in found if one.power <= times * best.power + UNSEEN**2)
     if chosen.power > MISFIT**2 or not 0.5 < chosen.model.gain < 2.0:
         return []
     most, likely = (times if noise else RIVAL) * best.power + UNSEEN**2, math.inf
@@ -349,17 +343,16 @@ def _identified(
 
 def _with_others(best: _Fitted, epochs: Sequence[Epoch], motion: str) -> _Record:
     """Return the record with those of epochs that came as often and that the drive explains too."""
-    own = best.record
-    records = (_record(epoch, motion) for epoch in epochs)
-    others = tuple(
-        replace(one, measured=one.measured * (one.scale / own.scale))
-        for one in records
-        if one is not None
-        and math.isclose(one.interval_s, own.interval_s, rel_tol=SAME_RATE)
-        and math.isclose(one.every_s, own.every_s, rel_tol=SAME_RATE)
-        and _answer(one, best.place, best.zeros).power < RIVAL * best.power
-    )
-    return replace(own, others=others)
+    own, others = best.record, []
+    for one in filter(None, (_record(epoch, motion) for epoch in epochs)):
+        alike = np.divide(
+            [one.interval_s, one.every_s or 1.0], [own.interval_s, own.every_s or 1.0]
+        )
+        left = _answer(one, best.place, best.zeros).power
+        if np.all(np.abs(alike - 1.0) < SAME_RATE) and left < RIVAL * best.power:
+            others.append(one)
+    measured = [one.measured * (one.scale / own.scale) for one in (own, *others)]
+    return replace(own, measured=np.concatenate(measured), others=tuple(others))
 
 
 def _is_noise(one: _Fitted) -> bool:
@@ -471,9 +464,8 @@ def _answer(record: _Record, place: Array, zeros: int) -> _Fitted:
     table = _table(record, place, zeros)
     size = np.linalg.norm(table, axis=1) + TINY
     scaled = table / size[:, None]
-    measured = record.everything
-    numerator = np.linalg.lstsq(scaled @ scaled.T, scaled @ measured)[0] / size
-    left = numerator @ table - measured
+    numerator = np.linalg.lstsq(scaled @ scaled.T, scaled @ record.measured)[0] / size
+    left = numerator @ table - record.measured
     return _Fitted(record, place, zeros, numerator, table, left, float(left @ left) / left.size)
 
 

@@ -165,6 +165,8 @@ class Observation:
         How often the perturbation repeats, so that it has power at every so many lines; 1 where it
         need not repeat.
     drive_known : bool
+    of_angle : bool
+        Whether acceleration and velocity are made of the angle alone.
     wider : Observation or None
         The same at the lines of a wider band.
     """
@@ -182,6 +184,7 @@ class Observation:
     cause: Cause | None = None
     periods: int = 1
     drive_known: bool = False
+    of_angle: bool = False
     wider: Observation | None = None
 
     @property
@@ -334,7 +337,8 @@ def _at_lines(
             driven, seen = columns_at(torque, caused, time_s, SAME_TIME), drive.beyond(epoch)
     angle, velocity = angle_at(seen, time_s, SAME_TIME), velocity_at(seen, time_s, SAME_TIME)
     angle, passing = angle - np.mean(angle), passed(through, grid.omega_rad_s)[:, None]
-    own = None if recorded and by_angle else velocity
+    of_angle = recorded and by_angle
+    own = None if of_angle else velocity
     motion, apart = passing * _motion_lines(grid, angle, own), None
     if noise and recorded and grid.rate_hz >= DENSE * grid.band_hz[1]:
         # As far below half the rate as the lines are above zero there is noise alone.
@@ -362,6 +366,7 @@ def _at_lines(
         apart,
         changes,
         drive_known=drive is not None and command is not None,
+        of_angle=of_angle,
     )
 
 

@@ -493,17 +493,11 @@ def holds_torque(epoch: Epoch, fastest_rad_s: float) -> bool:
     gained = np.diff(values_at(motion, pushed.time_s[rows]), 1 + of_angle)
     if of_angle:  # two mean velocities differ by half of what the torques of both ticks give
         held = (held + np.append(held[:1], held[:-1])) / 2
-    table = past_sums(held, rows[of_angle:-1])
-    table = np.column_stack([table, np.ones(len(table))])
-    if table.shape[0] < 2 * table.shape[1]:
-        return False
-    basis, upper = np.linalg.qr(table)
-    beyond = np.zeros((table.shape[1], 2))  # the first gain beyond these shares of the fourth
-    beyond[:EACH] = -np.array(AT_ONCE)
-    beyond[0] += 1.0
-    weights = basis @ np.linalg.lstsq(upper.T, beyond)[0]
-    left = gained - basis @ (gained @ basis)
-    low, high = gained @ weights - ERRORS * np.std(left) * np.linalg.norm(weights, axis=0)
+    table = np.column_stack([past_sums(held, rows[of_angle:-1]), np.ones(gained.size)])
+    inverse = np.linalg.pinv(table)
+    left = gained - table @ (inverse @ gained)
+    beyond = inverse[0] - np.outer(AT_ONCE, inverse[:EACH].sum(axis=0))
+    low, high = beyond @ gained - ERRORS * np.std(left) * np.linalg.norm(beyond, axis=1)
     return bool(low > 0.0 > high)
 
 

@@ -197,7 +197,8 @@ def loop(seen: Observation) -> list[Finding]:
 def velocity(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
     """Return whether the velocity has the scale of the angle, its time, and its shape.
 
-    With the torque in time with the velocity B is K τ too low, which half its interval must hold.
+    With the torque in time with the velocity B is K τ too low, which half its interval must hold,
+    unless the velocity is not used.
     """
     if not {"angle_rad", "velocity_rad_s"} <= seen.epoch.channels.keys():
         return []
@@ -214,7 +215,7 @@ def velocity(seen: Observation, fit: Fit, pull: Pull) -> list[Finding]:
     checks, late_ms, half = seen.settings.diagnostics, 1e3 * delay_s / scale, half_widths(fit)
     value, most = 100.0 * abs(scale - 1.0), checks.max_velocity_scale_percent
     results = at_most("velocity_scale", checks, value, most, facts={"scale": scale})
-    bias = np.array([0.0, -1e-3 * fit.value[2] * late_ms, 0.0])
+    bias = np.array([0.0, 0.0 if seen.of_angle else -1e-3 * fit.value[2] * late_ms, 0.0])
     held_ms = abs(late_ms) * half[1] / max(abs(bias[1]), 1e-300)
     most = min(checks.max_velocity_delay_ms, float(held_ms))
     effect = Effect.of(bias, fit.value, half)
