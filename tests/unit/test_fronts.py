@@ -19,9 +19,7 @@ ALSO = (
 )
 """Fronts within a room."""
 
-NOT_YET = tuple(
-    f"rigidimeter.analysis.{room}" for room in ("reading", "estimation", "study", "report")
-)
+NOT_YET = tuple(f"rigidimeter.analysis.{room}" for room in ("reading", "study", "report"))
 """Rooms whose insides are imported; fewer with time, since the ceiling of their number may fall."""
 
 COMMANDS = "rigidimeter.cli"

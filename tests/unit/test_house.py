@@ -73,7 +73,6 @@ class TestEndOfEstimation:
         defined = {n.name for tree in own for n in ast.walk(tree) if isinstance(n, ast.ClassDef)}
         assert not defined & GONE
 
-    @pytest.mark.xfail(strict=True, reason="not reached")
     def test_nothing_is_taken_from_inside(self, now: dict[str, dict[str, int]]) -> None:
         assert not now["inside"].get("analysis.estimation")
 

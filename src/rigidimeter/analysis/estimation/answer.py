@@ -316,7 +316,7 @@ def with_phases(case: Case, state: State) -> Case:
     That is a motion at one slow frequency in every epoch which the perturbation does not cause.
     """
     found = []
-    for own, cause in zip(case.measured, _motions(case, state), strict=True):
+    for own, cause in zip(case.measured, caused_motions(case, state.joint), strict=True):
         w, n, rest = own.grid.coarse_window[0], own.angle.size, own.angle
         if case.caused:
             x = (cause.angle - cause.angle.mean()) * w
@@ -388,7 +388,7 @@ def _rows(motion: Motion, state: State, tested: Tested) -> list[Complex]:
     return [motion.torque[None, :, 0], motion.lines.T, *own]
 
 
-def _motions(case: Case, state: State) -> list[Motion]:
+def caused_motions(case: Case, joint: Array) -> list[Motion]:
     """Return what the perturbations cause; epochs that share one share the object."""
     if not case.caused:
         return case.measured
@@ -397,9 +397,9 @@ def _motions(case: Case, state: State) -> list[Motion]:
     for one, own in zip(case.observations, case.measured, strict=True):
         key = id(one.cause), id(own.phase)
         if key not in made and one.cause is not None:
-            caused, s = one.cause.at(state.joint), 1j * one.grid.omega_rad_s
+            caused, s = one.cause.at(joint), 1j * one.grid.omega_rad_s
             lines = one.of_lines(caused.lines)
-            torque = (lines @ state.joint)[:, None] * np.stack([s**0, s, s * s], axis=1)
+            torque = (lines @ joint)[:, None] * np.stack([s**0, s, s * s], axis=1)
             velocity, angle = caused.coarse * (one.grid.coarse_window[0] > FAINT)
             made[key] = own._replace(
                 velocity=velocity, angle=angle, lines=lines, torque=torque, measured=False,
@@ -415,7 +415,7 @@ def _instruments(case: Case, state: State, tested: Tested, last: int = 0) -> lis
     With `last` only so many from the end.
     """
     made: dict[int, Complex] = {}
-    motions = _motions(case, state)
+    motions = caused_motions(case, state.joint)
     for one, motion, power in zip(case.observations, motions, state.powers, strict=True):
         if id(motion) not in made:
             weight = (one.excited if case.caused else 1.0) / np.sqrt(power)
@@ -606,7 +606,7 @@ def _with(case: Case, state: State, term: Term, inner: Array) -> State:
     """
     if term.name == "cuff":
         gram, moment = np.zeros((6, 6)), np.zeros(6)
-        motions = _motions(case, state)
+        motions = caused_motions(case, state.joint)
         for own, cause, power in zip(case.measured, motions, state.powers, strict=True):
             s, moved = 1j * own.grid.omega_rad_s, (own.lines - own.unseen).T
             columns = np.stack([*moved[::-1], s * moved[0], *-own.torque.T[1:]])
@@ -654,7 +654,7 @@ def size_of(case: Case, state: State) -> tuple[float, float]:
                 for j, functions, values, _ in courses(case, *taken)]  # fmt: skip
         return max(float(np.ptp(one) / np.abs(at + np.mean(one))) for at, one in goes), LEAST_RANGE
     own = whole = 0.0
-    for motion, power in zip(_motions(case, state), state.powers, strict=True):
+    for motion, power in zip(caused_motions(case, state.joint), state.powers, strict=True):
         part = taken.values @ term.columns(motion, taken.inner[None])
         whole += float(np.sum(np.abs(motion.lines @ state.joint) ** 2 / power))
         own += float(np.sum(np.abs(part) ** 2 / power))

@@ -447,9 +447,9 @@ def fit_of(
         # Parseval: the window's energy is spread over all samples.
         per_line = 2 * one.grid.samples / (one.grid.time_s.size * one.grid.energy)
         unexplained = one.torque_nm - one.motion @ numbers["value"]
-        left += per_line * _power(problem.residual(solution.values) if beside else unexplained)
-        total += per_line * _power(one.torque_nm)
-        moved += per_line * _power(one.motion[:, 2])
+        left += per_line * power_of(problem.residual(solution.values) if beside else unexplained)
+        total += per_line * power_of(one.torque_nm)
+        moved += per_line * power_of(one.motion[:, 2])
     r_squared = 1.0 - left / total
     ranges_rad = [angle_range_rad(one.epoch, one.grid.time_s) for one in observations]
     return Fit(
@@ -508,7 +508,8 @@ def between_samples(
     )
 
 
-def _power(lines: Complex) -> float:
+def power_of(lines: Complex) -> float:
+    """Return the sum of |x|² over lines."""
     return float(np.vdot(lines, lines).real)
 
 

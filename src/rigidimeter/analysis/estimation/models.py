@@ -36,9 +36,9 @@ from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation import solve as by
 from rigidimeter.analysis.estimation import terms as of
-from rigidimeter.analysis.estimation.answer import Case, State, _motions, case_of
+from rigidimeter.analysis.estimation.answer import Case, case_of, caused_motions
 from rigidimeter.analysis.estimation.grid import SAME_TIME, Array, Complex, Grid
-from rigidimeter.analysis.estimation.methods import _power, direct, start_of
+from rigidimeter.analysis.estimation.methods import direct, power_of, start_of
 from rigidimeter.analysis.estimation.observation import Observation
 from rigidimeter.analysis.estimation.published import least_squares
 from rigidimeter.analysis.estimation.score import without_filter
@@ -359,6 +359,7 @@ def _with_means(one: Observation) -> Observation:
         **vars(one) | {
             "grid": grid, "wider": None, "motion": np.vstack([means, one.motion]),
             "torque_nm": np.append(mean_nm, one.torque_nm),
+            "terms_nm": np.append(0.0, one.terms_nm),
             "noise": None if one.noise is None else np.pad(one.noise, ((1, 0), (0, 0))),
         }
     )  # fmt: skip
@@ -448,7 +449,7 @@ class _Sum(NamedTuple):
         for one in self.placed:
             if one.term.asked in JOINT:
                 joint[JOINT.index(one.term.asked)] = one.values[0]
-        looked = _motions(self.case, State(joint, ()))
+        looked = caused_motions(self.case, joint)
         if not self.case.caused:
             each = zip(own, self.case.instruments, strict=True)
             looked = [one._replace(lines=lines) for one, lines in each]
@@ -551,7 +552,7 @@ def _fitted(seen: Seen, names: tuple[str, ...]) -> ModelRow:
     model, solution = _settled(model.at(begin), [rest * s for s in powers] if alike else None)
     solution = replace(solution, powers=by.noise_powers(solution.problems, solution.values))
     left = [one.residual(solution.values) for one in solution.problems]
-    unexplained, whole = (sum(map(_power, x)) for x in (left, [one.torque_nm for one in seen]))
+    unexplained, whole = (sum(map(power_of, x)) for x in (left, [one.torque_nm for one in seen]))
     p = sum(one.values.size + one.inner.size for one in model.placed)
     count = sum(2 * one.grid.line.size / one.grid.spread for one in seen)
     each = zip(solution.powers, seen, strict=True)

@@ -63,36 +63,21 @@ LOW = 0.01
 
 
 class LeastSquares(NamedTuple):
-    """What minimises |target − columns · values|, and how well the columns can be told apart.
+    """What minimises |target − A · values|.
 
     Attributes
     ----------
     values : array, shape (p,)
-        Not finite where the columns are linearly dependent.
-    lengths, singular : arrays, shape (p,)
-        Of the columns; singular values of the columns over their lengths, the largest first.
-    right : array, shape (p, p)
-        A direction of the scaled values in each row.
-    rows : int
+        Not finite where columns are linearly dependent, as the rest.
+    inverse : array, shape (p, p)
+        (AᵀA)⁻¹.
+    condition_number : float
+        Of A, each column scaled to unit length.
     """
 
     values: Array
-    lengths: Array
-    singular: Array
-    right: Array
-    rows: int
-
-    @property
-    def condition_number(self) -> float:
-        """The largest singular value over the smallest."""
-        largest, smallest = float(self.singular[0]), float(self.singular[-1])
-        return largest / smallest if smallest > 0 else math.inf
-
-    @property
-    def bread(self) -> Array:
-        """(AᵀA)⁻¹, shape (p, p)."""
-        inverse = self.right.T / self.singular
-        return np.asarray(inverse @ inverse.T / np.outer(self.lengths, self.lengths))
+    inverse: Array
+    condition_number: float
 
 
 def least_squares(columns: Array, target: Array, names: Sequence[str] = ()) -> LeastSquares:
@@ -122,8 +107,8 @@ def least_squares(columns: Array, target: Array, names: Sequence[str] = ()) -> L
             "them out"
         )
     with np.errstate(divide="ignore", invalid="ignore"):
-        values = (right.T / singular) @ (left.T @ target) / lengths
-    return LeastSquares(values, lengths, singular, right, len(columns))
+        back = right.T / singular / lengths[:, None]
+        return LeastSquares(back @ (left.T @ target), back @ back.T, singular[0] / singular[-1])
 
 
 def fit_inertia_damping_stiffness(signals: Signals, inertia_kg_m2: float | None = None) -> Fit:
@@ -151,16 +136,16 @@ def fit_inertia_damping_stiffness(signals: Signals, inertia_kg_m2: float | None 
     if inertia_kg_m2 is not None:
         target = torque - inertia_kg_m2 * regressors[:, 0]
         regressors = np.ascontiguousarray(regressors[:, 1:])
-    solved = least_squares(regressors, target)
-    if not np.all(solved.lengths > 0):
+    if not np.all(np.any(regressors, axis=0)):
         raise ValueError("a regressor is zero throughout")
-    if solved.condition_number > 1 / (solved.rows * float(np.finfo(np.float64).eps)):
+    solved = least_squares(regressors, target)
+    if not solved.condition_number < 1 / (target.size * float(np.finfo(np.float64).eps)):
         raise ValueError(
             "the motion cannot distinguish J, B and K: its regressors are linearly dependent"
         )
     residual = target - regressors @ solved.values
     degrees = float(residual.size - solved.values.size)
-    covariance = float(residual @ residual) / degrees * solved.bread
+    covariance = float(residual @ residual) / degrees * solved.inverse
     bound = _bound(signals, regressors, residual)
     total = float(np.sum((torque - torque.mean()) ** 2))
     return Fit(
@@ -168,7 +153,7 @@ def fit_inertia_damping_stiffness(signals: Signals, inertia_kg_m2: float | None 
         **of_fit(solved.values, covariance, degrees, bound, inertia_kg_m2),
         r_squared=1.0 - float(residual @ residual) / total,
         vaf_percent=100.0 * (1.0 - float(np.var(residual)) / float(np.var(torque))),
-        condition_number=solved.condition_number,
+        condition_number=float(solved.condition_number),
         residual_sd_nm=float(np.std(residual)),
         n_samples=torque.size,
         band_hz=signals.band_hz,
@@ -192,7 +177,7 @@ def _bound(signals: Signals, regressors: Array, residual: Array) -> Array:
     lines = scipy.fft.rfft(np.ascontiguousarray(regressors.T))[:, inside].T
     matrix = (sides / np.sqrt(n * rate_hz * density))[:, None] * lines
     stacked = np.concatenate([matrix.real, matrix.imag])
-    return np.sqrt(np.diag(least_squares(stacked, np.zeros(len(stacked))).bread))
+    return np.sqrt(np.diag(least_squares(stacked, np.zeros(len(stacked))).inverse))
 
 
 def published_signals(epoch: Epoch, settings: EstimationSettings) -> Signals:
