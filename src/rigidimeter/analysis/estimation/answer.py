@@ -171,8 +171,7 @@ class Found(NamedTuple):
         Coefficients, or the parameters of a term that bends the model; half their 95 % intervals.
     covariance : array
         Of the values.
-    inner, inner_half : array, shape (d,)
-        NaN where it was not fitted.
+    inner : array, shape (d,)
     """
 
     term: Term
@@ -182,7 +181,6 @@ class Found(NamedTuple):
     half: Array
     covariance: Array
     inner: Array
-    inner_half: Array
 
 
 class Answer(NamedTuple):
@@ -744,16 +742,12 @@ def _answered(
     if any(one.name in _LATE for one, *_ in found):
         away = away + unsure_s(case) * np.append(np.abs(joint[1:]), 0.0)
     told = []
-    for one, own, slopes in zip(state.taken, model.of_terms, model.of_slopes, strict=True):
+    for one, own in zip(state.taken, model.of_terms, strict=True):
         if one.term.name not in named:
             continue
-        inner_half = np.full(one.inner.size, np.nan)
-        inner_half[one.moving] = half_of_all[slopes]
         values = one.inner[: own.stop - own.start] if one.term.bent else fit.values[own]
-        told.append(Found(
-            *named[one.term.name], values, half_of_all[own], covariance[own, own], one.inner,
-            inner_half,
-        ))  # fmt: skip
+        known = half_of_all[own], covariance[own, own]
+        told.append(Found(*named[one.term.name], values, *known, one.inner))
     return Answer(
         joint, half + away, away, of_joint, tuple(told), remains, left, change, answered,
         frozenset(little), _differs(state, model), follows, case, state,
