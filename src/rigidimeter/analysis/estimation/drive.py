@@ -81,13 +81,12 @@ AS_GOOD, UNSEEN = 1.05, 2e-5
 # If what the best leaves is correlated by so much from sample to sample it is not noise, and one
 # that leaves so many times its power might be there.
 RIVAL, COLOURED = 4.0, 1 / 3
-# Where it is noise the drive with the least information criterion is chosen: in much noise a pole
-# and a delay leave 1 % more than two poles, which is not as good. If no pole is faster than so many
-# rad a tick, one whose criterion is above the least by more (Kass and Raftery 1995: strong
-# evidence) is no rival.
+# Where it is noise and no pole is faster than so many rad a tick, a drive whose information
+# criterion is above the least by more (Kass and Raftery 1995: strong evidence) is no rival.
 UNLIKELY, SLOW = 6.0, 1.0
-# Shares of the velocity's SD: where noise is larger the angle may show the drive better; where
-# more is left the command does not explain it.
+# Shares of the velocity's SD: where noise is larger the angle may show the drive better, and a
+# pole with a delay leaves hardly more than two poles, so that the information criterion chooses;
+# where more is left the command does not explain it.
 NOISY, MISFIT = 0.01, 0.1
 # A share of the SD below which nothing needs friction; the share to which it must bring the power
 # that any linear drive would leave; how much more power is as good with it, for poles bend to what
@@ -320,7 +319,8 @@ def _identified(
     slowly = first.ticks is None and best.power > QUIET**2 and _explainable(best) > 0.5 * STAIRS
     if slowly and _power_of_lines(found) < STAIRS * best.power:
         return []
-    if best.power > NOISY**2 and _is_noise(best) and not rubs:
+    much = best.power > NOISY**2 and _is_noise(best) and not rubs
+    if much:
         found = _climbed(_with_others(best, rest, motion), start)
     found = [one for one in found if _fastest(one) < SEEN]  # the samples show every pole
     if not found:
@@ -328,7 +328,7 @@ def _identified(
     best, times = min(found, key=_power), RUBBED if rubs else AS_GOOD
     noise = _is_noise(best)
     chosen = next(one for one in found if one.power <= times * best.power + UNSEEN**2)
-    if noise and not rubs:
+    if much:
         chosen = min(found, key=_information)
     if chosen.power > MISFIT**2 or not 0.5 < chosen.model.gain < 2.0:
         return []
