@@ -21,7 +21,7 @@ without changing J, B and K; rivals are compared by the power of the residual.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,11 +35,11 @@ from rigidimeter.analysis.estimation.grid import SAME_TIME, Array, Complex
 from rigidimeter.analysis.estimation.methods import DEPENDS, opened
 from rigidimeter.analysis.estimation.observation import LEAST, Observation, torque_filter_of
 from rigidimeter.analysis.estimation.score import EVERY, Part, Place, Score, real
-from rigidimeter.analysis.estimation.signals import values_at, velocity_at
+from rigidimeter.analysis.estimation.signals import motion_channels, values_at, velocity_at
 from rigidimeter.analysis.estimation.solve import Problem, Solution, noise_powers
 from rigidimeter.analysis.estimation.terms import TERMS, Motion, Term
 from rigidimeter.core.findings import UNKNOWN_EFFECT, Effect, Fact, Finding
-from rigidimeter.core.records import PARAMETERS
+from rigidimeter.core.records import PARAMETERS, Epoch
 from rigidimeter.core.settings import DiagnosticsSettings, Settings
 from rigidimeter.core.words import series
 
@@ -340,13 +340,22 @@ def with_phases(case: Case, state: State) -> Case:
 
 def _offered(case: Case, term: Term, person: bool) -> bool:
     several, phase = len(case.observations) > 1, case.measured[0].phase is not None
+    # Jumps of a term need the motion at each sample of the torque.
+    every = case.caused or all(_keeps_step(one.epoch) for one in case.observations)
     return (
         term.tested
         and (person or not term.muscle)
+        and (every or not term.itself)
         and (phase or term.finding != "varying_with_phase")
         and (several or term.parameter is None)
         and (case.caused or term.name[:2] not in ("J ", "B "))
     )
+
+
+def _keeps_step(epoch: Epoch) -> bool:
+    """Return whether the motion was sampled as often as the torque."""
+    slowest_hz = min(one.mean_rate_hz for one in motion_channels(epoch))
+    return slowest_hz > 0.99 * epoch.channels["torque_nm"].mean_rate_hz
 
 
 # --- The lines of a state
@@ -659,12 +668,6 @@ def size_of(case: Case, state: State) -> tuple[float, float]:
     return float(np.sqrt(own / whole)), LEAST_SHARE
 
 
-def unsure_s(case: Case) -> float:
-    """Return how late the motion itself may be where the drive is not known: half a tick."""
-    known = all(one.drive_known for one in case.observations)
-    return 0.0 if known else 0.5 / case.observations[0].settings.rig.tick_rate_hz
-
-
 def courses(
     case: Case, term: Term, inner: Array, values: Array
 ) -> list[tuple[int, Array, Array, list[str]]]:
@@ -721,33 +724,33 @@ def _answered(
     half = half + np.where(depends, np.maximum(most, 2 * without), most)
     remains, change = np.nan, np.zeros(3)
 
-    def low(w: Array) -> Array:
-        return np.asarray(w[0] / w)
-
     if case.caused:
         # What another drive explains is not of the joint.
         remains = max([linear.p, *(p for _, one in others[1:] for p in one.values())])
-        change = _otherwise(model, fit.values, low)
+        change = _otherwise(model, fit.values)
     # A linear term beside which something linear remains has not its name.
     named = {one[0].name: one for one in found if not remains < REMAINS or not _linear(one[0])}
     plain = linear if len(named) == len(found) or not case.caused else nameless
     follows = np.nan
-    if not case.caused and np.max(np.abs(_otherwise(model, fit.values, low) / joint)) > MUCH:
+    if not case.caused and np.max(np.abs(_otherwise(model, fit.values) / joint)) > MUCH:
         plain = _follows(case, state, tested) or plain
         follows = plain.p
     left = float(np.sqrt(2 * np.mean(plain.values**2)))
     harmless = np.max(np.abs(change / joint)) < LITTLE and len(named) == len(found)
     answered = bool(remains >= REMAINS or not case.caused or harmless)
     away = np.abs(change) if remains < REMAINS else np.zeros(3)
-    if any(one.name in _LATE for one, *_ in found):
-        away = away + unsure_s(case) * np.append(np.abs(joint[1:]), 0.0)
+    known = all(one.drive_known for one in case.observations)
+    if not known and any(one.name in _LATE for one, *_ in found):
+        # The motion itself may be half a tick late.
+        late_s = 0.5 / case.observations[0].settings.rig.tick_rate_hz
+        away = away + late_s * np.append(np.abs(joint[1:]), 0.0)
     told = []
     for one, own in zip(state.taken, model.of_terms, strict=True):
         if one.term.name not in named:
             continue
         values = one.inner[: own.stop - own.start] if one.term.bent else fit.values[own]
-        known = half_of_all[own], covariance[own, own]
-        told.append(Found(*named[one.term.name], values, *known, one.inner))
+        errors = half_of_all[own], covariance[own, own]
+        told.append(Found(*named[one.term.name], values, *errors, one.inner))
     return Answer(
         joint, half + away, away, of_joint, tuple(told), remains, left, change, answered,
         frozenset(little), _differs(state, model), follows, case, state,
@@ -805,10 +808,10 @@ def _other_drives(
         yield fit, {name: one.p for name, one in scores.items()}
 
 
-def _otherwise(model: Model, values: Array, weight: Callable[[Array], Array]) -> Array:
-    """Return how J, B and K change where lines count by another weight of their frequency."""
+def _otherwise(model: Model, values: Array) -> Array:
+    """Return how J, B and K change where lines count the less the higher they are."""
     parts = [
-        one._replace(instruments=one.instruments * weight(one.grid.omega_rad_s))
+        one._replace(instruments=one.instruments * one.grid.omega_rad_s[0] / one.grid.omega_rad_s)
         for one in model.parts
     ]
     try:

@@ -38,7 +38,7 @@ from rigidimeter.analysis.estimation.delay import (
     widened,
     with_clock_error,
 )
-from rigidimeter.analysis.estimation.drive import Drive, find_drive
+from rigidimeter.analysis.estimation.drive import find_drive
 from rigidimeter.analysis.estimation.grid import Array, Complex
 from rigidimeter.analysis.estimation.methods import (
     BANDLIMITED,
@@ -218,12 +218,18 @@ def prepare(
     measured = [screened(one, settings) for one in perturbed]
     active = activities(perturbed, measured, settings)
     sources = dict.fromkeys(one.source for one in everyone)
-    drives = {source: _drive_of(source, [one for one, _ in active], settings) for source in sources}
+    sound = [
+        one for one, _ in active if one.closed.included and not obstacle(one, settings.estimation)
+    ]
+    driven: dict[tuple[str, str], list[Epoch]] = {}
+    for one in sound:
+        driven.setdefault(_driven(one), []).append(one)
+    drives = {key: find_drive(own, settings) for key, own in driven.items()}
     ready = [
         Ready(
             epoch,
             settings,
-            drives[epoch.source],
+            drives.get(_driven(epoch)),
             obstacle(epoch, settings.estimation),
             activity,
             whole if epoch is not whole else None,
@@ -246,13 +252,11 @@ def prepare(
     )
 
 
-def _drive_of(source: str, epochs: Sequence[Epoch], settings: Settings) -> Drive | None:
-    sound = [
-        one
-        for one in epochs
-        if one.source == source and one.closed.included and not obstacle(one, settings.estimation)
-    ]
-    return find_drive(sound, settings)
+def _driven(epoch: Epoch) -> tuple[str, str]:
+    """Return what epochs with one drive share: the recording, and the rate of the command."""
+    command = epoch.channels.get("velocity_command_rad_s")
+    rate_hz = command.mean_rate_hz if command is not None and len(command) > 1 else 0.0
+    return epoch.source, f"{rate_hz:.2g}"
 
 
 def _delay_of(source: str, ready: Sequence[Ready], observed: Sequence[Observation | str]) -> Delay:
