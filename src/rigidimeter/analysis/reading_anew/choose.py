@@ -290,7 +290,7 @@ def _settle(file: Columns, chosen: Chosen, said: Mapping, headers: Dict[str, Hea
 
 
 def _several(file: Columns, said: Mapping, name: str, candidates: list[str]) -> Fault:
-    moving = [column for column in candidates if changes(file, column)] or candidates
+    moving = _moving_first(file, candidates) or candidates
     spoken = name.replace("_", " ")
     more = len(moving) - MOST_OFFERED
     text = f"{file.source}: {len(moving)} columns may be the {spoken}"
@@ -300,27 +300,31 @@ def _several(file: Columns, said: Mapping, name: str, candidates: list[str]) -> 
     return Fault(text, "several", name, remedies)
 
 
-def changes(file: Columns, column: str) -> bool:
-    """Whether a column of numbers is not the same throughout."""
-    values = file.columns[column].read()
-    if values.dtype == object:
-        return False
-    finite = values[np.isfinite(values)]
-    return bool(finite.size) and bool(np.any(finite != finite[0]))
+def _moving_first(file: Columns, names: Iterable[str]) -> list[str]:
+    """Return columns of numbers without those that never change, those that change often first."""
+    shares: dict[str, float] = {}
+    for name in names:
+        values = file.columns[name].read()
+        if values.dtype != object:
+            finite = values[np.isfinite(values)]
+            changed = np.count_nonzero(finite[1:] != finite[:-1])
+            shares[name] = changed / max(finite.size, 1)
+    moving = (name for name, share in shares.items() if share > 0)
+    return sorted(moving, key=lambda name: -round(shares[name], 1))
 
 
 def _missing(
     file: Columns, chosen: Chosen, said: Mapping, headers: Dict[str, Header], names: Iterable[str]
 ) -> list[Fault]:
     """Say that a quantity is not there, and which column is the nearest to be it."""
-    if chosen.faults:  # what was named and is not there, or does not fit
-        return []
     names = tuple(names)
+    if any(fault.quantity in names for fault in chosen.faults):  # what was named, and does not fit
+        return []
     stored = [QUANTITIES[name].stored for name in reversed(names)]
     what = f"neither column {stored[0]} nor {stored[1]}" if stored[1:] else f"no column {stored[0]}"
     taken = {*chosen.columns.values(), *chosen.labels.values()}
-    free = [one for one in file.columns if one not in taken and changes(file, one)]
-    text = f"{file.source} has {what}; its columns are {file.listed}"
+    free = _moving_first(file, (one for one in file.columns if one not in taken))
+    text = f"{file.source} has {what}; its columns are {', '.join(free[:20]) or file.listed}"
     if file.others:
         name, why = next(iter(file.others.items()))
         text += f" ({name} is no column but {why})"

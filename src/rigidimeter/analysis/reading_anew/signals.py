@@ -101,7 +101,9 @@ def signals(file: Columns, said: Mapping, read: dict[str, Array] | None = None) 
     columns = chosen.columns
     if "torque" not in columns or not any(name in columns for name in MOTION):
         return found
-    found.faults += _lengths(file, [*columns.values(), *chosen.labels.values()])
+    if unequal := _lengths(file, [*columns.values(), *chosen.labels.values()]):
+        found.faults += unequal
+        return found
     for name, column in columns.items():
         strays = None if name == "time" else found.strays
         try:

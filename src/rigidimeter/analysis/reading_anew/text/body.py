@@ -140,7 +140,8 @@ def _plain(path: Path, file: io.BufferedReader, said: Mapping) -> Rows | None:
         head = _head_of(str(path), text, data, said)
     except (UserError, UnicodeError):
         return None
-    if head.in_pairs or not head.delimiter or lines.size < head.n_before + 2:
+    few = len(head.names) < 2 or lines.size < head.n_before + 2
+    if head.in_pairs or not head.delimiter or few:
         return None
     first = int(lines[head.n_before])
     offset = n_mark + sum(len(line) + 1 for line in text.split(b"\n", first - 1)[: first - 1])
