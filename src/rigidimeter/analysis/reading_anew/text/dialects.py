@@ -33,14 +33,14 @@ class Dialect(NamedTuple):
     Attributes
     ----------
     program : str
-    begins : pattern
-        Of the first line; of `ends` where that is what tells the program.
-    ends : str
-        The line that ends the head, as it begins, in any case; nothing: the first line without key.
-    n_ends : int
-        How often such a line comes before the rows.
+    begins : pattern or None
+        The first line; None where the line that ends the head is what tells the program.
     key : pattern
         A key and what follows it.
+    ends : str
+        The line that ends the head, as it begins, in lower case; nothing: the first without a key.
+    n_ends : int
+        How often such a line comes before the rows.
     mark : str
         Between values, and between the cells of the rows; nothing for tabs or else blanks.
     names : tuple of str
@@ -54,11 +54,11 @@ class Dialect(NamedTuple):
         A last column that is no channel.
     units : str
         The key of units, one for each column but `before` or the first.
-    unit_of_time : tuple of (str, str)
-        A name of a first column and its unit.
+    times : tuple of str
+        The names, in lower case, of columns of the time in s.
     rate : callable
         The sampling rate in Hz that the keys state, 0 where they do not.
-    by_kind : callable or None
+    by_kind : callable
         The units of quantities that the keys imply.
     must : str
         A key without which the head is not complete.
@@ -67,7 +67,7 @@ class Dialect(NamedTuple):
     """
 
     program: str
-    begins: re.Pattern[str]
+    begins: re.Pattern[str] | None
     key: re.Pattern[str]
     ends: str = ""
     n_ends: int = 1
@@ -121,13 +121,13 @@ DIALECTS: tuple[Dialect, ...] = (
         n_ends=2,
         after="Comment",
         units="Y_Unit_Label",
-        times=("X_Value",),
+        times=("x_value",),
         rate=_labview_rate,
         in_pairs=lambda keys: _first(keys, "X_Columns") == "Multi",
     ),
     Dialect(
         "OpenSim",
-        re.compile("(?!)"),
+        None,
         re.compile(r"([^=]+)=(.*)"),
         ends="endheader",
         mark="",
@@ -165,11 +165,11 @@ def known_head(source: str, lines: Sequence[str]) -> Head | None:
         If such a head is not complete.
     """
     for dialect in DIALECTS:
-        by_first = lines and dialect.begins.match(lines[0])
-        by_end = dialect.begins.pattern == "(?!)" and any(
-            line.strip().lower() == dialect.ends for line in lines
-        )
-        if by_first or by_end:
+        if dialect.begins is None:
+            is_its = any(line.strip().lower() == dialect.ends for line in lines)
+        else:
+            is_its = bool(lines) and dialect.begins.match(lines[0]) is not None
+        if is_its:
             return _head(source, lines, dialect)
     if len(lines) > 3 and _PER_SAMPLE.fullmatch(lines[1].strip().rstrip(",;\t")):
         return _acqknowledge(source, lines)
@@ -200,7 +200,7 @@ def _head(source: str, lines: Sequence[str], dialect: Dialect) -> Head:
     shown = unique(checked_names(source, names))
     facts: dict[str, float | str] = {"rate_hz": rate_hz} if rate_hz else {}
     units = _units(shown, keys, dialect, in_pairs=in_pairs)
-    if dialect.times and shown[0] == dialect.times[0] and not in_pairs:  # X_Value says no quantity
+    if shown[0] == "X_Value" and not in_pairs:  # a name that says no quantity
         units[f"{shown[0]} (time)"] = units.pop(shown[0], "")
         shown[0] += " (time)"
     return Head(mark, shown, n_head + in_line, units, facts, in_pairs)
@@ -245,7 +245,7 @@ def _units(names: Sequence[str], keys: Keys, dialect: Dialect, *, in_pairs: bool
     if in_pairs:
         units |= dict.fromkeys(names[::2], "s")
     elif in_time:
-        units |= {n: "s" for n in names if n in dialect.times or n.lower() in dialect.times}
+        units |= {name: "s" for name in names if name.lower() in dialect.times}
     return units
 
 
