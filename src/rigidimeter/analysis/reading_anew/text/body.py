@@ -157,7 +157,7 @@ def _plain_decimal(file: IO[bytes], delimiter: str) -> str | None:
     """Return the decimal mark of rows that are plain; None if they are not."""
     commas = points = False
     while block := file.read(_BLOCK):
-        if not block.isascii() or any(mark in block for mark in (b'"', b"'", b"\0", b"#")):
+        if not block.isascii() or any(mark in block for mark in (b'"', b"'", b"\0")):
             return None
         commas = commas or (delimiter != "," and b"," in block)
         points = points or (delimiter != "," and b"." in block)
