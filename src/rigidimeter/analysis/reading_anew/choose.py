@@ -34,11 +34,11 @@ from rigidimeter.analysis.reading_anew.units import (
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.words import series
 
-OWN_NAMES = frozenset(
+# Of the columns of our own exports: of those without a quantity none is guessed by its name.
+_OWN_NAMES = frozenset(
     {*(one.stored for one in QUANTITIES.values()), *LABELS}
     | {"drive_torque_nm", "drive_torque_time_s"}
 )
-"""Of the columns of our own exports: of those without a quantity none is guessed by its name."""
 MOST_OFFERED = 6
 # Of a column that is named as the nearest, where its unit does not tell.
 _LEAST_LIKE = 0.4
@@ -157,7 +157,7 @@ def _candidates(
         return [pick.column] if pick.column in file.columns else []
     if QUANTITIES[name].stored in file.columns:
         return [QUANTITIES[name].stored]
-    free = [one for one in file.columns if one not in used and one not in OWN_NAMES]
+    free = [one for one in file.columns if one not in used and one not in _OWN_NAMES]
     found = [column for column in free if headers[column].kind == name]
     if name == "torque" and not found:
         found = [column for column in free if headers[column].kind == "force"]
@@ -372,7 +372,7 @@ def _emg_columns(
     looking: list[str] = []
     slots = [name for name in EMG if name not in found]
     for column, header in headers.items():
-        if header.kind != "emg" or column in used or column in OWN_NAMES:
+        if header.kind != "emg" or column in used or column in _OWN_NAMES:
             continue
         why = ""
         if _PROCESSED.intersection(words_of(column)):

@@ -21,28 +21,32 @@ from numpy.typing import NDArray
 from rigidimeter.analysis.reading_anew.columns import Array
 from rigidimeter.analysis.reading_anew.repeated import held_rows
 
-LONGEST_RUN = 3
-"""In samples; a value that lasts longer is not alone."""
-TIMES_OTHERS = 6.0
-"""Of what nine in ten of the others that stand out do so by."""
-TIMES_CUBIC = 4.0
-"""Of the median distance of a sample from the cubic through those beside it."""
-TIMES_STEP = 3.0
-"""Of the sensor's resolution."""
-FEWEST, FEWEST_OUTSIDE = 3, 2
-"""How often a code recurs; fewer where it is farther outside than all others are apart."""
-LEAST_FAR = 0.3
-"""Of the runs of a code; the others lie near the values beside them by chance."""
-ALONE = 0.1
-"""Of the distance of a code: others that stand out to so near it are peaks of a coarse signal."""
-LARGEST_SHARE = 0.25
-"""Of the samples; what is written more often is no exception."""
-MOST_CODES = 4
+# In samples; a value that lasts longer is not alone.
+_LONGEST_RUN = 3
+# Of what nine in ten of the others that stand out do so by.
+_TIMES_OTHERS = 6.0
+# Of the median distance of a sample from the cubic through those beside it.
+_TIMES_CUBIC = 4.0
+# Of the sensor's resolution.
+_TIMES_STEP = 3.0
+# How often a code recurs; fewer where it is farther outside than all others are apart.
+_FEWEST, _FEWEST_OUTSIDE = 3, 2
+# Of the runs of a code; the others lie near the values beside them by chance.
+_LEAST_FAR = 0.3
+# Of the distance of a code: others that stand out to so near it are peaks of a coarse signal.
+_ALONE = 0.1
+# Of the samples; what is written more often is no exception.
+_LARGEST_SHARE = 0.25
+_MOST_CODES = 4
 _MOST_TRIED = 8
 _FEWEST_SAMPLES = 50
 _BLOCK = 2**15
-# Of what is asked of a sample, where noise is known from the beginning of the column alone.
+_PIECES, _PIECE = 16, 2**12
+# Of what is asked of a sample, where the others are known from some stretches alone.
 _NEARLY = 0.8
+# Of the samples of a noisy signal that stand out at all, and of a code so frequent that it changes
+# what the others do.
+_NOISY, _DENSE = 0.1, 0.05
 
 
 class Code(NamedTuple):
@@ -68,35 +72,55 @@ def missing_codes(values: Array) -> list[Code]:
     [(-999.0, [50, 120, 200, 301])]
     """
     with np.errstate(all="ignore"):  # of numbers that are refused elsewhere
-        return _codes(values) if _may_have_one(values) else []
+        held = held_rows(values)  # of a slower sensor each sample is several rows
+        if not _may_have_one(values[held] if held.size else values):
+            return []
+        return _codes(values, held if held.size else np.arange(values.size))
 
 
 def _may_have_one(values: Array) -> bool:
-    """Whether some value is above or below both beside it twice, and far from them.
+    """Whether some value stands out twice, which `_one_code` asks for before it sorts all values.
 
-    That is less than `_one_code` asks for before it sorts all values, and most recordings have no
-    code. Blocks fit the cache of a processor.
+    Most recordings have none. Of a coarse and noisy signal many values do; then a code is also far
+    from the others beside it, of which a quarter may be codes.
     """
     here = values[np.isfinite(values)]
     if here.size < _FEWEST_SAMPLES:
         return False
-    least = _NEARLY * TIMES_CUBIC * _from_cubic(here[: 4 * _BLOCK])
+    starts = np.unique(np.linspace(0, max(here.size - _PIECE, 0), _PIECES).astype(int))
+    some = np.concatenate([here[start : start + _PIECE] for start in starts])
+    levels, times = np.unique(some, return_counts=True)
+    finest = float(np.min(np.diff(levels), initial=np.inf)) if levels.size > 1 else 0.0
+    usual = _TIMES_STEP * finest + _TIMES_CUBIC * _from_cubic(some)
+    found = _standing_out(here, _NEARLY * usual)
+    if found.size <= _MOST_TRIED:
+        return found.size > 0
+    others = _stands_out(some)
+    others = others[others > 0]
+    if others.size < _NOISY * some.size or times.max() > _DENSE * some.size:
+        return True
+    far = max(usual, _TIMES_OTHERS * float(np.quantile(others, 0.7)))
+    return _standing_out(here, _NEARLY * far).size > 0
+
+
+def _standing_out(values: Array, least: float) -> Array:
+    """Return the values that stand out by more than `least` twice, of blocks that fit a cache."""
     found = []
-    for begin in range(0, here.size, _BLOCK):
-        block = here[begin : begin + _BLOCK + 2]
+    for begin in range(0, values.size, _BLOCK):
+        block = values[begin : begin + _BLOCK + 4]
         rise = np.diff(block)
         far = np.abs(rise) > least
         turns = far[1:] & far[:-1] & (rise[1:] * rise[:-1] < 0)
-        found.append(block[1:-1][turns])
-    _, counts = np.unique(np.concatenate(found), return_counts=True)
-    return bool(np.any(counts >= FEWEST_OUTSIDE))
+        at = 2 + np.flatnonzero(turns[1:-1])
+        apart = _apart(block[at], *(block[at + k] for k in (-2, -1, 1, 2)))
+        found.append(block[at[apart > least]])
+    levels, counts = np.unique(np.concatenate(found), return_counts=True)
+    return np.asarray(levels[counts >= _FEWEST_OUTSIDE], dtype=np.float64)
 
 
-def _codes(values: Array) -> list[Code]:
-    held = held_rows(values)  # of a slower sensor each sample is several rows
-    samples = held if held.size else np.arange(values.size)
+def _codes(values: Array, samples: NDArray[np.intp]) -> list[Code]:
     left, found = values.copy(), list[Code]()
-    while len(found) < MOST_CODES:
+    while len(found) < _MOST_CODES:
         rows = samples[np.isfinite(left[samples])]
         value = _one_code(left[rows]) if rows.size >= _FEWEST_SAMPLES else None
         if value is None:
@@ -113,10 +137,10 @@ def _one_code(values: Array) -> float | None:
     if levels.size < 2:
         return None
     step = float(np.median(np.diff(levels)))
-    usual = TIMES_STEP * step + TIMES_CUBIC * _from_cubic(values)
+    usual = _TIMES_STEP * step + _TIMES_CUBIC * _from_cubic(values)
     often = np.bincount(level[_stands_out(values) > usual], minlength=levels.size)
-    often[times > LARGEST_SHARE * values.size] = 0
-    tried = [k for k in np.argsort(-often)[:_MOST_TRIED] if often[k] >= FEWEST_OUTSIDE]
+    often[times > _LARGEST_SHARE * values.size] = 0
+    tried = [k for k in np.argsort(-often)[:_MOST_TRIED] if often[k] >= _FEWEST_OUTSIDE]
     counts = {float(levels[k]): _times_far(values, level == k, step) for k in tried}
     best = max(counts, key=lambda value: counts[value], default=0.0)
     return best if counts and counts[best] else None
@@ -128,9 +152,9 @@ def _times_far(values: Array, own: NDArray[np.bool_], step: float) -> int:
     out = _stands_out(rest)
     others = out[out > 0]
     far = max(
-        TIMES_STEP * step,
-        TIMES_CUBIC * _from_cubic(rest),
-        TIMES_OTHERS * float(np.quantile(others, 0.9)) if others.size else 0.0,
+        _TIMES_STEP * step,
+        _TIMES_CUBIC * _from_cubic(rest),
+        _TIMES_OTHERS * float(np.quantile(others, 0.9)) if others.size else 0.0,
     )
     edges = np.flatnonzero(np.diff(np.concatenate(([False], own, [False]))))
     start, stop = edges.reshape(-1, 2)[(edges[::2] > 0) & (edges[1::2] < own.size)].T
@@ -139,12 +163,12 @@ def _times_far(values: Array, own: NDArray[np.bool_], step: float) -> int:
     start, stop, before = start[inside], stop[inside], before[inside]
     value = values[own][0]
     distance = _apart(value, *(rest[before + k] for k in (-1, 0, 1, 2)))
-    is_far = (distance > far) & (stop - start <= LONGEST_RUN)
+    is_far = (distance > far) & (stop - start <= _LONGEST_RUN)
     count = int(np.count_nonzero(is_far))
     outside = max(rest.min() - value, value - rest.max()) > np.ptp(rest)
-    if count < (FEWEST_OUTSIDE if outside else FEWEST) or count < LEAST_FAR * start.size:
+    if count < (_FEWEST_OUTSIDE if outside else _FEWEST) or count < _LEAST_FAR * start.size:
         return 0
-    near = np.abs(rest - value) < ALONE * float(np.median(distance[is_far]))
+    near = np.abs(rest - value) < _ALONE * float(np.median(distance[is_far]))
     return count if 3 * np.count_nonzero(near & (out > far)) < count else 0
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rigidimeter.analysis.reading_anew.clock import restarts, seconds
 from rigidimeter.analysis.reading_anew.columns import Array, Columns, label_text, nearest
 from rigidimeter.analysis.reading_anew.gaps import (
+    LONGEST_BRIDGED_S,
     Break,
     Loss,
     Rows,
@@ -179,8 +180,8 @@ def _clock(file: Columns, found: Signals, values: Dict[str, Array]) -> tuple[Row
     for name in (one for one in SENSORS if one in values):
         finite = np.isfinite(values[name])
         channels.append((found.clock_s(file, name)[finite], values[name][finite]))
-    longest = bridged_s(channels)
     pauses = np.diff(merged)[clock.gaps]
+    longest = bridged_s(channels) if pauses.min() <= LONGEST_BRIDGED_S else 0.0
     bridged = pauses[pauses <= longest]
     if not bridged.size:
         return clock, []

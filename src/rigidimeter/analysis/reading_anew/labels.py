@@ -15,10 +15,10 @@ from rigidimeter.analysis.reading_anew.mapping import Fault, Mapping
 from rigidimeter.analysis.reading_anew.quantities import names_epochs
 from rigidimeter.core.words import series
 
-ROWS_A_LABEL = 100
-"""A column whose label changes more often, on average, is no column of trials."""
-MOST_LABELS = 12
-"""Of a column that is not named as trials are: states, conditions, phases."""
+# A column whose label changes more often, on average, is no column of trials.
+_ROWS_A_LABEL = 100
+# Of a column that is not named as trials are: states, conditions, phases.
+_MOST_LABELS = 12
 _BLOCK = 2**16
 _DECIMALS = re.compile(r"-?\d*[.,]\d+")
 
@@ -66,9 +66,9 @@ def label_columns(
         header = read_header(name, one.unit)
         if name in used or one.size != n_rows or (not trials and (header.kind or header.unit)):
             continue
-        stretches = runs(one.read(), n_rows // ROWS_A_LABEL)
+        stretches = runs(one.read(), n_rows // _ROWS_A_LABEL)
         labels = list(dict.fromkeys(label for label, _, _ in stretches if label))
-        few = len(labels) <= MOST_LABELS and not any(_DECIMALS.fullmatch(text) for text in labels)
+        few = len(labels) <= _MOST_LABELS and not any(_DECIMALS.fullmatch(text) for text in labels)
         if len(stretches) > 1 and labels and (trials or few):
             alike.setdefault(tuple(start for _, start, _ in stretches), {})[name] = labels
     return alike

@@ -26,8 +26,8 @@ from rigidimeter.analysis.reading_anew.quantities import MOTION, names_epochs
 
 MOST_STEPS = 8
 MOST_PAIRS = 36
-BELONGS, DOES_NOT = 0.8, 0.5
-"""Of the share of a torque that the motion explains, the best and the second best."""
+# Of the share of a torque that the motion explains, the best and the second best.
+_BELONGS, _DOES_NOT = 0.8, 0.5
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def _pair(file: Columns, several: dict[str, Fault], read: dict[str, Array]) -> S
     explained = {both: _explained(file, both, read) for _, both in pairs}
     ranked = sorted(explained, key=lambda both: -explained[both])
     best, second = ranked[0], ranked[1]
-    if explained[best] < BELONGS or explained[second] > DOES_NOT:
+    if explained[best] < _BELONGS or explained[second] > _DOES_NOT:
         return None
     return best, (
         f"the share of the torque that the motion explains is {explained[best]:.2f} with "
@@ -116,7 +116,7 @@ def _one(file: Columns, several: dict[str, Fault], read: dict[str, Array]) -> St
     for name in (one for one in ("torque", "velocity", "angle") if one in several):
         explained = {one: _explained(file, one, read) for one in several[name].remedies}
         ranked = sorted((one for one in explained if explained[one]), key=lambda m: -explained[m])
-        if len(ranked) < 2 or explained[ranked[0]] < BELONGS or explained[ranked[1]] > DOES_NOT:
+        if len(ranked) < 2 or explained[ranked[0]] < _BELONGS or explained[ranked[1]] > _DOES_NOT:
             continue
         shown = ", ".join(f"{explained[m]:.2f} with {m.pick(name).column!r}" for m in ranked[:4])
         why = f"the share of the torque that the motion explains is {shown} as the {name}"
