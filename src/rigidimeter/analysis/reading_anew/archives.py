@@ -19,7 +19,7 @@ from rigidimeter.analysis.reading_anew.arrays import Expansion, Stored, check_co
 from rigidimeter.analysis.reading_anew.columns import Array, Column, Columns
 from rigidimeter.analysis.reading_anew.structures import columns_of_variables
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import RECORDING_BYTES, open_regular, printable
+from rigidimeter.core.files import printable
 
 VIRTUAL = b"virtual"
 """The key, in the metadata of a schema, of whether the recording was simulated: true or false."""
@@ -40,7 +40,7 @@ def read_npz(path: Path) -> Columns:
     Exception
         Whatever zipfile, zlib and NumPy raise on a damaged archive.
     """
-    with open_regular(path, RECORDING_BYTES) as file:
+    with path.open("rb") as file:
         if file.read(6) == np.lib.format.MAGIC_PREFIX:
             raise UserError(
                 f"{path} holds a single unnamed array; save the columns by name, with numpy.savez"
@@ -91,7 +91,7 @@ def _header(file: Any) -> tuple[tuple[int, ...], np.dtype[Any], int]:
 def _read(path: Path, member: zipfile.ZipInfo, name: str, expansion: Expansion) -> NDArray[Any]:
     expansion.take(name, member.file_size)
     with (
-        open_regular(path, RECORDING_BYTES) as file,
+        path.open("rb") as file,
         zipfile.ZipFile(file) as archive,
         archive.open(member) as entry,
     ):
@@ -116,7 +116,7 @@ def read_arrow(path: Path) -> Columns:
     import pyarrow.parquet
 
     expansion = Expansion(path, path.stat().st_size)
-    with open_regular(path, RECORDING_BYTES) as file:
+    with path.open("rb") as file:
         start = file.read(6)
         file.seek(0)
         if start[:4] == b"PAR1":

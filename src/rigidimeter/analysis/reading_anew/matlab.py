@@ -24,7 +24,7 @@ from rigidimeter.analysis.reading_anew.mapping import Mapping as Said
 from rigidimeter.analysis.reading_anew.streams import Stream, columns_of_streams
 from rigidimeter.analysis.reading_anew.structures import columns_of_variables
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import MAX_COLUMNS, RECORDING_BYTES, open_regular
+from rigidimeter.core.files import MAX_COLUMNS
 
 TIME = "time_s"
 # scipy's name of the variable without a name, which holds the values of objects.
@@ -50,7 +50,7 @@ def read_mat(path: Path, said: Said) -> Columns:
     Exception
         Whatever scipy, h5py and mat-io raise on a damaged file.
     """
-    with open_regular(path, RECORDING_BYTES) as file:
+    with path.open("rb") as file:
         start = file.read(520)
         expansion = Expansion(path, path.stat().st_size)
         if _HDF5 in (start[:8], start[512:520]):

@@ -183,7 +183,7 @@ def columns_of(path: Path, said: Mapping) -> Columns:
     """
     reader = reader_of(path)
     if not path.is_dir():
-        # Not a pipe or a device, which a library would wait for.
+        # Not a pipe or a device, which a library would wait for; hashed here, and nowhere else.
         with open_regular(path, RECORDING_BYTES) as file:
             if not file.read(1):
                 what = f"a recording in a {path.suffix} file was expected"

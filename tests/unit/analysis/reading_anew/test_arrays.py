@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +16,7 @@ from tests.known_joint import angle_rad, torque_nm
 
 from rigidimeter.analysis.reading_anew import Mapping, columns_of, mapping_of, read_file
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import noted_digests
 
 T = np.arange(3000) / 200.0
 M, A = torque_nm(T, 1), angle_rad(T, 1)
@@ -156,3 +158,24 @@ def test_a_damaged_file_is_refused_in_a_sentence_or_read_as_it_was(
     path.write_bytes(whole[: int(rng.integers(1, len(whole) - 1))])
     with pytest.raises(UserError, match=re.escape(file)):
         read_file(path)
+
+
+@pytest.mark.parametrize("file", ["r.npz", "r.mat", "r.h5", "r.csv"])
+def test_a_file_is_hashed_once(tmp_path: Path, file: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, made = tmp_path / file, []
+    if file == "r.csv":
+        rows = np.column_stack([T, M, A])
+        np.savetxt(path, rows, delimiter=",", header="time_s,torque_nm,angle_rad", comments="")
+    else:
+        WRITERS[file](path, time_s=T, torque_nm=M, angle_rad=A)
+    digest = hashlib.file_digest
+
+    def counted(opened: object, name: str) -> object:
+        made.append(name)
+        return digest(opened, name)
+
+    monkeypatch.setattr(hashlib, "file_digest", counted)
+    with noted_digests() as digests:
+        read_file(path)
+    assert digests == {path: hashlib.sha256(path.read_bytes()).hexdigest()}
+    assert made == ["sha256"]

@@ -40,7 +40,6 @@ from rigidimeter.core.files import (
     as_read,
     content,
     joined_names,
-    open_regular,
     printable,
     read_utf8,
     records,
@@ -99,7 +98,7 @@ def read_text(path: Path, said: Mapping) -> Columns:
     UserError
         If it is not such a file; the sentence names the line where there is one.
     """
-    with open_regular(path, RECORDING_BYTES) as file:
+    with path.open("rb") as file:
         plain = _plain(path, file, said)
         frame = None if plain is None else _parsed(str(path), plain)
         if plain is not None and frame is not None and _is_as_meant(plain, file, frame):
