@@ -121,7 +121,7 @@ def unwrapped(angle_rad: Array) -> tuple[Array, int]:
     1
     """
     low, high = np.nanmin(angle_rad, initial=np.inf), np.nanmax(angle_rad, initial=-np.inf)
-    if not TURN_RAD / 2 < high - low <= TURN_RAD * (1 + _ROUNDING):
+    if not TURN_RAD / 2 < float(high) - float(low) <= TURN_RAD * (1 + _ROUNDING):
         return angle_rad, 0
     here = np.flatnonzero(np.isfinite(angle_rad))
     inside = angle_rad[here]

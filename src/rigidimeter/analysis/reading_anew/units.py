@@ -211,8 +211,10 @@ def split_number(text: str) -> tuple[float, Unit | None]:
     found = _NUMBER.fullmatch(text)
     if found is None:
         return 0.0, None
-    number = float(found[1].replace(",", "."))
-    return number, unit_of(found[2]) if found[2] else NO_UNIT
+    number, unit = float(found[1].replace(",", ".")), unit_of(found[2]) if found[2] else NO_UNIT
+    if unit is not None and unit.dimension == {(RATIO, 1)}:  # of a scale such as 2 Nm/Nm
+        unit = Unit(unit.size, NO_UNIT.dimension)
+    return number, unit
 
 
 def divided_by(scale: str) -> str:
