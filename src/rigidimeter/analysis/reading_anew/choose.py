@@ -117,10 +117,8 @@ def choose(file: Columns, said: Mapping) -> Chosen:
             chosen.faults.append(_no_such_column(file, said, name, column))
     emg, unused = _emg_columns(file, headers, said, used)
     chosen.unused += unused
-    for name in QUANTITIES:
-        candidates = emg.get(name, []) if name in EMG else _candidates(
-            file, name, headers, said, used
-        )  # fmt: skip
+    by_name = {q: _candidates(file, q, headers, said, used) for q in QUANTITIES if q not in EMG}
+    for name, candidates in (by_name | emg).items():
         if len(candidates) > 1:
             chosen.several[name] = candidates
         elif candidates:
@@ -130,11 +128,11 @@ def choose(file: Columns, said: Mapping) -> Chosen:
 
 
 def _without_columns(said: Mapping) -> dict[str, Any]:
-    """Return the fields of a mapping that are of no quantity and no label."""
+    """Return the fields of a mapping that are of no column, and what is left out on purpose."""
     return {
         name: getattr(said, name)
         for name in Mapping.model_fields
-        if name not in QUANTITIES and not name.endswith("_column")
+        if (said.pick(name).leaves_out if name in QUANTITIES else not name.endswith("_column"))
     }
 
 

@@ -87,7 +87,8 @@ def _by_name(name: str) -> Header:
     if len(name.strip()) > 1 and alone and measures(alone, "time") and alone.size <= 1.0:
         return Header("time", name.strip())  # such as mSec; `min` may be a minimum
     unknown = "" if bracketed is None else bracketed[2].strip()
-    return Header(_kind(name), unknown="" if unit_of(unknown) else unknown)
+    is_place = unknown.isdigit()  # of a column of a matrix, as q[3]
+    return Header(_kind(name), unknown="" if is_place or unit_of(unknown) else unknown)
 
 
 def _is_whole(unit: str) -> bool:

@@ -61,6 +61,8 @@ def series(file: h5py.File, name: str, data: np.ndarray, unit: str) -> None:
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_matrix_has_columns(tmp_path: Path, file: str, turned: bool) -> None:
     WRITERS[file](tmp_path / file, t=T, q=Q.T if turned else Q)
+    with pytest.raises(UserError, match="no name of them is known"):
+        read_file(tmp_path / file)
     said = mapping_of(
         column={"time": "t", "torque": "q[0]", "angle": "q[2]"},
         unit={"time": "s", "torque": "Nm", "angle": "rad"},
