@@ -108,6 +108,13 @@ class Reader(NamedTuple):
 
 READERS: tuple[Reader, ...] = (
     Reader(
+        "BIDS motion recording",
+        (".tsv",),
+        "bids.read_bids_motion",
+        sniff="bids.is_bids_motion",
+        made_by="a program that writes BIDS-Motion",
+    ),
+    Reader(
         "text table",
         (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".sto", ".mot", ".gz"),
         "text.body.read_text",
@@ -124,6 +131,30 @@ READERS: tuple[Reader, ...] = (
     ),
     Reader("NWB file", (".nwb",), "nwb.read_nwb", made_by="a program that writes NWB", extra="nwb"),
     Reader("HDF5 file", (".h5", ".hdf5"), "hdf5.read_hdf5", made_by="h5py", extra="matlab"),
+    Reader(
+        "spreadsheet",
+        (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"),
+        "sheets.read_spreadsheet",
+        made_by="Excel or LibreOffice",
+        extra="excel",
+        takes_mapping=True,
+    ),
+    Reader("XDF file", (".xdf", ".xdfz"), "xdf.read_xdf", made_by="LabRecorder", extra="xdf"),
+    Reader("TDMS file", (".tdms",), "tdms.read_tdms", made_by="LabVIEW", extra="tdms"),
+    Reader(
+        "C3D file",
+        (".c3d",),
+        "instruments.read_c3d",
+        made_by="a program of motion capture",
+        extra="c3d",
+    ),
+    Reader(
+        "electrophysiology file",
+        (".smr", ".smrx", ".abf", ".plx", *(f".ns{k}" for k in range(1, 7))),
+        "instruments.read_neurophysiology",
+        made_by="Spike2, pCLAMP, Central or Plexon",
+        extra="neo",
+    ),
     Reader(
         "Parquet or Arrow file",
         (".parquet", ".feather", ".arrow", ".arrows"),
