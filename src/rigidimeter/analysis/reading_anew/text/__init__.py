@@ -1,0 +1,1 @@
+"""Recordings as text: one path, on which the programs that wrote them are rows of a table."""
