@@ -1,0 +1,236 @@
+"""One study in both rooms, their answers in two columns.
+
+    python -m tests.study_anew.both              200 random studies
+    python -m tests.study_anew.both 1000 1500    those with these seeds
+
+The result of the room that is replaced is taken apart into what was recorded (estimates, sessions,
+ratings, what was declared); the new room begins there.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, fields
+from typing import Any, NamedTuple
+
+import numpy as np
+from tests.study_anew.designs import random_study
+
+from rigidimeter.analysis import study as old
+from rigidimeter.analysis import study_anew as new
+
+CLOSE = 1e-12
+"""Numbers agree to this share of the larger."""
+CANCELLED = 1e-15
+"""So far off a difference may be in any case (100 times that in per cent): of values that are almost
+equal no more is known. Not p."""
+
+Rows = Sequence[Mapping[str, Any]]
+
+
+class Answers(NamedTuple):
+    """What is concluded of a study, as documents and sentences have it."""
+
+    conclusion: Rows
+    statements: Rows
+    lead: str
+    values: Rows
+    groups: Rows
+
+    def cells(self) -> dict[str, Any]:
+        """Return every answer by its name."""
+        found: dict[str, Any] = {"lead": self.lead}
+        for table in ("conclusion", "statements", "values", "groups"):
+            for k, row in enumerate(getattr(self, table)):
+                where = f"{table} {row.get('measure', k)} {row['other']}"
+                found |= {f"{where} {name}": cell for name, cell in row.items()}
+        return found
+
+
+def old_answers(result: old.StudyResult) -> Answers:
+    """Return what the room that is replaced says."""
+    pairs = (result, *result.further_pairs)
+    tested = [c for c in (*result.comparisons, *result.further) if c.paired]
+    return Answers(
+        old.conclusion_rows(result),
+        [
+            {"other": pair.other, **said._asdict()}
+            for pair in pairs
+            if (said := old.statements(pair)) is not None
+        ],
+        old.lead(result),
+        [
+            {
+                "measure": c.measure.name,
+                "other": c.other,
+                "p_holm": c.p_holm,
+                **{name: getattr(c.test, name, None) for name in ("z", "p", "r", "shift")},
+                **{name: getattr(c.test, name, None) for name in ("shift_low", "shift_high", "u")},
+                "remark": c.remark,
+            }
+            for c in tested
+        ],
+        [
+            {"measure": c.measure.name, "other": c.other, "groups": " ".join(c.groups)}
+            for c in tested
+        ],
+    )
+
+
+def new_answers(study: new.Study, methods: Sequence[new.OfMethod]) -> Answers:
+    """Return what the new room says."""
+    concluded = new.conclude(study, new.compare(study), methods)
+    said = new.statements(study, concluded)
+    others = list(dict.fromkeys(one.other for one in concluded))
+    values = [one for one in new.compare_values(study) if one.other]
+    return Answers(
+        new.conclusion_rows(concluded, methods),
+        [{"other": other, **one._asdict()} for other, one in zip(others, said, strict=True)],
+        new.lead(study, concluded),
+        [
+            {
+                "measure": one.measure.name,
+                "other": one.other,
+                "p_holm": one.p_adjusted,
+                **{name: getattr(one.statistic, name, None) for name in ("z", "p", "r", "shift")},
+                **{
+                    name: getattr(one.statistic, name, None)
+                    for name in ("shift_low", "shift_high", "u")
+                },
+                "remark": one.remark,
+            }
+            for one in values
+        ],
+        [
+            {
+                "measure": one.measure.name,
+                "other": one.other,
+                "groups": " ".join(
+                    new.groups_of(new.counting(study.rows, one.measure.name), one.pair)
+                ),
+            }
+            for one in values
+        ],
+    )
+
+
+def new_study(result: old.StudyResult) -> tuple[new.Study, list[new.OfMethod]]:
+    """Return what was recorded of a study, and what other methods gave."""
+    sessions = {one.source: _as(new.SessionEntry, one) for one in result.sessions}
+    conditions = tuple(_as(new.Condition, one) for one in result.conditions)
+    method = result.analysis.method or "iv"
+    parts = [
+        new.estimate_rows({method: result.analysis}, sessions or None, result.epochs, conditions)
+    ]
+    ratings = None
+    if result.ratings is not None:
+        ratings = _ratings(result.ratings, result.sessions)
+        parts.append(new.as_rows(new.corrected(ratings).to_dict("records")))
+    virtual = [epoch.virtual for epoch in result.epochs]
+    study = new.Study(
+        new.together(parts),
+        result.reference,
+        result.other,
+        tuple(dict.fromkeys(c.other for c in result.further)),
+        title=result.title,
+        primary=_as(new.Primary, result.primary),
+        settings=result.settings,
+        conditions=conditions,
+        sessions=tuple(sessions.values()),
+        left_out=tuple(_as(new.LeftOut, one) for one in result.left_out),
+        ratings=ratings,
+        blinded=result.blinded,
+        virtual=result.virtual,
+        partly_virtual=any(virtual),
+    )
+    return study, [_of_method(row, result) for row in result.sensitivity]
+
+
+def _as(kind: type, one: Any) -> Any:
+    return kind(**{field.name: getattr(one, field.name) for field in fields(one)})
+
+
+def _ratings(found: old.RatingsFound, sessions: Sequence[old.SessionEntry]) -> new.Ratings:
+    groups = {one.subject: one.group for one in sessions}
+    scores = new.as_rows(
+        {
+            **{name: getattr(row, name) for name in ("subject", "day", "condition")},
+            "group": groups.get(row.subject, ""),
+            "rater": row.examiner,
+            "epoch": f"line {row.line}",
+            "measure": new.SCORE,
+            "chosen": False,
+            "value": row.score,
+        }
+        for row in found.rows
+    )
+    random = tuple(found.fit.offsets)
+    return new.ratings_of(found.source, scores, random)
+
+
+def _of_method(row: old.SensitivityRow, result: old.StudyResult) -> new.OfMethod:
+    measure = new.Measure(*(asdict(row.measure)[name] for name in new.Measure._fields))
+    of = (measure, result.reference, result.other)
+    counts = (row.n_reference, row.n_other)
+    values = new.Compared(*of, "values", counts, p=row.p, difference=-row.shift)
+    days = new.Compared(*of, "days", counts, p=row.p_day)
+    return new.OfMethod(row.method, row.inertia, row.chosen, values, days)
+
+
+class Apart(NamedTuple):
+    """An answer that differs."""
+
+    name: str
+    old: Any
+    new: Any
+
+    def __str__(self) -> str:
+        return f"{self.name}\n    old {self.old!r}\n    new {self.new!r}"
+
+
+def apart(before: Answers, now: Answers, close: float = CLOSE) -> Iterator[Apart]:
+    """Yield what differs; numbers by more than a share of the larger, words by anything."""
+    one, two = before.cells(), now.cells()
+    for name in {**one, **two}:
+        first, second = one.get(name, "absent"), two.get(name, "absent")
+        allowed = 0.0 if name.endswith((" p", " p_holm")) else CANCELLED
+        allowed *= 100.0 if "percent" in name else 1.0
+        if first != second and not _close(first, second, close, allowed):
+            yield Apart(name, first, second)
+
+
+def _close(first: Any, second: Any, close: float, allowed: float) -> bool:
+    if not all(isinstance(one, float | np.floating) for one in (first, second)):
+        return False
+    if math.isnan(first) and math.isnan(second):
+        return True
+    return abs(first - second) <= max(close * max(abs(first), abs(second)), allowed)
+
+
+def compare_seeds(seeds: range) -> int:
+    """Print what differs in random studies; return how many differ."""
+    seen: Counter[str] = Counter()
+    differing = 0
+    for seed in seeds:
+        for known_days in (True, False):
+            result = random_study(seed, known_days=known_days)
+            before = old_answers(result)
+            found = list(apart(before, new_answers(*new_study(result))))
+            differing += bool(found)
+            seen["studies"] += 1
+            seen.update(f"verdict {row['verdict']}" for row in before.conclusion)
+            seen.update(f"reason {row['finding']}" for row in before.conclusion if row["finding"])
+            for one in found[:5]:
+                print(f"seed {seed}, days known: {known_days}: {one}")
+    for name, count in sorted(seen.items()):
+        print(f"{count:7}  {name}")
+    print(f"{differing:7}  studies differ")
+    return differing
+
+
+if __name__ == "__main__":
+    ends = [int(word) for word in sys.argv[1:]] or [0, 100]
+    sys.exit(bool(compare_seeds(range(*ends))))
