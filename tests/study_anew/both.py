@@ -17,15 +17,16 @@ from dataclasses import asdict, fields
 from typing import Any, NamedTuple
 
 import numpy as np
-from tests.study_anew.designs import random_study
+from tests.study_anew.designs import random_study, random_table
 
 from rigidimeter.analysis import study as old
 from rigidimeter.analysis import study_anew as new
+from rigidimeter.core.errors import UserError
 
 CLOSE = 1e-12
 """Numbers agree to this share of the larger."""
 CANCELLED = 1e-15
-"""So far off a difference may be in any case (100 times that in per cent): of values that are almost
+"""A difference (100 times that in per cent) may be as far off: of values that are almost
 equal no more is known. Not p."""
 
 Rows = Sequence[Mapping[str, Any]]
@@ -39,10 +40,11 @@ class Answers(NamedTuple):
     lead: str
     values: Rows
     groups: Rows
+    notices: Sequence[str] = ()
 
     def cells(self) -> dict[str, Any]:
         """Return every answer by its name."""
-        found: dict[str, Any] = {"lead": self.lead}
+        found: dict[str, Any] = {"lead": self.lead, "notices": list(self.notices)}
         for table in ("conclusion", "statements", "values", "groups"):
             for k, row in enumerate(getattr(self, table)):
                 where = f"{table} {row.get('measure', k)} {row['other']}"
@@ -115,6 +117,28 @@ def new_answers(study: new.Study, methods: Sequence[new.OfMethod]) -> Answers:
             for one in values
         ],
     )
+
+
+def of_table(seed: int) -> tuple[Answers | str, Answers | str]:
+    """Return what both rooms say of a random table, or why they refuse it."""
+    table, options = random_table(seed)
+    before: Answers | str
+    now: Answers | str
+    try:
+        result = old.compare(table, resamples=0, **options)
+    except UserError as error:
+        before = str(error)
+    else:
+        before = old_answers(result)._replace(notices=[one.text for one in result.notices])
+    pair = options["reference"], options["other"]
+    columns = new.Columns(options["value"], options["by"], options["session"])
+    try:
+        study = new.table_study(table, columns, pair, options["group"])
+    except UserError as error:
+        now = str(error)
+    else:
+        now = new_answers(study, ())._replace(notices=[one.text for one in study.notices])
+    return before, now
 
 
 def new_study(result: old.StudyResult) -> tuple[new.Study, list[new.OfMethod]]:
@@ -191,8 +215,12 @@ class Apart(NamedTuple):
         return f"{self.name}\n    old {self.old!r}\n    new {self.new!r}"
 
 
-def apart(before: Answers, now: Answers, close: float = CLOSE) -> Iterator[Apart]:
+def apart(before: Answers | str, now: Answers | str, close: float = CLOSE) -> Iterator[Apart]:
     """Yield what differs; numbers by more than a share of the larger, words by anything."""
+    if isinstance(before, str) or isinstance(now, str):
+        if before != now:
+            yield Apart("refusal", before, now)
+        return
     one, two = before.cells(), now.cells()
     for name in {**one, **two}:
         first, second = one.get(name, "absent"), two.get(name, "absent")
@@ -225,6 +253,13 @@ def compare_seeds(seeds: range) -> int:
             seen.update(f"reason {row['finding']}" for row in before.conclusion if row["finding"])
             for one in found[:5]:
                 print(f"seed {seed}, days known: {known_days}: {one}")
+        of_both = of_table(seed)
+        found = list(apart(*of_both))
+        differing += bool(found)
+        seen["tables"] += 1
+        seen["tables that are refused"] += isinstance(of_both[0], str)
+        for one in found[:5]:
+            print(f"table {seed}: {one}")
     for name, count in sorted(seen.items()):
         print(f"{count:7}  {name}")
     print(f"{differing:7}  studies differ")

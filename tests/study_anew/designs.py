@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from tests.unit.analysis.report.cohorts import (
     JOINT,
     PULL,
@@ -302,3 +303,46 @@ def _by_methods(comparisons: tuple[Comparison, ...], rng: np.random.Generator) -
                     yield sensitivity_row(c.measure, method, inertia, group, factor)
                 except ValueError:  # one day
                     continue
+
+
+def random_table(seed: int) -> tuple[pd.DataFrame, dict[str, Any]]:
+    """Return a table as a laboratory may have it, and how it is to be compared.
+
+    Some have subjects, days, groups, sessions or outcomes, cells that are missing or negative, or
+    are too small or wrong, so that there is nothing to compare.
+    """
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 40))
+    names = ["ON", "OFF", "half"][: rng.integers(2, 4)]
+    table = pd.DataFrame({"state": rng.choice(names, n)})
+    shift = 0.5 * (table["state"] != "OFF") * rng.choice([0.0, 1.0, 4.0])
+    for name in ("k", "b")[: rng.integers(1, 3)]:
+        table[name] = np.round(3.0 - shift + rng.standard_normal(n), int(rng.choice([1, 6])))
+        if rng.random() < 0.5:
+            table[name] = table[name].abs() + 0.1
+        table.loc[rng.random(n) < rng.choice([0.0, 0.1]), name] = np.nan
+    values = list(table.columns[1:])
+    if rng.random() < 0.5:
+        table["Subject"] = rng.choice(["R1", "R2", "R3", "R4"][: rng.integers(1, 5)], n)
+    if rng.random() < 0.5:
+        table["day"] = rng.integers(1, 7, n).astype(str)
+        if rng.random() < 0.1:
+            table.loc[0, "day"] = ""
+        elif rng.random() < 0.1:
+            table.loc[0, "day"] = "0" + table.loc[0, "day"]
+    if rng.random() < 0.2:
+        table["group"] = rng.choice(["patients", "controls"], n)
+    if rng.random() < 0.2:
+        table["visit"] = rng.choice(["first", "second"], n)
+    if rng.random() < 0.2:
+        table["outcome"] = rng.choice(["included", "included", "failed"], n)
+    table["box"] = rng.integers(1, 9, n).astype(str)
+    options: dict[str, Any] = {"value": values, "by": "state"}
+    for name, choices in (
+        ("session", [None, None, "box"]),
+        ("group", [None] * 4 + ["patients"]),
+        ("other", [None, None, "ON"]),
+        ("reference", [*[None] * 5, "OFF", "OFF", "gone"]),
+    ):
+        options[name] = choices[rng.integers(len(choices))]
+    return table, options

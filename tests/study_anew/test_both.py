@@ -3,7 +3,7 @@
 from collections import Counter
 
 import pytest
-from tests.study_anew.both import apart, new_answers, new_study, old_answers
+from tests.study_anew.both import apart, new_answers, new_study, of_table, old_answers
 from tests.study_anew.designs import random_study
 from tests.unit.analysis.report.cohorts import Design, made_study
 
@@ -46,6 +46,11 @@ def test_the_random_studies_reach_every_verdict(reached: Counter[str]) -> None:
 def test_of_a_made_study(design: Design) -> None:
     result = made_study(design)
     assert not list(apart(old_answers(result), new_answers(*new_study(result))))
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_of_a_random_table(seed: int) -> None:
+    assert not list(apart(*of_table(seed)))
 
 
 @pytest.mark.slow

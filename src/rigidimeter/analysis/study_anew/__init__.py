@@ -3,6 +3,7 @@
 Not used by the program yet: it takes the place of `analysis.study` when it is whole.
 """
 
+from rigidimeter.analysis.study_anew.any_table import Columns, table_study
 from rigidimeter.analysis.study_anew.caveats import groups_of
 from rigidimeter.analysis.study_anew.compare import compare, compare_values, effects
 from rigidimeter.analysis.study_anew.compared import Compared, signed

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
@@ -12,6 +12,15 @@ from rigidimeter.analysis.statistics import Mixed
 from rigidimeter.analysis.study_anew.families import Primary
 from rigidimeter.core.records import Notice
 from rigidimeter.core.settings import Settings
+
+GROUP = "group"
+"""The column that says of which group, such as patients, a subject is."""
+
+
+def no_such_group(source: str, group: str, labels: Iterable[str]) -> str:
+    """Return that a table has no such group of subjects, and which it has."""
+    known = ", ".join(filter(None, dict.fromkeys(labels)))
+    return f"{source}: there is no group {group}; there are: {known or 'none'}"
 
 
 @dataclass(frozen=True)
