@@ -14,6 +14,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,13 +42,19 @@ class Answers(NamedTuple):
     values: Rows
     groups: Rows
     notices: Sequence[str] = ()
+    sensitivity: Rows = ()
+    exclusions: Rows = ()
+    left_out: Rows = ()
+    sessions: Rows = ()
+    conditions: Rows = ()
+    digests: Rows = ()
 
     def cells(self) -> dict[str, Any]:
         """Return every answer by its name."""
         found: dict[str, Any] = {"lead": self.lead, "notices": list(self.notices)}
-        for table in ("conclusion", "statements", "values", "groups"):
-            for k, row in enumerate(getattr(self, table)):
-                where = f"{table} {row.get('measure', k)} {row['other']}"
+        for table in self._fields:
+            for k, row in enumerate(() if table in found else getattr(self, table)):
+                where = f"{table} {row.get('measure', k)} {row.get('other', k)}"
                 found |= {f"{where} {name}": cell for name, cell in row.items()}
         return found
 
@@ -119,6 +126,43 @@ def new_answers(study: new.Study, methods: Sequence[new.OfMethod]) -> Answers:
     )
 
 
+def of_folder(folder: Path, **options: Any) -> tuple[Answers | str, Answers | str]:
+    """Return what both rooms say of a study folder, read and estimated by each, or refuse."""
+    before: Answers | str
+    now: Answers | str
+    try:
+        read = old.read_study(folder, **options)
+    except UserError as error:
+        before = str(error)
+    else:
+        result = old.analyse_study(read, resamples=0)
+        before = old_answers(result)._replace(
+            notices=[f"{one.level} {one.text}" for one in result.notices],
+            sensitivity=old.result_table(result, "sensitivity"),
+            exclusions=old.result_table(result, "excluded_epochs"),
+            left_out=old.result_table(result, "left_out"),
+            sessions=old.result_table(result, "sessions"),
+            conditions=[asdict(one) for one in result.conditions],
+            digests=[{**read.folder.digests, **read.gathered.digests}],
+        )
+    try:
+        loaded = new.load_study(folder, **options)
+    except UserError as error:
+        return before, str(error)
+    study = new.analyse(loaded)
+    methods, notices = new.sensitivity(study.rows, (study.reference, study.other))
+    now = new_answers(study, methods)._replace(
+        notices=[f"{one.level} {one.text}" for one in (*study.notices, *notices)],
+        sensitivity=[one.row() for one in methods],
+        exclusions=[one._asdict() for one in study.exclusions],
+        left_out=[one._asdict() for one in study.left_out],
+        sessions=[one._asdict() for one in study.sessions],
+        conditions=[asdict(one) for one in study.conditions],
+        digests=[study.digests],
+    )
+    return before, now
+
+
 def of_table(seed: int) -> tuple[Answers | str, Answers | str]:
     """Return what both rooms say of a random table, or why they refuse it."""
     table, options = random_table(seed)
@@ -152,7 +196,7 @@ def new_study(result: old.StudyResult) -> tuple[new.Study, list[new.OfMethod]]:
     ratings = None
     if result.ratings is not None:
         ratings = _ratings(result.ratings, result.sessions)
-        parts.append(new.as_rows(new.corrected(ratings).to_dict("records")))
+        parts.append(new.corrected(ratings))
     virtual = [epoch.virtual for epoch in result.epochs]
     study = new.Study(
         new.together(parts),

@@ -5,25 +5,30 @@ Not used by the program yet: it takes the place of `analysis.study` when it is w
 
 from rigidimeter.analysis.study_anew.any_table import Columns, table_study
 from rigidimeter.analysis.study_anew.caveats import groups_of
-from rigidimeter.analysis.study_anew.compare import compare, compare_values, effects
 from rigidimeter.analysis.study_anew.compared import Compared, signed
-from rigidimeter.analysis.study_anew.conclude import conclude
+from rigidimeter.analysis.study_anew.comparisons import (
+    OfMethod,
+    compare,
+    compare_values,
+    effects,
+    sensitivity,
+)
 from rigidimeter.analysis.study_anew.document import conclusion_rows
-from rigidimeter.analysis.study_anew.estimate_rows import blocks, estimate_rows
-from rigidimeter.analysis.study_anew.families import Primary
-from rigidimeter.analysis.study_anew.measures import MEASURES, RATING, SCORE, Measure
+from rigidimeter.analysis.study_anew.from_folder import Loaded, analyse, load_study
+from rigidimeter.analysis.study_anew.measures import MEASURES, RATING, SCORE, Measure, Primary
 from rigidimeter.analysis.study_anew.precision import Precision, precisions, precisions_of_each
 from rigidimeter.analysis.study_anew.ratings import corrected, rating_test, ratings_of
 from rigidimeter.analysis.study_anew.rows import (
     FIELDS,
     as_rows,
+    blocks,
     counting,
+    estimate_rows,
     read_rows,
     together,
     write_rows,
 )
-from rigidimeter.analysis.study_anew.sensitivity import OfMethod, sensitivity
-from rigidimeter.analysis.study_anew.statements import Statement, lead, statement, statements
+from rigidimeter.analysis.study_anew.sentences import Statement, lead, statement, statements
 from rigidimeter.analysis.study_anew.study import (
     Condition,
     Deviation,
@@ -34,3 +39,4 @@ from rigidimeter.analysis.study_anew.study import (
     Study,
 )
 from rigidimeter.analysis.study_anew.tests import by_units, by_values, tested
+from rigidimeter.analysis.study_anew.verdicts import conclude

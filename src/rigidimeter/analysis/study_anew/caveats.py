@@ -17,11 +17,10 @@ import pandas as pd
 
 from rigidimeter.analysis.estimation import method_named
 from rigidimeter.analysis.study_anew.compared import Compared, signed
-from rigidimeter.analysis.study_anew.estimate_rows import ALIKE_IN_BOTH, OF_SUBJECT
-from rigidimeter.analysis.study_anew.families import LEVEL
+from rigidimeter.analysis.study_anew.comparisons import OfMethod
+from rigidimeter.analysis.study_anew.measures import LEVEL
 from rigidimeter.analysis.study_anew.ratings import one_sided, without_raters
-from rigidimeter.analysis.study_anew.rows import pooled
-from rigidimeter.analysis.study_anew.sensitivity import OfMethod
+from rigidimeter.analysis.study_anew.rows import ALIKE_IN_BOTH, OF_SUBJECT, pooled
 from rigidimeter.analysis.study_anew.study import Study
 from rigidimeter.analysis.study_anew.tests import Pair, of_difference, tested
 from rigidimeter.core.findings import Fact, Finding, found_between

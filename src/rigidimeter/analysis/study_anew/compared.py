@@ -16,8 +16,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from rigidimeter.analysis.statistics import DayDifference, RankSum
-from rigidimeter.analysis.study_anew.families import LEVEL, Family, Role
-from rigidimeter.analysis.study_anew.measures import Measure
+from rigidimeter.analysis.study_anew.measures import LEVEL, Family, Measure, Role
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.words import clear_of_zero, decimals, fixed, p_text, within
 

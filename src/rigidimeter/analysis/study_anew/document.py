@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from rigidimeter.analysis.study_anew.compared import Compared
-from rigidimeter.analysis.study_anew.sensitivity import OfMethod, method_caveats
+from rigidimeter.analysis.study_anew.comparisons import OfMethod, method_caveats
 from rigidimeter.core.words import within
 
 

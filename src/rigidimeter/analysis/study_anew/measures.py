@@ -1,13 +1,34 @@
-"""What is compared: the measures, and which two conditions."""
+"""What is compared: measures, two conditions, and for which tests together p is adjusted.
+
+Primary measures, which a study declares, are one family, by Holm's method or in a fixed sequence.
+All others are secondary, by Holm's method among themselves, but the inertia: no treatment changes
+it, so that it checks the instrument and is in no family. In a sequence
+
+    p of a measure = c · the largest p of it and of those before it
+
+with c the number of conditions that are compared with the reference. Columns of a table, and a
+study that was compared before anything could be declared, are one family by Holm's method.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
-from typing import Literal, NamedTuple
+from dataclasses import dataclass, field
+from datetime import date
+from typing import Any, Literal, NamedTuple
 
+from rigidimeter.analysis.statistics import holm
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.records import Notice
+from rigidimeter.core.study_files import PrimaryTable
+from rigidimeter.core.words import series
 
 Origin = Literal["fits", "scores", "ratings", "column"]
+Role = Literal["primary", "secondary", "check"]
+
+LEVEL = 0.05
+"""Below it p shows a difference."""
 
 _SHOWN = 8
 
@@ -127,3 +148,144 @@ def chosen_pair(
         raise UserError(f"a comparison needs two conditions; {holder} {listed}; {remedy}")
     first = first or next(name for name in known if name != second)
     return first, second or next(name for name in known if name != first)
+
+
+class Family(NamedTuple):
+    """The tests that p of one of them is adjusted for.
+
+    `tests` is their number; `first` is that by which the level of the first of them is divided;
+    `order` names the measures of a sequence.
+    """
+
+    role: Role = "primary"
+    rule: Literal["holm", "sequence", "none"] = "none"
+    tests: int = 1
+    first: int = 1
+    order: tuple[str, ...] = ()
+
+    @property
+    def level(self) -> float:
+        """The level of the first test of the family."""
+        return LEVEL / self.first
+
+
+class PValue(NamedTuple):
+    """A test by its measure, the condition that is compared with the reference, and p; or NaN."""
+
+    measure: Measure
+    other: str
+    p: float
+
+
+@dataclass(frozen=True)
+class Primary:
+    """What a study concludes from, and where that is from.
+
+    Attributes
+    ----------
+    table : PrimaryTable
+    source : str
+        ``study.toml``, ``default``, or ``earlier comparison``, which had all measures in one
+        family.
+    first_recording : date or None
+        The first day that is named by a date.
+    """
+
+    table: PrimaryTable = field(default_factory=PrimaryTable)
+    source: Literal["study.toml", "default", "earlier comparison"] = "default"
+    first_recording: date | None = None
+
+    def role(self, measure: Measure) -> Role:
+        """Return what a measure is to the study."""
+        if measure.origin == "column" or self.source == "earlier comparison":
+            return "primary"
+        if measure.name == CHECK:
+            return "check"
+        return "primary" if measure.name in self.table.measures else "secondary"
+
+    def before(self, measure: Measure) -> str:
+        """Return the words of the measures before one in the declared sequence."""
+        declared: list[str] = [*self.table.measures]
+        names = declared[: declared.index(measure.name)]
+        return series([measure_of(name).short for name in names])
+
+    @property
+    def late(self) -> bool:
+        """Whether the measures were declared after the first recording, as far as is known."""
+        declared, first = self.table.declared, self.first_recording
+        return declared is not None and first is not None and declared > first
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """What is odd about the declaration."""
+        text = ""
+        if self.source == "earlier comparison":
+            text = (
+                "study.toml has no [primary], and analysis/ holds an earlier comparison, so all "
+                "measures stay one family by Holm's method, J among them; declare [primary] to "
+                "conclude from K and B"
+            )
+        elif self.late:
+            text = (
+                f"study.toml: the primary measures were declared on {self.table.declared}, after "
+                f"the first recording, of {self.first_recording}"
+            )
+        return (Notice("warning", text),) if text else ()
+
+    def row(self, measures: Iterable[Measure]) -> dict[str, Any]:
+        """Return the declaration as documents have it, of the measures that were compared."""
+        names = [each.name for each in measures if self.role(each) == "primary"]
+        declared_alone = self.source != "earlier comparison" and {*names} <= {*self.table.measures}
+        declared, first = self.table.declared, self.first_recording
+        return {
+            "measures": list(self.table.measures) if declared_alone else names,
+            "rule": self.table.rule,
+            "difference_percent": self.table.difference_percent,
+            "declared": None if declared is None else declared.isoformat(),
+            "first_recording": None if first is None else first.isoformat(),
+            "declared_after_first_recording": self.late,
+            "source": self.source,
+        }
+
+
+def adjusted(tests: Sequence[PValue], primary: Primary) -> list[tuple[float, Family]]:
+    """Return p of each test, adjusted in its family, and the family."""
+    found: dict[int, tuple[float, Family]] = {}
+    roles = [primary.role(one.measure) for one in tests]
+    for role in dict.fromkeys(roles):
+        places = [k for k, one in enumerate(roles) if one == role]
+        own = [tests[k] for k in places]
+        family = _family(role, own, primary.table)
+        rule = {"holm": _by_holm, "none": _alone, "sequence": _in_sequence}[family.rule]
+        for place, p in zip(places, rule(own, family), strict=True):
+            found[place] = p, family
+    return [found[k] for k in range(len(tests))]
+
+
+def _family(role: Role, own: Sequence[PValue], table: PrimaryTable) -> Family:
+    if role == "check":
+        return Family("check")
+    count = sum(not math.isnan(one.p) for one in own) or len(own)
+    if role == "primary" and table.rule == "sequence":
+        conditions = len({one.other for one in own})
+        return Family(role, "sequence", count, conditions, tuple(table.measures))
+    return Family(role, "holm", count, count)
+
+
+def _by_holm(own: Sequence[PValue], _: Family) -> Sequence[float]:
+    return holm([one.p for one in own])
+
+
+def _alone(own: Sequence[PValue], _: Family) -> Sequence[float]:
+    return [one.p for one in own]
+
+
+def _in_sequence(own: Sequence[PValue], family: Family) -> Sequence[float]:
+    largest: dict[str, float] = {}
+    found = [math.nan] * len(own)
+    for k in sorted(range(len(own)), key=lambda k: family.order.index(own[k].measure.name)):
+        _, other, p = own[k]
+        # What could not be tested is not shown either.
+        largest[other] = max(largest.get(other, 0.0), 1.0 if math.isnan(p) else p)
+        found[k] = math.nan if math.isnan(p) else min(1.0, family.first * largest[other])
+    return found

@@ -1,13 +1,14 @@
-"""Examiners' ratings: their mixed model, and the rows that are corrected by it.
+"""Examiners' ratings: out of their table, checked; their mixed model; rows corrected by it.
 
 As in Sec. 2.2 of the paper: score = mean of condition + offset of examiner + error. With several
 subjects each has an offset too. Beside it the same contrast with an offset for every day, since all
-scores of one day are of one arm on that day: that is the test of a study.
+scores of one day are of one arm on that day: that is the test of a study. What is wrong in a table
+is left out and stated, what is odd is stated.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -20,10 +21,15 @@ from rigidimeter.analysis.statistics import (
     interval_of,
     nested,
 )
-from rigidimeter.analysis.study_anew.measures import RATING
-from rigidimeter.analysis.study_anew.rows import FIELDS, TEXT
+from rigidimeter.analysis.study_anew.measures import RATING, SCORE
+from rigidimeter.analysis.study_anew.naming import Naming
+from rigidimeter.analysis.study_anew.rows import TEXT, as_rows, typed
 from rigidimeter.analysis.study_anew.study import Ratings
 from rigidimeter.analysis.study_anew.tests import Pair
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import MAX_NOTICES, lines_text
+from rigidimeter.core.records import Notice
+from rigidimeter.core.study_files import StudyFolder, TableRow
 
 RANDOM = ("examiner", "subject", "subject/day", "day", "day/condition")
 """What may have an offset. ``subject/day`` is a subject, and a day within."""
@@ -36,6 +42,11 @@ EXAMINERS = "examiners"
 
 COLUMNS = {"examiner": "rater", "subject": "subject", "day": "day", "condition": "condition"}
 """Where rows hold what has an offset."""
+
+Kept = tuple[TableRow, str, float]
+"""A row of the table, its condition and its score."""
+_SHOWN = 4
+_LINE = "line "
 
 
 def ratings_of(
@@ -121,13 +132,14 @@ def corrected(ratings: Ratings) -> pd.DataFrame:
     rows = ratings.rows
     own_day = [f"row {number}" for number in range(1, len(rows) + 1)]
     days = rows["day"].where(rows["day"] != "", own_day)
-    return rows.assign(
+    changed = rows.assign(
         measure=RATING.name,
         chosen=True,
         method=EXAMINERS,
         value=np.asarray(ratings.fit.corrected, dtype=np.float64),
         unit=rows["subject"] + "/" + days,
-    )[list(FIELDS)]
+    )
+    return typed(changed)
 
 
 def rating_test(ratings: Ratings, pair: Pair) -> DayDifference:
@@ -182,3 +194,158 @@ def without_raters(ratings: Ratings, raters: Sequence[str], pair: Pair) -> DayDi
 
 def _distinct(rows: pd.DataFrame, *columns: str) -> int:
     return int(rows[list(columns)].drop_duplicates().shape[0]) if len(rows) else 0
+
+
+def study_ratings(
+    read: StudyFolder, names: Naming, groups: Mapping[str, str]
+) -> tuple[Ratings | None, list[Notice]]:
+    """Return the ratings of a study folder, and what is wrong with them.
+
+    A row that cannot be used is left out and stated. None if there is no table, or what is left of
+    it gives no contrast.
+
+    Parameters
+    ----------
+    read : StudyFolder
+    names : Naming
+    groups : mapping of str to str
+        Of the subjects.
+    """
+    if not read.ratings:
+        return None, []
+    source = read.about.ratings
+    kept, notices = _kept(read, names)
+    rows = as_rows(_records(kept, groups))
+    counts = {name: int((rows["condition"] == name).sum()) for name in names.pair}
+    if min(counts.values()) == 0 or sum(counts.values()) < FEWEST:
+        there = " and ".join(f"{n} in {name}" for name, n in counts.items() if name)
+        text = (
+            f"{source}: a contrast of ratings needs both conditions and at least {FEWEST} ratings; "
+            f"there are {there}"
+        )
+        return None, [*notices, Notice("error", text)]
+    random = RANDOM[: 2 if rows["subject"].nunique() > 1 else 1]
+    low, step = read.about.rating.scale[0], read.about.rating.step
+    odd = [*oddities(source, rows, random, low, step)]
+    try:
+        found = ratings_of(source, rows, random, odd)
+    except (ValueError, ArithmeticError) as error:
+        return None, [*notices, Notice("error", f"{source}: {error}")]
+    return found, [*notices, *(Notice("warning", text) for text in (*odd, *found.model_notices))]
+
+
+def _kept(read: StudyFolder, names: Naming) -> tuple[list[Kept], list[Notice]]:
+    low, high = read.about.rating.scale
+    kept: list[Kept] = []
+    notices: list[Notice] = []
+    for row in read.ratings:
+        condition = names.named(row["condition"])
+        try:
+            score = row.number("score")
+        except UserError as error:
+            notices.append(Notice("error", f"{error}; the rating is left out"))
+            continue
+        if score is None:
+            notices.append(Notice("error", f"{row.where}: no score is given; it is left out"))
+        elif not low <= score <= high:
+            text = (
+                f"{row.where}: score is {score:g}, outside the scale of {low:g} to {high:g} in "
+                "study.toml; the rating is left out"
+            )
+            notices.append(Notice("error", text))
+        elif condition is None:
+            text = f"{row.where}: {names.unknown(row['condition'])}; the rating is left out"
+            notices.append(Notice("error", text))
+        else:
+            kept.append((row, condition, score))
+    return kept, notices + _unrecorded(read, [row for row, _, _ in kept])
+
+
+def _unrecorded(read: StudyFolder, kept: Sequence[TableRow]) -> list[Notice]:
+    """Return that ratings are of days on which nothing was recorded."""
+    days = {(row["subject"], row["day"]) for row in read.sessions}
+    unrecorded = [row for row in kept if (row["subject"], row["day"]) not in days]
+    if not unrecorded:
+        return []
+    first, several = unrecorded[0], len(unrecorded) > 1
+    are = f"these {len(unrecorded)} ratings are" if several else "the rating is"
+    text = (
+        f"{first.source}, {lines_text([row.line for row in unrecorded])}: there is no session "
+        f"of subject {first['subject']} on day {first['day']}{' and others' * several}; {are} "
+        "used all the same"
+    )
+    return [Notice("warning", text)]
+
+
+def _records(kept: Sequence[Kept], groups: Mapping[str, str]) -> Iterator[dict[str, object]]:
+    for row, condition, score in kept:
+        yield {
+            "subject": row["subject"],
+            "group": groups.get(row["subject"], ""),
+            "day": row["day"],
+            "epoch": f"{_LINE}{row.line}",
+            "rater": row["examiner"],
+            "condition": condition,
+            "chosen": False,
+            "measure": SCORE,
+            "value": score,
+        }
+
+
+def oddities(
+    source: str, rows: pd.DataFrame, random: Sequence[str], low: float, step: float
+) -> Iterator[str]:
+    """Yield what is odd about ratings that are used all the same.
+
+    Parameters
+    ----------
+    source : str
+        The table.
+    rows : pandas.DataFrame
+        With lines of the table as epochs.
+    random : sequence of str
+        What has an offset.
+    low, step : float
+        Of the scale; a step of 0 for none.
+    """
+    lines = rows["epoch"].astype(str).str.removeprefix(_LINE)
+    steps = (rows["value"] - low) / step if step > 0 else pd.Series(0.0, rows.index)
+    odd = rows[(steps - steps.round()).abs() > 1e-6]
+    if len(odd):
+        shown = ", ".join(f"{odd['value'][k]:g} in line {lines[k]}" for k in odd.index[:_SHOWN])
+        more = f" and {len(odd) - _SHOWN} more" if len(odd) > _SHOWN else ""
+        yield f"{source}: not in steps of {step:g}: {shown}{more}; used as they are"
+    yield from _repeated(source, rows[rows["day"] != ""], lines)
+    for name, labels in groupings(rows, random).items():
+        counts = pd.Series(labels).value_counts(sort=False)
+        once = list(counts.index[counts == 1])
+        if not 0 < len(once) < len(counts) or name not in ("examiner", "subject"):
+            continue
+        if name == "examiner":
+            yield f"{name} {_some(once)} gave one rating; its offset is strongly shrunken"
+        else:
+            yield f"{name} {_some(once)} has one rating; its offset is shrunken"
+
+
+def _repeated(source: str, rows: pd.DataFrame, lines: pd.Series) -> Iterator[str]:
+    key = ["subject", "rater", "condition", "day"]
+    several = [
+        (names, own) for names, own in rows.groupby(key, observed=True, sort=False) if len(own) > 1
+    ]
+    for (_, rater, condition, day), own in several[:MAX_NOTICES]:
+        of = " and ".join(lines[own.index[:MAX_NOTICES]])
+        by = f" by examiner {rater}" if rater else ""
+        scores = ", ".join(f"{value:g}" for value in own["value"][:MAX_NOTICES])
+        yield (
+            f"{source}, lines {of}: rated more than once{by} in {condition} on day {day} "
+            f"({scores}); all are used as separate ratings. If one is a copy, p is too small: "
+            "take it out"
+        )
+    if len(several) > MAX_NOTICES:
+        more = len(several) - MAX_NOTICES
+        yield f"{source}: {more} more were rated more than once, and are used in the same way"
+
+
+def _some(names: Sequence[str]) -> str:
+    more = f" and {len(names) - MAX_NOTICES} more" if len(names) > MAX_NOTICES else ""
+    return ", ".join(names[:MAX_NOTICES]) + more

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 import pandas as pd
 
 from rigidimeter.analysis.statistics import Mixed
-from rigidimeter.analysis.study_anew.families import Primary
+from rigidimeter.analysis.study_anew.measures import Primary
 from rigidimeter.core.records import Notice
 from rigidimeter.core.settings import Settings
 
@@ -147,6 +147,21 @@ class Ratings(NamedTuple):
     fit: Mixed
     by_day: Mixed | None = None
     notices: tuple[str, ...] = ()
+
+    @property
+    def model_notices(self) -> tuple[str, ...]:
+        """Where a variance is at its boundary or cannot be estimated, in sentences."""
+        at_zero = [
+            f"the variance of {name} is estimated as zero, its boundary: they differ no more than "
+            "the residual explains, so all their offsets are zero and no score is corrected for "
+            "them"
+            for name in self.fit.at_zero
+        ]
+        left_out = [
+            f"{name} was left out of the model: {reason}; its offsets are zero"
+            for name, reason in self.fit.inseparable.items()
+        ]
+        return (*at_zero, *left_out)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 
 from rigidimeter.analysis.study_anew.caveats import groups_of
 from rigidimeter.analysis.study_anew.compared import Compared, Verdict, signed
-from rigidimeter.analysis.study_anew.families import LEVEL, Role
+from rigidimeter.analysis.study_anew.measures import LEVEL, Role
 from rigidimeter.analysis.study_anew.precision import precisions
 from rigidimeter.analysis.study_anew.rows import counting
 from rigidimeter.analysis.study_anew.study import Study

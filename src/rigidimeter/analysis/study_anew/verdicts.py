@@ -33,10 +33,9 @@ from rigidimeter.analysis.study_anew.caveats import (
     wide,
 )
 from rigidimeter.analysis.study_anew.compared import Compared, Needed, Verdict
-from rigidimeter.analysis.study_anew.families import LEVEL, PValue, adjusted
-from rigidimeter.analysis.study_anew.measures import CHECK
+from rigidimeter.analysis.study_anew.comparisons import OfMethod
+from rigidimeter.analysis.study_anew.measures import CHECK, LEVEL, PValue, adjusted
 from rigidimeter.analysis.study_anew.rows import counting
-from rigidimeter.analysis.study_anew.sensitivity import OfMethod
 from rigidimeter.analysis.study_anew.study import Study
 from rigidimeter.analysis.study_anew.tests import half_width
 from rigidimeter.core.findings import Finding, found_between
