@@ -23,7 +23,10 @@ from tests.study_anew.designs import random_study, random_table
 from rigidimeter.analysis import study as old
 from rigidimeter.analysis import study_anew as new
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.files import plain_values
 
+RESAMPLES = 199
+"""Of the bootstrap in studies that are read from folders."""
 CLOSE = 1e-12
 """Numbers agree to this share of the larger."""
 CANCELLED = 1e-15
@@ -31,6 +34,11 @@ CANCELLED = 1e-15
 equal no more is known. Not p."""
 
 Rows = Sequence[Mapping[str, Any]]
+
+
+TABLES = ("precision", "comparisons", "summaries", "days", "effect_differences", "sensitivity",
+          "conditions", "sessions", "excluded_epochs", "left_out", "account")  # fmt: skip
+"""Of a folder beside what is concluded."""
 
 
 class Answers(NamedTuple):
@@ -42,21 +50,35 @@ class Answers(NamedTuple):
     values: Rows
     groups: Rows
     notices: Sequence[str] = ()
-    sensitivity: Rows = ()
-    exclusions: Rows = ()
-    left_out: Rows = ()
-    sessions: Rows = ()
-    conditions: Rows = ()
-    digests: Rows = ()
+    tables: Mapping[str, Rows] = {}
+    documents: Sequence[Any] = ()
+    digests: Mapping[str, str] = {}
 
     def cells(self) -> dict[str, Any]:
         """Return every answer by its name."""
         found: dict[str, Any] = {"lead": self.lead, "notices": list(self.notices)}
-        for table in self._fields:
-            for k, row in enumerate(() if table in found else getattr(self, table)):
-                where = f"{table} {row.get('measure', k)} {row.get('other', k)}"
+        found |= {f"digest {name}": digest for name, digest in self.digests.items()}
+        mine = {name: getattr(self, name) for name in ("conclusion", "statements", "values")}
+        for table, rows in (mine | {"groups": self.groups} | {**self.tables}).items():
+            for k, row in enumerate(rows):
+                where = f"{table} {k} {row.get('measure', '')} {row.get('other', '')}"
                 found |= {f"{where} {name}": cell for name, cell in row.items()}
+                found[f"{where} columns"] = list(row)
+        for k, document in enumerate(self.documents):
+            found |= {f"document {k} {name}": cell for name, cell in leaves(document)}
         return found
+
+
+def leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield what a document holds, by its path."""
+    if isinstance(value, Mapping):
+        for key, one in value.items():
+            yield from leaves(one, f"{name}.{key}")
+    elif isinstance(value, list | tuple):
+        for k, one in enumerate(value):
+            yield from leaves(one, f"{name}.{k}")
+    else:
+        yield name, value
 
 
 def old_answers(result: old.StudyResult) -> Answers:
@@ -135,30 +157,23 @@ def of_folder(folder: Path, **options: Any) -> tuple[Answers | str, Answers | st
     except UserError as error:
         before = str(error)
     else:
-        result = old.analyse_study(read, resamples=0)
+        result = old.analyse_study(read, resamples=RESAMPLES)
         before = old_answers(result)._replace(
             notices=[f"{one.level} {one.text}" for one in result.notices],
-            sensitivity=old.result_table(result, "sensitivity"),
-            exclusions=old.result_table(result, "excluded_epochs"),
-            left_out=old.result_table(result, "left_out"),
-            sessions=old.result_table(result, "sessions"),
-            conditions=[asdict(one) for one in result.conditions],
-            digests=[{**read.folder.digests, **read.gathered.digests}],
+            tables={name: old.result_table(result, name) for name in TABLES},
+            documents=old.comparison_document(result)["comparisons"],
+            digests={**read.folder.digests, **read.gathered.digests},
         )
     try:
         loaded = new.load_study(folder, **options)
     except UserError as error:
         return before, str(error)
-    study = new.analyse(loaded)
-    methods, notices = new.sensitivity(study.rows, (study.reference, study.other))
-    now = new_answers(study, methods)._replace(
-        notices=[f"{one.level} {one.text}" for one in (*study.notices, *notices)],
-        sensitivity=[one.row() for one in methods],
-        exclusions=[one._asdict() for one in study.exclusions],
-        left_out=[one._asdict() for one in study.left_out],
-        sessions=[one._asdict() for one in study.sessions],
-        conditions=[asdict(one) for one in study.conditions],
-        digests=[study.digests],
+    found = new.conclude_study(new.analyse(loaded), resamples=RESAMPLES)
+    now = new_answers(found.study, found.methods)._replace(
+        notices=[f"{one.level} {one.text}" for one in found.notices],
+        tables={name: new.result_table(found, name) for name in TABLES},
+        documents=plain_values(new.comparison_values(found)),
+        digests=found.study.digests,
     )
     return before, now
 

@@ -20,7 +20,7 @@ def same(folder: Path, **options) -> Answers | str:
 def test_of_a_study_with_every_method_and_ratings(fitted_study: Path) -> None:
     found = same(fitted_study)
     assert len(found.conclusion) == 4
-    assert len(found.sensitivity) == 15
+    assert len(found.tables["sensitivity"]) == 15
 
 
 def test_of_a_study_of_scores(scored_study: Path) -> None:
@@ -50,7 +50,7 @@ def test_epochs_that_the_operator_excludes(study: Path) -> None:
             "sessions/2-OF,1,misspelt,", "sessions/3-DBS,1,moved,"]  # fmt: skip
     (study / "exclusions.csv").write_text("\n".join(["path,epoch,reason,by", *rows]) + "\n")
     found = same(study)
-    assert [(one["by"], one["who"]) for one in found.exclusions] == [
+    assert [(one["by"], one["who"]) for one in found.tables["excluded_epochs"]] == [
         ("operator", "NB"),
         ("operator", ""),
     ]
@@ -67,7 +67,7 @@ def test_sessions_that_do_not_count(study: Path, edit: Edit) -> None:
         file.write("../away,M1,7,OFF\nsessions/other,M1,8,DBS\nsessions/faster,M1,9,DBS\n")
         file.write("sessions/2-OFF,M1,3,DBS\n")
     found = same(study)
-    assert len(found.left_out) == 8
+    assert len(found.tables["left_out"]) == 8
 
 
 FASTER = {
@@ -109,7 +109,7 @@ def test_several_subjects_in_groups(study: Path, subjects: int) -> None:
     same(study)
     (study / "ratings.csv").unlink()
     same(study)
-    assert len(same(study, group="old").sessions) == 2 * (subjects - 1)
+    assert len(same(study, group="old").tables["sessions"]) == 2 * (subjects - 1)
 
 
 def test_declared_measures(study: Path) -> None:

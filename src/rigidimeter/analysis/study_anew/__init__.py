@@ -8,15 +8,25 @@ from rigidimeter.analysis.study_anew.caveats import groups_of
 from rigidimeter.analysis.study_anew.compared import Compared, signed
 from rigidimeter.analysis.study_anew.comparisons import (
     OfMethod,
+    Precision,
     compare,
     compare_values,
     effects,
+    precisions,
+    precisions_of_each,
     sensitivity,
 )
-from rigidimeter.analysis.study_anew.document import conclusion_rows
+from rigidimeter.analysis.study_anew.document import (
+    TABLES,
+    Result,
+    comparison_rows,
+    comparison_values,
+    conclude_study,
+    conclusion_rows,
+    result_table,
+)
 from rigidimeter.analysis.study_anew.from_folder import Loaded, analyse, load_study
 from rigidimeter.analysis.study_anew.measures import MEASURES, RATING, SCORE, Measure, Primary
-from rigidimeter.analysis.study_anew.precision import Precision, precisions, precisions_of_each
 from rigidimeter.analysis.study_anew.ratings import corrected, rating_test, ratings_of
 from rigidimeter.analysis.study_anew.rows import (
     FIELDS,

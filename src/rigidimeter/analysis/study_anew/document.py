@@ -1,13 +1,107 @@
-"""Conclusions as plain values: the rows of documents and tables, every number unrounded."""
+"""What a study concludes as one result, as tables and as one JSON document: every number, unrounded.
+
+A table of one name has the same rows and columns wherever it is written. Two analyses of the same
+inputs give the same bytes: neither time nor place is written down.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
+import pandas as pd
+
+from rigidimeter.analysis.statistics import DayDifference, Effects, RankSum, Summary, summarise
 from rigidimeter.analysis.study_anew.compared import Compared
-from rigidimeter.analysis.study_anew.comparisons import OfMethod, method_caveats
+from rigidimeter.analysis.study_anew.comparisons import (
+    EffectPair,
+    OfMethod,
+    Progress,
+    compare,
+    compare_values,
+    effects,
+    method_caveats,
+    precisions_of_each,
+    sensitivity,
+)
+from rigidimeter.analysis.study_anew.measures import RATING, Measure
+from rigidimeter.analysis.study_anew.rows import counting, measures_of, recorded
+from rigidimeter.analysis.study_anew.study import Study
+from rigidimeter.analysis.study_anew.verdicts import conclude
+from rigidimeter.core.records import Notice
 from rigidimeter.core.words import within
+
+Rows = Sequence[Mapping[str, Any]]
+
+TEST = "Wilcoxon rank-sum, two-sided, asymptotic, tie and continuity corrected"
+TESTS_SHARE = 0.1
+"""Of the work on a study: what its tests take."""
+
+_RANKS = tuple(one.name for one in fields(RankSum))
+_SIZES = ("r_low", "r_high", "rank_biserial", "rank_biserial_low", "rank_biserial_high")
+_SUMMARY = ("median", "q1", "q3", "sd_percent")
+_EXCLUDED_BY = ("protocol", "check", "estimate", "operator")
+
+
+@dataclass(frozen=True)
+class Result:
+    """A study, compared and concluded.
+
+    Attributes
+    ----------
+    study : Study
+    concluded : tuple of Compared
+        For each pair of conditions and measure; the first pair is the main one.
+    values : tuple of Compared
+        The rank-sum tests, in which each epoch counts, with p by Holm's method.
+    effects : mapping of str to Effects
+        Effect sizes of the main pair, by the name of the measure.
+    effect_pairs : tuple of EffectPair
+    methods : tuple of OfMethod
+        The main pair by every method.
+    notices : tuple of Notice
+    seed, resamples : int
+        Of the bootstrap.
+    """
+
+    study: Study
+    concluded: tuple[Compared, ...]
+    values: tuple[Compared, ...]
+    effects: Mapping[str, Effects] = field(default_factory=dict)
+    effect_pairs: tuple[EffectPair, ...] = ()
+    methods: tuple[OfMethod, ...] = ()
+    notices: tuple[Notice, ...] = ()
+    seed: int = 1
+    resamples: int = 9999
+
+
+def conclude_study(
+    study: Study,
+    *,
+    seed: int = 1,
+    resamples: int = 9999,
+    progress: Progress = lambda _: None,
+) -> Result:
+    """Compare a study and conclude from it, once.
+
+    Parameters
+    ----------
+    study : Study
+    seed, resamples : int
+        Of the bootstrap; with 0 resamples there are no effect sizes with intervals.
+    progress : callable
+        Called with the share of the work that was done since, 1 in all.
+    """
+    values = compare_values(study)
+    sizes, pairs = effects(study, values, seed=seed, resamples=resamples, progress=progress)
+    methods: tuple[OfMethod, ...] = ()
+    notices = study.notices
+    if study.sessions and study.other:
+        methods, lacking = sensitivity(study.rows, (study.reference, study.other))
+        notices = (*notices, *lacking)
+    concluded = conclude(study, compare(study), methods)
+    return Result(study, concluded, values, sizes, pairs, methods, notices, seed, resamples)
 
 
 def conclusion_rows(
@@ -51,11 +145,216 @@ def _simulated(one: Compared) -> dict[str, float]:
     if one.simulated is None:
         return {}
     first, second = one.simulated
-    difference = second - first
-    percent = 100 / first * difference if first > 0 and one.measure.origin != "ratings" else None
+    known = first > 0 and one.measure != RATING
     return {
         "simulated_reference": first,
         "simulated_other": second,
-        "simulated_difference": difference,
-        "simulated_difference_percent": float("nan") if percent is None else percent,
+        "simulated_difference": second - first,
+        "simulated_difference_percent": 100 / first * (second - first) if known else float("nan"),
     }
+
+
+def comparison_rows(result: Result) -> list[dict[str, Any]]:
+    """Return each measure in each pair of conditions: summaries, rank-sum test, test by days."""
+    days = _by_days(result)
+    rows = []
+    for one in result.values:
+        row: dict[str, Any] = _names(one)
+        every = recorded(result.study.rows, one.measure.name)
+        for side, name in (("reference", one.reference), ("other", one.other)):
+            known = side == "reference" or bool(name)
+            summary, excluded = _summary(every, name)
+            numbers = asdict(summary) if known else dict.fromkeys(("n", *_SUMMARY))
+            row[f"n_{side}"] = numbers["n"]
+            row[f"excluded_{side}"] = excluded if known else None
+            row |= {f"{key}_{side}": numbers[key] for key in _SUMMARY}
+        row |= _tested(result, one) | {"remark": one.remark}
+        if found := days.get((one.measure, one.other)):
+            found["offsets"] = " + ".join(found["offsets"])
+            row |= {k if k.startswith("days_") else f"days_{k}": v for k, v in found.items()}
+        rows.append(row)
+    return rows
+
+
+def comparison_values(result: Result) -> list[dict[str, Any]]:
+    """Return the same as documents nest it; the keys of the rank-sum test are flat."""
+    days = _by_days(result)
+    rows = []
+    for one in result.values:
+        every = recorded(result.study.rows, one.measure.name)
+        groups = {}
+        for name in filter(None, one.pair) if one.other else (one.reference,):
+            summary, excluded = _summary(every, name)
+            groups[name] = asdict(summary) | {"excluded": excluded}
+        rows.append(
+            {
+                **_names(one),
+                "groups": groups,
+                "test": TEST,
+                **_tested(result, one),
+                "remark": one.remark,
+                "days": days.get((one.measure, one.other)),
+            }
+        )
+    return rows
+
+
+def _names(one: Compared) -> dict[str, Any]:
+    return one.measure.names | {"reference": one.reference, "other": one.other}
+
+
+def _summary(every: pd.DataFrame, condition: str) -> tuple[Summary, int]:
+    """Return the summary of a condition's values that count, and how many do not."""
+    own = every[every["condition"] == condition]
+    included = own["outcome"] == "included"
+    return summarise(own.loc[included, "value"].to_numpy()), int((~included).sum())
+
+
+def _tested(result: Result, one: Compared) -> dict[str, Any]:
+    sizes = result.effects.get(one.measure.name) if one.other == result.study.other else None
+    return {
+        **{name: getattr(one.statistic, name, None) for name in _RANKS},
+        "p_holm": one.p_adjusted,
+        **{name: getattr(sizes, name, None) for name in _SIZES},
+        "interval_method": getattr(sizes, "method", None),
+    }
+
+
+def _by_days(result: Result) -> dict[tuple[Measure, str], dict[str, Any]]:
+    """Return the tests by days, by measure and other condition."""
+    found = {}
+    for one in result.concluded:
+        if one.by == "days" and isinstance(one.statistic, DayDifference):
+            row = asdict(one.statistic)
+            del row["weights"]
+            row["days_reference"], row["days_other"] = row.pop("n_days_x"), row.pop("n_days_y")
+            row["days_both"] = row.pop("n_days_both")
+            row["mean_reference"], row["mean_other"] = row.pop("mean_x"), row.pop("mean_y")
+            found[one.measure, one.other] = row | {"p_holm": one.p_adjusted}
+    return found
+
+
+def condition_names(study: Study) -> tuple[str, ...]:
+    """Return all conditions in the order of the study or the protocol, then as recorded."""
+    order = [each.name for each in study.conditions]
+    order = order or [block.condition for block in study.settings.protocol.blocks]
+    recorded_ones = map(str, study.rows["condition"].drop_duplicates())
+    names = dict.fromkeys([*filter(None, (study.reference, study.other)), *recorded_ones])
+    return tuple(sorted(names, key=lambda n: order.index(n) if n in order else len(order)))
+
+
+def _summaries(result: Result) -> Iterator[dict[str, Any]]:
+    study = result.study
+    for measure in measures_of(study.rows):
+        every = recorded(study.rows, measure.name)
+        there = {*every["condition"], study.reference, study.other}
+        for name in (name for name in condition_names(study) if name in there):
+            summary, excluded = _summary(every, name)
+            if summary.n or excluded:
+                counts = {"condition": name, "n": summary.n, "excluded": excluded}
+                yield measure.names | counts | asdict(summary)
+
+
+def _days(result: Result) -> Iterator[dict[str, Any]]:
+    """Yield median and quartiles of every day of every subject and condition, ratings excepted."""
+    if not any(one.by == "days" for one in result.concluded):
+        return
+    for measure in measures_of(result.study.rows):
+        rows = counting(result.study.rows, measure.name)
+        if measure == RATING:
+            continue
+        key = ["subject", "day", "condition"]
+        for labels, values in rows.groupby(key, sort=False)["value"]:
+            summary = asdict(summarise(values.to_numpy()))
+            numbers = {name: summary[name] for name in ("n", "median", "q1", "q3")}
+            yield {"measure": measure.name} | dict(zip(key, labels, strict=True)) | numbers
+
+
+def _effect_differences(result: Result) -> Iterator[dict[str, Any]]:
+    titles = {one.measure.name: one.measure.title for one in result.values}
+    for pair in result.effect_pairs:
+        yield {
+            "first": pair.first,
+            "second": pair.second,
+            "first_title": titles[pair.first],
+            "second_title": titles[pair.second],
+            **asdict(pair.difference),
+            "p_holm": pair.p_holm,
+        }
+
+
+def _precision(result: Result) -> Iterator[dict[str, Any]]:
+    """Yield the measures of the only condition, or of each of two without a test."""
+    study = result.study
+    if study.other and any(one.tested for one in result.concluded if one.other == study.other):
+        return
+    names = [study.reference, study.other] if study.other else [study.reference]
+    for name, each in precisions_of_each(study.rows, names).items():
+        yield from ({"condition": name} | one.row() for one in each)
+
+
+def _conditions(result: Result) -> Iterator[dict[str, Any]]:
+    """Yield each condition; a code without its stimulation, which would give it away."""
+    for condition in result.study.conditions:
+        mine = [each for each in result.study.sessions if each.condition == condition.name]
+        about = asdict(condition)
+        del about["simulated"]  # the conclusions have it beside each estimate
+        if result.study.blinded:
+            about = dict.fromkeys(about) | {"name": condition.name}
+        days = len({(each.subject, each.day) for each in mine})
+        yield about | {"days": days, "sessions": len(mine)}
+
+
+def _account(result: Result) -> Iterator[dict[str, Any]]:
+    """Yield for each task and condition what was recorded, what counts, and who left out the rest.
+
+    `unlisted` are epochs that neither count nor are among the exclusions.
+    """
+    study = result.study
+    if not study.sessions:
+        return
+    # An epoch counts where it counts with J held, too.
+    rows = study.rows[(study.rows["scope"] == "epoch") & (study.rows["task"] != "")]
+    of_main = rows[rows["method"].isin(rows.loc[rows["chosen"], "method"].unique())]
+    out = {(one.source, one.epoch): one.by for one in reversed(study.exclusions)}
+    for task, inertia in (("prbs", "fixed"), ("sinusoid", "")):
+        of_task = of_main[(of_main["task"] == task) & (of_main["inertia"] == inertia)]
+        for name in condition_names(study):
+            own = of_task[of_task["condition"] == name].drop_duplicates(["session", "epoch"])
+            if not len(own):
+                continue
+            keys = {*zip(own["session"], own["epoch"], strict=True)}
+            kept = own[own["outcome"] == "included"]
+            counts = len({*zip(kept["session"], kept["epoch"], strict=True)} - out.keys())
+            by: list[str] = [out[key] for key in keys & out.keys()]
+            yield {
+                "task": task,
+                "condition": name,
+                "recorded": len(keys),
+                "included": counts,
+                **{f"by_{one}": by.count(one) for one in _EXCLUDED_BY},
+                "unlisted": len(keys) - counts - len(by),
+            }
+
+
+TABLES: Mapping[str, Callable[[Result], Iterable[Mapping[str, Any]]]] = {
+    "conclusion": lambda result: conclusion_rows(result.concluded, result.methods),
+    "precision": _precision,
+    "comparisons": comparison_rows,
+    "summaries": _summaries,
+    "days": _days,
+    "effect_differences": _effect_differences,
+    "sensitivity": lambda result: [one.row() for one in result.methods],
+    "conditions": _conditions,
+    "sessions": lambda result: [one._asdict() for one in result.study.sessions],
+    "excluded_epochs": lambda result: [one._asdict() for one in result.study.exclusions],
+    "left_out": lambda result: [one._asdict() for one in result.study.left_out],
+    "deviations": lambda result: [one._asdict() for one in result.study.deviations],
+    "account": _account,
+}
+"""The tables of conclusions by name, each made alone."""
+
+
+def result_table(result: Result, name: str) -> Rows:
+    """Return one of the tables of conclusions; the others are not made."""
+    return list(TABLES[name](result))

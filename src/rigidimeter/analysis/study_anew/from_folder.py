@@ -25,7 +25,6 @@ from rigidimeter.analysis.estimation import (
 from rigidimeter.analysis.study_anew.comparisons import sensitivity_methods
 from rigidimeter.analysis.study_anew.load import Recordings, load, place_of
 from rigidimeter.analysis.study_anew.measures import Primary, chosen_pair
-from rigidimeter.analysis.study_anew.naming import Naming, naming
 from rigidimeter.analysis.study_anew.ratings import corrected, study_ratings
 from rigidimeter.analysis.study_anew.rows import estimate_rows, together, typed
 from rigidimeter.analysis.study_anew.session_checks import (
@@ -33,7 +32,14 @@ from rigidimeter.analysis.study_anew.session_checks import (
     exclusions_of,
     without_excluded,
 )
-from rigidimeter.analysis.study_anew.study import GROUP, SessionEntry, Study, no_such_group
+from rigidimeter.analysis.study_anew.study import (
+    GROUP,
+    Naming,
+    SessionEntry,
+    Study,
+    naming,
+    no_such_group,
+)
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import read_json
 from rigidimeter.core.findings import Finding

@@ -17,14 +17,13 @@ from rigidimeter.analysis.reading.channels.joining import FOUND
 from rigidimeter.analysis.reading.channels.mapping_file import read_mapping
 from rigidimeter.analysis.reading.formats import reader_of, settings_in_file
 from rigidimeter.analysis.reading.recording import read_joined
-from rigidimeter.analysis.study_anew.naming import Naming
 from rigidimeter.analysis.study_anew.session_checks import (
     Session,
     commanded_otherwise,
     other_settings,
     twice,
 )
-from rigidimeter.analysis.study_anew.study import LeftOut, SessionEntry
+from rigidimeter.analysis.study_anew.study import LeftOut, Naming, SessionEntry
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import RECORDING_BYTES, noted_digests, open_regular
 from rigidimeter.core.records import Epoch, Notice

@@ -22,9 +22,8 @@ from rigidimeter.analysis.statistics import (
     nested,
 )
 from rigidimeter.analysis.study_anew.measures import RATING, SCORE
-from rigidimeter.analysis.study_anew.naming import Naming
 from rigidimeter.analysis.study_anew.rows import TEXT, as_rows, typed
-from rigidimeter.analysis.study_anew.study import Ratings
+from rigidimeter.analysis.study_anew.study import Naming, Ratings
 from rigidimeter.analysis.study_anew.tests import Pair
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import MAX_NOTICES, lines_text

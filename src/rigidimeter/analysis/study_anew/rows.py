@@ -75,7 +75,7 @@ FIELDS: Mapping[str, Field] = {
     "outcome": Field(str, "", "included, excluded or failed"),
     "reason": Field(str, "", "why it is not included"),
     "findings": Field(str, "", "names of those at caution or worse that touch this value"),
-    "bias": Field(float, "measure", "the largest that its findings allow; inf: not told"),
+    "bias": Field(float, "measure", "the largest that its findings allow; inf: unknown"),
 }
 """The columns in their order. What is not known is empty, or NaN."""
 

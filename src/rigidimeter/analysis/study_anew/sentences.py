@@ -12,8 +12,8 @@ from typing import Literal, NamedTuple
 
 from rigidimeter.analysis.study_anew.caveats import groups_of
 from rigidimeter.analysis.study_anew.compared import Compared, Verdict, signed
+from rigidimeter.analysis.study_anew.comparisons import precisions
 from rigidimeter.analysis.study_anew.measures import LEVEL, Role
-from rigidimeter.analysis.study_anew.precision import precisions
 from rigidimeter.analysis.study_anew.rows import counting
 from rigidimeter.analysis.study_anew.study import Study
 from rigidimeter.core.words import (
