@@ -37,7 +37,8 @@ Rows = Sequence[Mapping[str, Any]]
 
 
 TABLES = ("precision", "comparisons", "summaries", "days", "effect_differences", "sensitivity",
-          "conditions", "sessions", "excluded_epochs", "left_out", "account")  # fmt: skip
+          "conditions", "sessions", "excluded_epochs", "left_out", "account", "ratings",
+          "rating_offsets", "rating_contrast", "rating_relation")  # fmt: skip
 """Of a folder beside what is concluded."""
 
 
@@ -161,7 +162,13 @@ def of_folder(folder: Path, **options: Any) -> tuple[Answers | str, Answers | st
         before = old_answers(result)._replace(
             notices=[f"{one.level} {one.text}" for one in result.notices],
             tables={name: old.result_table(result, name) for name in TABLES},
-            documents=old.comparison_document(result)["comparisons"],
+            documents=[
+                old.comparison_document(result)["comparisons"],
+                old.comparison_document(result)["ratings"],
+                None
+                if result.ratings is None
+                else tuple(old.agreement(result.ratings).__dict__.values()),
+            ],
             digests={**read.folder.digests, **read.gathered.digests},
         )
     try:
@@ -169,10 +176,15 @@ def of_folder(folder: Path, **options: Any) -> tuple[Answers | str, Answers | st
     except UserError as error:
         return before, str(error)
     found = new.conclude_study(new.analyse(loaded), resamples=RESAMPLES)
+    ratings, pair = found.study.ratings, (found.study.reference, found.study.other)
     now = new_answers(found.study, found.methods)._replace(
         notices=[f"{one.level} {one.text}" for one in found.notices],
         tables={name: new.result_table(found, name) for name in TABLES},
-        documents=plain_values(new.comparison_values(found)),
+        documents=[
+            plain_values(new.comparison_values(found)),
+            None if ratings is None else plain_values(new.ratings_document(ratings, pair)),
+            None if ratings is None else tuple(new.agreement(ratings)),
+        ],
         digests=found.study.digests,
     )
     return before, now

@@ -27,6 +27,13 @@ from rigidimeter.analysis.study_anew.document import (
 )
 from rigidimeter.analysis.study_anew.from_folder import Loaded, analyse, load_study
 from rigidimeter.analysis.study_anew.measures import MEASURES, RATING, SCORE, Measure, Primary
+from rigidimeter.analysis.study_anew.rating_document import (
+    Agreement,
+    Relation,
+    agreement,
+    ratings_document,
+    relations,
+)
 from rigidimeter.analysis.study_anew.ratings import corrected, rating_test, ratings_of
 from rigidimeter.analysis.study_anew.rows import (
     FIELDS,

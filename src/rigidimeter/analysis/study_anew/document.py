@@ -1,4 +1,4 @@
-"""What a study concludes as one result, as tables and as one JSON document: every number, unrounded.
+"""What a study concludes as one result, its tables and its document: every number, unrounded.
 
 A table of one name has the same rows and columns wherever it is written. Two analyses of the same
 inputs give the same bytes: neither time nor place is written down.
@@ -26,8 +26,14 @@ from rigidimeter.analysis.study_anew.comparisons import (
     sensitivity,
 )
 from rigidimeter.analysis.study_anew.measures import RATING, Measure
+from rigidimeter.analysis.study_anew.rating_document import (
+    rating_contrast,
+    rating_offsets,
+    rating_rows,
+    relations,
+)
 from rigidimeter.analysis.study_anew.rows import counting, measures_of, recorded
-from rigidimeter.analysis.study_anew.study import Study
+from rigidimeter.analysis.study_anew.study import Ratings, Study
 from rigidimeter.analysis.study_anew.verdicts import conclude
 from rigidimeter.core.records import Notice
 from rigidimeter.core.words import within
@@ -337,6 +343,12 @@ def _account(result: Result) -> Iterator[dict[str, Any]]:
             }
 
 
+def _of_ratings(
+    result: Result, rows: Callable[[Ratings], Iterable[dict[str, Any]]]
+) -> Iterable[dict[str, Any]]:
+    return [] if result.study.ratings is None else rows(result.study.ratings)
+
+
 TABLES: Mapping[str, Callable[[Result], Iterable[Mapping[str, Any]]]] = {
     "conclusion": lambda result: conclusion_rows(result.concluded, result.methods),
     "precision": _precision,
@@ -344,6 +356,12 @@ TABLES: Mapping[str, Callable[[Result], Iterable[Mapping[str, Any]]]] = {
     "summaries": _summaries,
     "days": _days,
     "effect_differences": _effect_differences,
+    "ratings": lambda result: _of_ratings(result, rating_rows),
+    "rating_offsets": lambda result: _of_ratings(result, rating_offsets),
+    "rating_contrast": lambda result: _of_ratings(
+        result, lambda found: rating_contrast(found, (result.study.reference, result.study.other))
+    ),
+    "rating_relation": lambda result: [one.row() for one in relations(result.study.rows)],
     "sensitivity": lambda result: [one.row() for one in result.methods],
     "conditions": _conditions,
     "sessions": lambda result: [one._asdict() for one in result.study.sessions],

@@ -291,6 +291,11 @@ def _records(kept: Sequence[Kept], groups: Mapping[str, str]) -> Iterator[dict[s
         }
 
 
+def line_of(epoch: str) -> int:
+    """Return the line of the table that a rating is from."""
+    return int(epoch.removeprefix(_LINE))
+
+
 def oddities(
     source: str, rows: pd.DataFrame, random: Sequence[str], low: float, step: float
 ) -> Iterator[str]:
@@ -307,7 +312,7 @@ def oddities(
     low, step : float
         Of the scale; a step of 0 for none.
     """
-    lines = rows["epoch"].astype(str).str.removeprefix(_LINE)
+    lines = rows["epoch"].map(line_of)
     steps = (rows["value"] - low) / step if step > 0 else pd.Series(0.0, rows.index)
     odd = rows[(steps - steps.round()).abs() > 1e-6]
     if len(odd):
@@ -332,7 +337,7 @@ def _repeated(source: str, rows: pd.DataFrame, lines: pd.Series) -> Iterator[str
         (names, own) for names, own in rows.groupby(key, observed=True, sort=False) if len(own) > 1
     ]
     for (_, rater, condition, day), own in several[:MAX_NOTICES]:
-        of = " and ".join(lines[own.index[:MAX_NOTICES]])
+        of = " and ".join(map(str, lines[own.index[:MAX_NOTICES]]))
         by = f" by examiner {rater}" if rater else ""
         scores = ", ".join(f"{value:g}" for value in own["value"][:MAX_NOTICES])
         yield (

@@ -146,6 +146,8 @@ class Ratings(NamedTuple):
         With an offset for every day too; None where the ratings cannot separate days.
     notices : tuple of str
         What is odd about the ratings.
+    left_out_lines : tuple of int
+        Of rows without a score or a label.
     """
 
     source: str
@@ -154,6 +156,7 @@ class Ratings(NamedTuple):
     fit: Mixed
     by_day: Mixed | None = None
     notices: tuple[str, ...] = ()
+    left_out_lines: tuple[int, ...] = ()
 
     @property
     def model_notices(self) -> tuple[str, ...]:
