@@ -13,7 +13,7 @@ import math
 import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, astuple, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,7 +23,6 @@ from tests.study_anew.designs import random_study, random_table
 from rigidimeter.analysis import study as old
 from rigidimeter.analysis import study_anew as new
 from rigidimeter.core.errors import UserError
-from rigidimeter.core.files import plain_values
 
 RESAMPLES = 199
 """Of the bootstrap in studies that are read from folders."""
@@ -38,7 +37,8 @@ Rows = Sequence[Mapping[str, Any]]
 
 TABLES = ("precision", "comparisons", "summaries", "days", "effect_differences", "sensitivity",
           "conditions", "sessions", "excluded_epochs", "left_out", "account", "ratings",
-          "rating_offsets", "rating_contrast", "rating_relation")  # fmt: skip
+          "rating_offsets", "rating_contrast", "rating_relation", "deviations",
+          "without_deviating")  # fmt: skip
 """Of a folder beside what is concluded."""
 
 
@@ -54,10 +54,15 @@ class Answers(NamedTuple):
     tables: Mapping[str, Rows] = {}
     documents: Sequence[Any] = ()
     digests: Mapping[str, str] = {}
+    plan: str = ""
 
     def cells(self) -> dict[str, Any]:
         """Return every answer by its name."""
-        found: dict[str, Any] = {"lead": self.lead, "notices": list(self.notices)}
+        found: dict[str, Any] = {
+            "lead": self.lead,
+            "notices": list(self.notices),
+            "plan": self.plan,
+        }
         found |= {f"digest {name}": digest for name, digest in self.digests.items()}
         mine = {name: getattr(self, name) for name in ("conclusion", "statements", "values")}
         for table, rows in (mine | {"groups": self.groups} | {**self.tables}).items():
@@ -109,6 +114,12 @@ def old_answers(result: old.StudyResult) -> Answers:
             {"measure": c.measure.name, "other": c.other, "groups": " ".join(c.groups)}
             for c in tested
         ],
+        tables={
+            "without": old.result_table(result, "without_deviating"),
+            "quality": [] if (light := old.traffic_light(result)) is None else [light.row()],
+        },
+        documents=[[(one.finding.row(), one.where) for one in result.findings]],
+        plan=old.deviation_words(result),
     )
 
 
@@ -116,11 +127,13 @@ def new_answers(study: new.Study, methods: Sequence[new.OfMethod]) -> Answers:
     """Return what the new room says."""
     concluded = new.conclude(study, new.compare(study), methods)
     said = new.statements(study, concluded)
-    others = list(dict.fromkeys(one.other for one in concluded))
+    again = new.without_deviating(study, concluded)
+    light = new.traffic_light(study, concluded)
+    findings = (*study.analysis.findings, *new.reasons(concluded))
     values = [one for one in new.compare_values(study) if one.other]
     return Answers(
         new.conclusion_rows(concluded, methods),
-        [{"other": other, **one._asdict()} for other, one in zip(others, said, strict=True)],
+        [{"other": other, **one._asdict()} for other, one in said.items()],
         new.lead(study, concluded),
         [
             {
@@ -146,6 +159,12 @@ def new_answers(study: new.Study, methods: Sequence[new.OfMethod]) -> Answers:
             }
             for one in values
         ],
+        tables={
+            "without": again,
+            "quality": [] if light is None else [light],
+        },
+        documents=[[(one.finding.row(), one.where) for one in findings]],
+        plan=new.deviation_sentence(study, again),
     )
 
 
@@ -162,13 +181,7 @@ def of_folder(folder: Path, **options: Any) -> tuple[Answers | str, Answers | st
         before = old_answers(result)._replace(
             notices=[f"{one.level} {one.text}" for one in result.notices],
             tables={name: old.result_table(result, name) for name in TABLES},
-            documents=[
-                old.comparison_document(result)["comparisons"],
-                old.comparison_document(result)["ratings"],
-                None
-                if result.ratings is None
-                else tuple(old.agreement(result.ratings).__dict__.values()),
-            ],
+            documents=[old.comparison_document(result, str(folder)), _agreement(result)],
             digests={**read.folder.digests, **read.gathered.digests},
         )
     try:
@@ -176,18 +189,21 @@ def of_folder(folder: Path, **options: Any) -> tuple[Answers | str, Answers | st
     except UserError as error:
         return before, str(error)
     found = new.conclude_study(new.analyse(loaded), resamples=RESAMPLES)
-    ratings, pair = found.study.ratings, (found.study.reference, found.study.other)
+    ratings = found.study.ratings
     now = new_answers(found.study, found.methods)._replace(
         notices=[f"{one.level} {one.text}" for one in found.notices],
         tables={name: new.result_table(found, name) for name in TABLES},
         documents=[
-            plain_values(new.comparison_values(found)),
-            None if ratings is None else plain_values(new.ratings_document(ratings, pair)),
+            new.comparison_document(found, str(folder)),
             None if ratings is None else tuple(new.agreement(ratings)),
         ],
         digests=found.study.digests,
     )
     return before, now
+
+
+def _agreement(result: old.StudyResult) -> tuple[Any, ...] | None:
+    return None if result.ratings is None else astuple(old.agreement(result.ratings))
 
 
 def of_table(seed: int) -> tuple[Answers | str, Answers | str]:
@@ -237,11 +253,17 @@ def new_study(result: old.StudyResult) -> tuple[new.Study, list[new.OfMethod]]:
         sessions=tuple(sessions.values()),
         left_out=tuple(_as(new.LeftOut, one) for one in result.left_out),
         ratings=ratings,
+        deviations=tuple(_deviation(one) for one in result.deviations),
+        analysis=result.analysis,
         blinded=result.blinded,
         virtual=result.virtual,
         partly_virtual=any(virtual),
     )
     return study, [_of_method(row, result) for row in result.sensitivity]
+
+
+def _deviation(one: Any) -> new.Deviation:
+    return new.Deviation(*(getattr(one, name) for name in new.Deviation._fields))
 
 
 def _as(kind: type, one: Any) -> Any:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -108,8 +109,19 @@ def random_study(seed: int, *, known_days: bool = True) -> StudyResult:
         ratings=made.ratings,
         sensitivity=tuple(_by_methods(tested[: len(placed)], rng)),
         left_out=left_out,
+        deviations=tuple(_deviations(made.sessions, rng)),
         **parts,
     )
+
+
+def _deviations(sessions: tuple[SessionEntry, ...], rng: np.random.Generator) -> Iterator[Any]:
+    """Yield that some sessions were not as planned, in half of the studies."""
+    often = 0.3 if rng.random() < 0.5 else 0.0
+    for one in sessions:
+        if rng.random() < often:
+            kind = str(rng.choice(["short wait", "cut short"]))
+            where = {"subject": one.subject, "day": one.day, "order": 1, "path": one.path}
+            yield SimpleNamespace(condition=one.condition, kind=kind, detail="", **where)
 
 
 def _declared(rng: np.random.Generator) -> PrimaryTable:

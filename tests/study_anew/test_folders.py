@@ -7,6 +7,9 @@ from pathlib import Path
 import pytest
 from tests.small_study import record
 from tests.study_anew.both import Answers, apart, of_folder
+from tests.unit.analysis.study import test_deviations
+
+planned_study = test_deviations.study
 
 Edit = Callable[[Path, str, str], None]
 
@@ -117,3 +120,15 @@ def test_declared_measures(study: Path) -> None:
         file.write('[primary]\nmeasures = ["work_j", "impulse_nm_s"]\nrule = "sequence"\n')
         file.write("declared = 2026-01-01\n[analysis]\naxis = 'vertical'\n")
     assert same(study).conclusion[0]["role"] == "primary"
+
+
+def test_a_study_that_was_not_carried_out_as_planned(planned_study: Path, tmp_path: Path) -> None:
+    planned = Path(shutil.copytree(planned_study, tmp_path / "planned"))
+    kinds = {one["kind"] for one in same(planned).tables["deviations"]}
+    assert kinds == {"not done", "out of order", "short wait"}
+    protocol = planned / "protocols/OFF.toml"
+    protocol.write_text(protocol.read_text().replace("duration_s = 6.0", "duration_s = 7.0", 1))
+    table = planned / "plan.csv"
+    table.write_text(table.read_text().replace("15.0", "10.0"))
+    kinds = {one["kind"] for one in same(planned).tables["deviations"]}
+    assert {"plan edited", "other protocol"} <= kinds

@@ -5,20 +5,18 @@ Not used by the program yet: it takes the place of `analysis.study` when it is w
 
 from rigidimeter.analysis.study_anew.any_table import Columns, table_study
 from rigidimeter.analysis.study_anew.caveats import groups_of
-from rigidimeter.analysis.study_anew.compared import Compared, signed
+from rigidimeter.analysis.study_anew.compared import Compared
 from rigidimeter.analysis.study_anew.comparisons import (
     OfMethod,
-    Precision,
     compare,
     compare_values,
-    effects,
-    precisions,
-    precisions_of_each,
     sensitivity,
+    without_deviating,
 )
 from rigidimeter.analysis.study_anew.document import (
     TABLES,
     Result,
+    comparison_document,
     comparison_rows,
     comparison_values,
     conclude_study,
@@ -28,13 +26,11 @@ from rigidimeter.analysis.study_anew.document import (
 from rigidimeter.analysis.study_anew.from_folder import Loaded, analyse, load_study
 from rigidimeter.analysis.study_anew.measures import MEASURES, RATING, SCORE, Measure, Primary
 from rigidimeter.analysis.study_anew.rating_document import (
-    Agreement,
-    Relation,
     agreement,
     ratings_document,
     relations,
 )
-from rigidimeter.analysis.study_anew.ratings import corrected, rating_test, ratings_of
+from rigidimeter.analysis.study_anew.ratings import corrected, ratings_of
 from rigidimeter.analysis.study_anew.rows import (
     FIELDS,
     as_rows,
@@ -45,7 +41,13 @@ from rigidimeter.analysis.study_anew.rows import (
     together,
     write_rows,
 )
-from rigidimeter.analysis.study_anew.sentences import Statement, lead, statement, statements
+from rigidimeter.analysis.study_anew.sentences import (
+    Statement,
+    deviation_sentence,
+    lead,
+    statement,
+    statements,
+)
 from rigidimeter.analysis.study_anew.study import (
     Condition,
     Deviation,
@@ -55,5 +57,5 @@ from rigidimeter.analysis.study_anew.study import (
     SessionEntry,
     Study,
 )
-from rigidimeter.analysis.study_anew.tests import by_units, by_values, tested
-from rigidimeter.analysis.study_anew.verdicts import conclude
+from rigidimeter.analysis.study_anew.tests import by_units, by_values
+from rigidimeter.analysis.study_anew.verdicts import conclude, reasons, traffic_light

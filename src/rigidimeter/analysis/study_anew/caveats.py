@@ -64,11 +64,6 @@ class Case(NamedTuple):
         """Return the same test of other rows."""
         return tested(rows, self.test.measure, self.test.pair, self.test.by)
 
-    @property
-    def of_pair(self) -> pd.DataFrame:
-        """The rows of the two conditions, the reference first."""
-        return pd.concat([self.of(name) for name in self.test.pair])
-
     def of(self, condition: str) -> pd.DataFrame:
         """Return the rows of one condition."""
         return self.rows[self.rows["condition"] == condition]
@@ -316,7 +311,7 @@ def _in_order(case: Case) -> Iterator[Finding]:
     pair = case.test.pair
     later: set[int | None] = set()
     n = [0, 0]
-    for _, own in case.of_pair.groupby("subject", sort=False):
+    for _, own in case.rows.groupby("subject", sort=False):
         days = [own.loc[own["condition"] == name, "day"].unique() for name in pair]
         n = [total + len(of_one) for total, of_one in zip(n, days, strict=True)]
         if all(map(len, days)):

@@ -191,26 +191,16 @@ class Compared:
 
     def numbers(self) -> dict[str, Any]:
         """Return the values and the difference as documents and tables have them."""
-        tested, measured = self.of_test, self.of_measurement
-        sizes = {
-            "difference": tested,
-            "difference_percent": self.percent(tested),
-            "measured": measured,
-            "measured_percent": self.percent(measured),
-        }
-        ends = {
-            f"{name}{end}": size
-            for name, three in sizes.items()
-            for end, size in zip(("", "_low", "_high"), three, strict=True)
-            if end or not name.startswith("measured")  # the estimate is that of the test
-        }
-        return {
+        found: dict[str, Any] = {
             "centre": "median" if self.by == "values" else "mean",
             "value_reference": self.value_reference,
             "value_other": self.value_other,
-            **ends,
-            "p": self.p,
         }
+        for name, sizes in (("difference", self.of_test), ("measured", self.of_measurement)):
+            for key, three in ((name, sizes), (f"{name}_percent", self.percent(sizes))):
+                found |= {key: three[0], f"{key}_low": three[1], f"{key}_high": three[2]}
+        del found["measured"], found["measured_percent"]  # the difference is that of the test
+        return found | {"p": self.p}
 
 
 def signed(percent: Three, own: Three, unit: str = "", two_below: float = 5.0) -> Signed:

@@ -43,6 +43,7 @@ from rigidimeter.analysis.study_anew.tests import (
     tested,
 )
 from rigidimeter.core.records import Notice
+from rigidimeter.core.words import fixed
 
 Progress = Callable[[float], None]
 
@@ -105,6 +106,33 @@ def _can_be_compared(study: Study, measure: Measure, rows: pd.DataFrame, pair: P
         return bool((recorded(study.rows, measure.name)["condition"] == pair[1]).any())
     counts = [int((rows["condition"] == name).sum()) for name in pair]
     return min(counts) > 0 and sum(counts) >= FEWEST
+
+
+def without_deviating(study: Study, concluded: Sequence[Compared]) -> list[dict[str, Any]]:
+    """Return the test of each primary measure once more, without the sessions not as planned.
+
+    One row for each measure that can still be tested; p is that of this test alone.
+    """
+    paths = {one.path for one in study.deviations if one.path}
+    sources = {entry.source for entry in study.sessions if entry.path in paths}
+    main = {one.measure: one for one in concluded if one.other == study.other}
+    rows: list[dict[str, Any]] = []
+    for measure in measures_of(study.rows) if sources else ():
+        one = main.get(measure)
+        if one is None or measure == RATING or one.role != "primary":
+            continue
+        every = counting(study.rows, measure.name)
+        left = every[~every["session"].isin(sources)]
+        if not {*one.pair} <= {*left["condition"]}:
+            continue
+        again = tested(left, measure, one.pair, one.by)
+        if again.tested:
+            percent = again.percent(again.of_test)[0]
+            words = f"{measure.short} {fixed(percent, 0, sign=True)} %, {again.p_words}"
+            row = {"measure": measure.name, "difference_percent": percent, "p": again.p}
+            row |= {"p_with_all": one.p, "words": f"{words}, with them {one.p_words}"}
+            rows.append(row)
+    return rows
 
 
 def effects(
@@ -270,67 +298,19 @@ def method_caveats(found: Sequence[OfMethod]) -> dict[str, str]:
     }  # fmt: skip
 
 
-class Precision(NamedTuple):
-    """How precise one measure of one condition is, and how many epochs would make it better.
+def precisions(rows: pd.DataFrame, condition: str) -> list[dict[str, Any]]:
+    """Return how precise each measure of the only condition of some rows is, from its epochs alone.
+
+    J, B and K are those fitted to all epochs together; scores are means over epochs, with an
+    interval from their scatter. Interval and scatter are in % of the value. The number of epochs
+    whose interval is ± `WANTED_PERCENT` is
 
         N ≈ n (1.96 SE / (0.05 |K|))²,   SE the standard error from n epochs
 
-    since it falls with the root of the number of epochs. 1.96 SE is half the 95 % interval of many
+    since SE falls with the root of the number of epochs. 1.96 SE is half the 95 % interval of many
     epochs; that of few is wider, for their scatter is not well known. A bias, such as that by the
     subject's own torque, does not fall.
-
-    Attributes
-    ----------
-    measure : Measure
-    n : int
-        Epochs.
-    value, low, high : float
-        With a 95 % interval: J, B and K fitted to all epochs together; scores as the mean over
-        epochs, with an interval from their scatter.
-    se : float
-        The standard error of `value`.
-    sd_percent : float
-        Standard deviation between the epochs, in % of their mean; NaN of one epoch.
     """
-
-    measure: Measure
-    n: int
-    value: float
-    low: float
-    high: float
-    se: float
-    sd_percent: float
-
-    @property
-    def percent(self) -> float:
-        """Half the interval in per cent of the value."""
-        return 100 * (self.high - self.low) / 2 / abs(self.value) if self.value else math.nan
-
-    @property
-    def epochs_needed(self) -> int | None:
-        """The number of epochs whose interval is ± `WANTED_PERCENT`; None where it is not known."""
-        if not self.value:
-            return None
-        percent = 100 * _WIDE * self.se / abs(self.value)
-        epochs = self.n * (percent / WANTED_PERCENT) ** 2
-        return math.ceil(epochs - 1e-9) if math.isfinite(epochs) else None
-
-    def row(self) -> dict[str, Any]:
-        """Return all numbers as tables have them."""
-        return self.measure.names | {
-            "epochs": self.n,
-            "value": self.value,
-            "low": self.low,
-            "high": self.high,
-            "se": self.se,
-            "half_width_percent": self.percent,
-            "sd_percent": self.sd_percent,
-            "epochs_for_5_percent": self.epochs_needed,
-        }
-
-
-def precisions(rows: pd.DataFrame, condition: str) -> tuple[Precision, ...]:
-    """Return each measure of the only condition of some rows, from their epochs alone."""
     found = []
     for measure in sorted(MEASURES, key=lambda one: one.place):
         values = counting(rows, measure.name)
@@ -338,21 +318,47 @@ def precisions(rows: pd.DataFrame, condition: str) -> tuple[Precision, ...]:
         if measure.origin == "fits" and not len(together) and len(values) == 1:
             together = values
         if len(together):
-            sd_percent = summarise(values["value"].to_numpy()).sd_percent
-            value, low, high, se = together.iloc[0][["value", "low", "high", "se"]].astype(float)
-            n = max(len(values), 1)
-            found.append(Precision(measure, n, value, low, high, se, sd_percent))
+            numbers = together.iloc[0][["value", "low", "high", "se"]].astype(float)
+            found.append(_precision(measure, values, *numbers))
         elif len(values):
-            found.append(_of_values(measure, values["value"].to_numpy()))
-    return tuple(found)
+            found.append(_precision(measure, values, *_mean(values["value"])))
+    return found
 
 
-def precisions_of_each(
-    rows: pd.DataFrame, conditions: Iterable[str]
-) -> dict[str, tuple[Precision, ...]]:
-    """Return each measure of each condition that has any, from its epochs alone."""
-    found = {name: precisions(rows[rows["condition"] == name], name) for name in conditions}
-    return {name: each for name, each in found.items() if each}
+def _precision(
+    measure: Measure, values: pd.DataFrame, value: float, low: float, high: float, se: float
+) -> dict[str, Any]:
+    n = max(len(values), 1)
+    size = abs(value) or math.nan
+    epochs = n * (100 * _WIDE * se / size / WANTED_PERCENT) ** 2
+    return {
+        **measure.names,
+        "epochs": n,
+        "value": value,
+        "low": low,
+        "high": high,
+        "se": se,
+        "half_width_percent": 100 * (high - low) / 2 / size,
+        "sd_percent": summarise(values["value"].to_numpy()).sd_percent,
+        "epochs_for_5_percent": math.ceil(epochs - 1e-9) if math.isfinite(epochs) else None,
+    }
+
+
+def _mean(values: pd.Series) -> tuple[float, float, float, float]:
+    """Return the mean with the interval from the scatter, and its standard error."""
+    n, mean = len(values), float(values.mean())
+    se = float(values.std(ddof=1)) / math.sqrt(n) if n > 1 else math.nan
+    half = float(scipy.stats.t.ppf(0.975, n - 1)) * se if n > 1 else math.nan
+    return mean, mean - half, mean + half, se
+
+
+def precisions_of_each(rows: pd.DataFrame, conditions: Iterable[str]) -> list[dict[str, Any]]:
+    """Return the same of each condition, which is the first cell."""
+    return [
+        {"condition": name} | one
+        for name in conditions
+        for one in precisions(rows[rows["condition"] == name], name)
+    ]
 
 
 def _together(rows: pd.DataFrame, measure: Measure, condition: str) -> pd.DataFrame:
@@ -365,11 +371,3 @@ def _together(rows: pd.DataFrame, measure: Measure, condition: str) -> pd.DataFr
         if len(own):
             return own[own["outcome"] == "included"]
     return mine[:0]
-
-
-def _of_values(measure: Measure, values: np.ndarray[tuple[int], np.dtype[Any]]) -> Precision:
-    n, mean = len(values), float(np.mean(values))
-    se = float(np.std(values, ddof=1)) / math.sqrt(n) if n > 1 else math.nan
-    half = float(scipy.stats.t.ppf(0.975, n - 1)) * se if n > 1 else math.nan
-    sd_percent = summarise(values).sd_percent
-    return Precision(measure, n, mean, mean - half, mean + half, se, sd_percent)

@@ -24,18 +24,22 @@ from rigidimeter.analysis.study_anew.comparisons import (
     method_caveats,
     precisions_of_each,
     sensitivity,
+    without_deviating,
 )
-from rigidimeter.analysis.study_anew.measures import RATING, Measure
+from rigidimeter.analysis.study_anew.measures import MEASURE_NAMES, RATING, Measure
 from rigidimeter.analysis.study_anew.rating_document import (
     rating_contrast,
     rating_offsets,
     rating_rows,
+    ratings_document,
     relations,
 )
 from rigidimeter.analysis.study_anew.rows import counting, measures_of, recorded
+from rigidimeter.analysis.study_anew.sentences import deviation_sentence, lead, statements
 from rigidimeter.analysis.study_anew.study import Ratings, Study
-from rigidimeter.analysis.study_anew.verdicts import conclude
-from rigidimeter.core.records import Notice
+from rigidimeter.analysis.study_anew.verdicts import conclude, reasons, traffic_light
+from rigidimeter.core.files import plain_values
+from rigidimeter.core.records import Fit, Notice, Score
 from rigidimeter.core.words import within
 
 Rows = Sequence[Mapping[str, Any]]
@@ -44,6 +48,10 @@ TEST = "Wilcoxon rank-sum, two-sided, asymptotic, tie and continuity corrected"
 TESTS_SHARE = 0.1
 """Of the work on a study: what its tests take."""
 
+COMPARISON_SCHEMA = "rigidimeter.comparison/3"
+
+_IN_DOCUMENT = ("conditions", "sessions", "left_out", "conclusion", "days", "effect_differences",
+                "deviations", "rating_relation", "sensitivity", "excluded_epochs")  # fmt: skip
 _RANKS = tuple(one.name for one in fields(RankSum))
 _SIZES = ("r_low", "r_high", "rank_biserial", "rank_biserial_low", "rank_biserial_high")
 _SUMMARY = ("median", "q1", "q3", "sd_percent")
@@ -104,7 +112,7 @@ def conclude_study(
     methods: tuple[OfMethod, ...] = ()
     notices = study.notices
     if study.sessions and study.other:
-        methods, lacking = sensitivity(study.rows, (study.reference, study.other))
+        methods, lacking = sensitivity(study.rows, study.pair)
         notices = (*notices, *lacking)
     concluded = conclude(study, compare(study), methods)
     return Result(study, concluded, values, sizes, pairs, methods, notices, seed, resamples)
@@ -160,53 +168,47 @@ def _simulated(one: Compared) -> dict[str, float]:
     }
 
 
-def comparison_rows(result: Result) -> list[dict[str, Any]]:
+def comparison_values(result: Result) -> list[dict[str, Any]]:
     """Return each measure in each pair of conditions: summaries, rank-sum test, test by days."""
     days = _by_days(result)
+    return [
+        {
+            **one.measure.names,
+            "reference": one.reference,
+            "other": one.other,
+            "groups": _groups(result, one),
+            "test": TEST,
+            **_tested(result, one),
+            "remark": one.remark,
+            "days": days.get((one.measure, one.other)),
+        }
+        for one in result.values
+    ]
+
+
+def comparison_rows(result: Result) -> list[dict[str, Any]]:
+    """Return the same as a table, one row for each measure and pair."""
     rows = []
-    for one in result.values:
-        row: dict[str, Any] = _names(one)
-        every = recorded(result.study.rows, one.measure.name)
-        for side, name in (("reference", one.reference), ("other", one.other)):
-            known = side == "reference" or bool(name)
-            summary, excluded = _summary(every, name)
-            numbers = asdict(summary) if known else dict.fromkeys(("n", *_SUMMARY))
-            row[f"n_{side}"] = numbers["n"]
-            row[f"excluded_{side}"] = excluded if known else None
-            row |= {f"{key}_{side}": numbers[key] for key in _SUMMARY}
-        row |= _tested(result, one) | {"remark": one.remark}
-        if found := days.get((one.measure, one.other)):
-            found["offsets"] = " + ".join(found["offsets"])
-            row |= {k if k.startswith("days_") else f"days_{k}": v for k, v in found.items()}
+    for values in comparison_values(result):
+        groups, days = values.pop("groups"), values.pop("days")
+        del values["test"]
+        row = {name: values.pop(name) for name in (*MEASURE_NAMES, "reference", "other")}
+        for side in ("reference", "other"):
+            own = groups.get(row[side], {})
+            row |= {f"{name}_{side}": own.get(name) for name in ("n", "excluded", *_SUMMARY)}
+        row |= values
+        for name, value in (days or {}).items():
+            cell = " + ".join(value) if name == "offsets" else value
+            row[name if name.startswith("days_") else f"days_{name}"] = cell
         rows.append(row)
     return rows
 
 
-def comparison_values(result: Result) -> list[dict[str, Any]]:
-    """Return the same as documents nest it; the keys of the rank-sum test are flat."""
-    days = _by_days(result)
-    rows = []
-    for one in result.values:
-        every = recorded(result.study.rows, one.measure.name)
-        groups = {}
-        for name in filter(None, one.pair) if one.other else (one.reference,):
-            summary, excluded = _summary(every, name)
-            groups[name] = asdict(summary) | {"excluded": excluded}
-        rows.append(
-            {
-                **_names(one),
-                "groups": groups,
-                "test": TEST,
-                **_tested(result, one),
-                "remark": one.remark,
-                "days": days.get((one.measure, one.other)),
-            }
-        )
-    return rows
-
-
-def _names(one: Compared) -> dict[str, Any]:
-    return one.measure.names | {"reference": one.reference, "other": one.other}
+def _groups(result: Result, one: Compared) -> dict[str, dict[str, Any]]:
+    every = recorded(result.study.rows, one.measure.name)
+    names = one.pair if one.other else (one.reference,)
+    of_each = {name: _summary(every, name) for name in names}
+    return {name: asdict(own) | {"excluded": out} for name, (own, out) in of_each.items()}
 
 
 def _summary(every: pd.DataFrame, condition: str) -> tuple[Summary, int]:
@@ -245,7 +247,7 @@ def condition_names(study: Study) -> tuple[str, ...]:
     order = [each.name for each in study.conditions]
     order = order or [block.condition for block in study.settings.protocol.blocks]
     recorded_ones = map(str, study.rows["condition"].drop_duplicates())
-    names = dict.fromkeys([*filter(None, (study.reference, study.other)), *recorded_ones])
+    names = dict.fromkeys([*filter(None, study.pair), *recorded_ones])
     return tuple(sorted(names, key=lambda n: order.index(n) if n in order else len(order)))
 
 
@@ -253,8 +255,8 @@ def _summaries(result: Result) -> Iterator[dict[str, Any]]:
     study = result.study
     for measure in measures_of(study.rows):
         every = recorded(study.rows, measure.name)
-        there = {*every["condition"], study.reference, study.other}
-        for name in (name for name in condition_names(study) if name in there):
+        there = {*every["condition"], *study.pair}
+        for name in filter(there.__contains__, condition_names(study)):
             summary, excluded = _summary(every, name)
             if summary.n or excluded:
                 counts = {"condition": name, "n": summary.n, "excluded": excluded}
@@ -294,9 +296,7 @@ def _precision(result: Result) -> Iterator[dict[str, Any]]:
     study = result.study
     if study.other and any(one.tested for one in result.concluded if one.other == study.other):
         return
-    names = [study.reference, study.other] if study.other else [study.reference]
-    for name, each in precisions_of_each(study.rows, names).items():
-        yield from ({"condition": name} | one.row() for one in each)
+    yield from precisions_of_each(study.rows, study.pair)
 
 
 def _conditions(result: Result) -> Iterator[dict[str, Any]]:
@@ -317,30 +317,25 @@ def _account(result: Result) -> Iterator[dict[str, Any]]:
     `unlisted` are epochs that neither count nor are among the exclusions.
     """
     study = result.study
-    if not study.sessions:
-        return
-    # An epoch counts where it counts with J held, too.
-    rows = study.rows[(study.rows["scope"] == "epoch") & (study.rows["task"] != "")]
-    of_main = rows[rows["method"].isin(rows.loc[rows["chosen"], "method"].unique())]
     out = {(one.source, one.epoch): one.by for one in reversed(study.exclusions)}
-    for task, inertia in (("prbs", "fixed"), ("sinusoid", "")):
-        of_task = of_main[(of_main["task"] == task) & (of_main["inertia"] == inertia)]
+    # A fit counts where it counts with J held, too.
+    fits = study.analysis.fixed_inertia if study.sessions else ()
+    scores = study.analysis.scores if study.sessions else ()
+    tasks: tuple[tuple[str, Sequence[Fit | Score]], ...] = ("prbs", fits), ("sinusoid", scores)
+    for task, of_task in tasks:
         for name in condition_names(study):
-            own = of_task[of_task["condition"] == name].drop_duplicates(["session", "epoch"])
-            if not len(own):
-                continue
-            keys = {*zip(own["session"], own["epoch"], strict=True)}
-            kept = own[own["outcome"] == "included"]
-            counts = len({*zip(kept["session"], kept["epoch"], strict=True)} - out.keys())
-            by: list[str] = [out[key] for key in keys & out.keys()]
-            yield {
-                "task": task,
-                "condition": name,
-                "recorded": len(keys),
-                "included": counts,
-                **{f"by_{one}": by.count(one) for one in _EXCLUDED_BY},
-                "unlisted": len(keys) - counts - len(by),
-            }
+            own = {(o.source, o.epoch): o.outcome.included for o in of_task if o.condition == name}
+            if own:
+                by: list[str] = [out[key] for key in own if key in out]
+                included = sum(counts and key not in out for key, counts in own.items())
+                yield {
+                    "task": task,
+                    "condition": name,
+                    "recorded": len(own),
+                    "included": included,
+                    **{f"by_{one}": by.count(one) for one in _EXCLUDED_BY},
+                    "unlisted": len(own) - included - len(by),
+                }
 
 
 def _of_ratings(
@@ -359,7 +354,7 @@ TABLES: Mapping[str, Callable[[Result], Iterable[Mapping[str, Any]]]] = {
     "ratings": lambda result: _of_ratings(result, rating_rows),
     "rating_offsets": lambda result: _of_ratings(result, rating_offsets),
     "rating_contrast": lambda result: _of_ratings(
-        result, lambda found: rating_contrast(found, (result.study.reference, result.study.other))
+        result, lambda found: rating_contrast(found, result.study.pair)
     ),
     "rating_relation": lambda result: [one.row() for one in relations(result.study.rows)],
     "sensitivity": lambda result: [one.row() for one in result.methods],
@@ -368,6 +363,7 @@ TABLES: Mapping[str, Callable[[Result], Iterable[Mapping[str, Any]]]] = {
     "excluded_epochs": lambda result: [one._asdict() for one in result.study.exclusions],
     "left_out": lambda result: [one._asdict() for one in result.study.left_out],
     "deviations": lambda result: [one._asdict() for one in result.study.deviations],
+    "without_deviating": lambda result: without_deviating(result.study, result.concluded),
     "account": _account,
 }
 """The tables of conclusions by name, each made alone."""
@@ -376,3 +372,60 @@ TABLES: Mapping[str, Callable[[Result], Iterable[Mapping[str, Any]]]] = {
 def result_table(result: Result, name: str) -> Rows:
     """Return one of the tables of conclusions; the others are not made."""
     return list(TABLES[name](result))
+
+
+def comparison_document(result: Result, place: str = "") -> dict[str, Any]:
+    """Return every conclusion as plain values; what does not exist is null.
+
+    `place` is the study's folder as sentences name it; it is taken out of them.
+    """
+    study, analysis = result.study, result.study.analysis
+    light = traffic_light(study, result.concluded)
+    again = result_table(result, "without_deviating")
+    subjects = {session.subject for session in study.sessions}
+    of_study = ("title", "source", "by", "reference", "other")
+    tables = {name: result_table(result, name) for name in _IN_DOCUMENT}
+    document = {
+        "schema": COMPARISON_SCHEMA,
+        **{name: getattr(study, name) for name in of_study},
+        "seed": result.seed,
+        "resamples": result.resamples,
+        "blinded": study.blinded,
+        "virtual": study.virtual,
+        **{name: tables[name] for name in ("conditions", "sessions", "left_out")},
+        "method": analysis.method,
+        "method_reason": analysis.method_reason,
+        "inertia_kg_m2": analysis.inertia_kg_m2,
+        "inertia_by_subject": len(subjects) > 1,
+        "lead": lead(study, result.concluded),
+        "statements": [
+            {"reference": study.reference, "other": other, **one._asdict()}
+            for other, one in statements(study, result.concluded).items()
+        ],
+        "primary": study.primary.row(measures_of(study.rows)),
+        "conclusion": tables["conclusion"],
+        "reasons": [
+            reason.row() | {"measures": measures}
+            for reason, _, measures in reasons(result.concluded)
+        ],
+        "quality": light,
+        "comparisons": comparison_values(result),
+        "days": tables["days"],
+        "effect_differences": tables["effect_differences"],
+        "plan": {
+            "words": deviation_sentence(study, again),
+            "deviations": tables["deviations"],
+            "without_deviating": again,
+        },
+        "ratings": None if study.ratings is None else ratings_document(study.ratings, study.pair),
+        "rating_relation": tables["rating_relation"],
+        "sensitivity": tables["sensitivity"],
+        "exclusions": tables["excluded_epochs"],
+        "notices": [
+            {"level": one.level, "text": one.text.replace(f"{place}/", "") if place else one.text}
+            for one in result.notices
+        ],
+    }
+    plain = plain_values(document)
+    assert isinstance(plain, dict)
+    return plain

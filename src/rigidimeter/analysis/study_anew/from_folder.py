@@ -23,15 +23,11 @@ from rigidimeter.analysis.estimation import (
     prepare,
 )
 from rigidimeter.analysis.study_anew.comparisons import sensitivity_methods
-from rigidimeter.analysis.study_anew.load import Recordings, load, place_of
+from rigidimeter.analysis.study_anew.load import Recordings, load, without_excluded
 from rigidimeter.analysis.study_anew.measures import Primary, chosen_pair
 from rigidimeter.analysis.study_anew.ratings import corrected, study_ratings
 from rigidimeter.analysis.study_anew.rows import estimate_rows, together, typed
-from rigidimeter.analysis.study_anew.session_checks import (
-    Taken,
-    exclusions_of,
-    without_excluded,
-)
+from rigidimeter.analysis.study_anew.session_checks import deviations, exclusions_of
 from rigidimeter.analysis.study_anew.study import (
     GROUP,
     Naming,
@@ -45,7 +41,7 @@ from rigidimeter.core.files import read_json
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Analysis, Epoch, Notice
 from rigidimeter.core.settings import Settings, changed_settings
-from rigidimeter.core.study_files import STUDY_FILE, StudyFolder, read_study_folder
+from rigidimeter.core.study_files import STUDY_FILE, StudyFolder, TableRow, read_study_folder
 
 ANALYSIS, COMPARISON = "analysis", "comparison.json"
 """Where a study keeps what was concluded."""
@@ -62,8 +58,10 @@ class Loaded:
     folder : StudyFolder
     names : Naming
     recordings : Recordings
-    taken : Taken
-        The epochs with what the operator excluded.
+    epochs : tuple of Epoch
+        With what the operator excluded.
+    operator : mapping of (str, str) to TableRow
+        The operator's exclusions that met an epoch, by source and label.
     settings : Settings
         Those that the first session was recorded with, or what was given instead.
     method : str
@@ -77,7 +75,8 @@ class Loaded:
     folder: StudyFolder
     names: Naming
     recordings: Recordings
-    taken: Taken
+    epochs: tuple[Epoch, ...]
+    operator: Mapping[tuple[str, str], TableRow]
     settings: Settings
     method: str
     notices: tuple[Notice, ...]
@@ -131,8 +130,8 @@ def load_study(
         wanted = pair[0] or names.pair[0], pair[1] or names.pair[1]
         names = replace(names, pair=chosen_pair(names.known, wanted, holder="the study has"))
     recordings = load(read, names, progress=progress)
-    taken = _taken(read, recordings)
-    there = {epoch.condition for epoch in taken.epochs} - {*names.pair}
+    epochs, operator, excluded = without_excluded(read, recordings)
+    there = {epoch.condition for epoch in epochs} - {*names.pair}
     settings = settings or recordings.settings or Settings()
     if about.axis != "unknown":
         where = f"{folder / STUDY_FILE}: analysis.axis"
@@ -142,10 +141,11 @@ def load_study(
         read,
         names,
         recordings,
-        taken,
+        epochs,
+        operator,
         settings,
         chosen,
-        (*read.notices, *notices, *recordings.notices, *taken.notices, *primary.notices),
+        (*read.notices, *notices, *recordings.notices, *excluded, *primary.notices),
         tuple(name for name in names.known if name in there) if pair[1] is None else (),
         primary,
     )
@@ -164,20 +164,6 @@ def _of_group(read: StudyFolder, group: str) -> StudyFolder:
         sessions=sessions,
         ratings=tuple(row for row in read.ratings if row["subject"] in subjects),
         exclusions=tuple(row for row in read.exclusions if row["path"] in paths),
-    )
-
-
-def _taken(read: StudyFolder, recordings: Recordings) -> Taken:
-    """Return the epochs without those of the table of exclusions, whose paths may lead by links."""
-    places = {place_of(read.folder / s.entry.path): s.entry.source for s in recordings.sessions}
-    out = {place_of(read.folder / one.path) for one in recordings.left_out}
-    paths = {row["path"]: place_of(read.folder / row["path"]) for row in read.exclusions}
-    return without_excluded(
-        read.exclusions,
-        recordings.epochs,
-        {path: places[place] for path, place in paths.items() if place in places},
-        [path for path, place in paths.items() if place in out],
-        read.about.sessions,
     )
 
 
@@ -213,7 +199,7 @@ def analyse(loaded: Loaded, *, progress: Progress = lambda _: None) -> Study:
     progress : callable
         Called with the share of the work that was done since, 1 in all.
     """
-    epochs, sessions = loaded.taken.epochs, loaded.recordings.entries
+    epochs, sessions = loaded.epochs, loaded.recordings.entries
     pair = loaded.names.pair
     fitted = any(epoch.task == "prbs" for epoch in epochs)
     others = sensitivity_methods() if fitted and all(pair) else ()
@@ -241,7 +227,11 @@ def analyse(loaded: Loaded, *, progress: Progress = lambda _: None) -> Study:
         conditions=loaded.names.conditions,
         sessions=tuple(session.entry for session in loaded.recordings.sessions),
         left_out=loaded.recordings.left_out,
-        exclusions=tuple(exclusions_of(loaded.taken, main, sessions)),
+        exclusions=tuple(exclusions_of(epochs, main, sessions, loaded.operator)),
+        deviations=deviations(
+            loaded.folder.folder, [session.entry for session in loaded.recordings.sessions]
+        ),
+        analysis=main,
         notices=(*loaded.notices, *notices, *said),
         ratings=ratings,
         blinded=loaded.names.blinded,

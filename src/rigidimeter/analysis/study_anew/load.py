@@ -6,6 +6,7 @@ twice, disagrees with the table about its condition, or was commanded otherwise 
 
 from __future__ import annotations
 
+import difflib
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,7 +27,7 @@ from rigidimeter.analysis.study_anew.session_checks import (
 from rigidimeter.analysis.study_anew.study import LeftOut, Naming, SessionEntry
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import RECORDING_BYTES, noted_digests, open_regular
-from rigidimeter.core.records import Epoch, Notice
+from rigidimeter.core.records import Epoch, Notice, Outcome
 from rigidimeter.core.session import EMG, EVENTS, MANIFEST, SAMPLES, is_session, read_events
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.study_files import StudyFolder, TableRow, is_outside
@@ -112,7 +113,7 @@ def load(
         If not one can be read.
     """
     sessions: list[Session] = []
-    left_out: list[tuple[TableRow, str]] = []
+    left_out: list[LeftOut] = []
     notices: list[Notice] = []
     seen = _Seen()
     rows_at: dict[Path, list[TableRow]] = {}
@@ -122,16 +123,18 @@ def load(
         beside = rows_at[place_of(read.folder / row["path"])]
         found = _read(read, row, names, beside, seen)
         if isinstance(found, str):
-            left_out.append((row, found))
-            notices.append(_left_out_notice(row, found))
+            out, notice = _out(read.folder, row, found)
+            left_out.append(out)
+            notices.append(notice)
         else:
             sessions.append(found[0])
             notices += found[1]
         progress(1.0 / len(read.sessions))
     for find in (twice, commanded_otherwise):
         for row, reason in find(sessions):
-            left_out.append((row, reason))
-            notices.append(_left_out_notice(row, reason))
+            out, notice = _out(read.folder, row, reason)
+            left_out.append(out)
+            notices.append(notice)
             sessions = [session for session in sessions if session.row is not row]
     notices += other_settings(sessions)
     if not sessions:
@@ -141,7 +144,7 @@ def load(
         )
     return Recordings(
         tuple(sessions),
-        tuple(_left_out(read.folder, row, reason) for row, reason in left_out),
+        tuple(left_out),
         seen.digests,
         tuple(dict.fromkeys(notices)),
     )
@@ -165,17 +168,12 @@ def _read(
                 seen.digests[path.relative_to(read.folder).as_posix()] = noted[path]
 
 
-def _with_place(row: TableRow, reason: str) -> str:
-    return reason if reason.startswith(row.where) else f"{row.where}: {reason}"
-
-
-def _left_out_notice(row: TableRow, reason: str) -> Notice:
-    return Notice("error", f"{_with_place(row, reason)}; the session is left out")
-
-
-def _left_out(folder: Path, row: TableRow, reason: str) -> LeftOut:
-    bare = _with_place(row, reason).replace(f"{folder}/", "")
-    return LeftOut(source_of(row["path"]), row["subject"], row["day"], row["condition"], bare)
+def _out(folder: Path, row: TableRow, reason: str) -> tuple[LeftOut, Notice]:
+    """Return that a session is left out, and the sentence on it, after file and line."""
+    text = reason if reason.startswith(row.where) else f"{row.where}: {reason}"
+    bare = text.replace(f"{folder}/", "")
+    out = LeftOut(source_of(row["path"]), row["subject"], row["day"], row["condition"], bare)
+    return out, Notice("error", f"{text}; the session is left out")
 
 
 def _session(
@@ -349,3 +347,40 @@ def _of_condition(
     if others and not kept:
         raise _Refused(f"{path} records no epoch of {condition}; take the row out")
     return kept, said
+
+
+def without_excluded(
+    read: StudyFolder, found: Recordings
+) -> tuple[tuple[Epoch, ...], dict[tuple[str, str], TableRow], list[Notice]]:
+    """Return the epochs with the operator's exclusions, the rows that met one, and what met none.
+
+    The rows are by source and label.
+    """
+    epochs = {(epoch.source, epoch.label): epoch for epoch in found.epochs}
+    labels: dict[str, list[str]] = {}
+    for source, label in epochs:
+        labels.setdefault(source, []).append(label)
+    places = {place_of(read.folder / s.entry.path): s.entry.source for s in found.sessions}
+    left_out = {place_of(read.folder / out.path) for out in found.left_out}
+    met: dict[tuple[str, str], TableRow] = {}
+    notices = []
+    for row in read.exclusions:
+        path, place = row["path"], place_of(read.folder / row["path"])
+        key = (places.get(place, ""), row["epoch"])
+        if key in met:
+            text = f"{row.where}: epoch {row['epoch']} of {path} is out already (line "
+            notices.append(Notice("warning", f"{text}{met[key].line}); the first reason counts"))
+        elif key in epochs:
+            met[key] = row
+            by = f" ({row['by']})" if row["by"] else ""
+            epochs[key] = replace(epochs[key], closed=Outcome("excluded", f"{row['reason']}{by}"))
+        elif place in places:
+            there = ", ".join(labels.get(places[place], [])) or "none"
+            text = f"{row.where}: {path} has no epoch {row['epoch']}; its epochs are {there}"
+            notices.append(Notice("error", text))
+        elif place not in left_out:
+            near = difflib.get_close_matches(source_of(path), labels, n=1, cutoff=0.5)
+            hint = f"; the nearest is {near[0]}" if near else ""
+            text = f"{row.where}: {path} is no session of {read.about.sessions}{hint}"
+            notices.append(Notice("error", text))
+    return tuple(epochs.values()), met, notices

@@ -33,6 +33,10 @@ LEVEL = 0.05
 _SHOWN = 8
 
 
+MEASURE_NAMES = ("measure", "title", "unit")
+"""How tables and documents call what names a measure."""
+
+
 class Measure(NamedTuple):
     """A quantity that rows hold.
 
@@ -74,7 +78,7 @@ class Measure(NamedTuple):
     @property
     def names(self) -> dict[str, str]:
         """How tables and documents name it."""
-        return {"measure": self.name, "title": self.title, "unit": self.unit}
+        return dict(zip(MEASURE_NAMES, self, strict=False))
 
 
 MEASURES = (
@@ -256,9 +260,7 @@ def adjusted(tests: Sequence[PValue], primary: Primary) -> list[tuple[float, Fam
         places = [k for k, one in enumerate(roles) if one == role]
         own = [tests[k] for k in places]
         family = _family(role, own, primary.table)
-        rule = {"holm": _by_holm, "none": _alone, "sequence": _in_sequence}[family.rule]
-        for place, p in zip(places, rule(own, family), strict=True):
-            found[place] = p, family
+        found |= {k: (p, family) for k, p in zip(places, _adjusted(own, family), strict=True)}
     return [found[k] for k in range(len(tests))]
 
 
@@ -272,15 +274,12 @@ def _family(role: Role, own: Sequence[PValue], table: PrimaryTable) -> Family:
     return Family(role, "holm", count, count)
 
 
-def _by_holm(own: Sequence[PValue], _: Family) -> Sequence[float]:
-    return holm([one.p for one in own])
-
-
-def _alone(own: Sequence[PValue], _: Family) -> Sequence[float]:
-    return [one.p for one in own]
-
-
-def _in_sequence(own: Sequence[PValue], family: Family) -> Sequence[float]:
+def _adjusted(own: Sequence[PValue], family: Family) -> Sequence[float]:
+    alone = [one.p for one in own]
+    if family.rule == "none":
+        return alone
+    if family.rule == "holm":
+        return holm(alone)
     largest: dict[str, float] = {}
     found = [math.nan] * len(own)
     for k in sorted(range(len(own)), key=lambda k: family.order.index(own[k].measure.name)):

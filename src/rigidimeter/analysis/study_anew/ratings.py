@@ -9,6 +9,7 @@ is left out and stated, what is odd is stated.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -42,8 +43,6 @@ EXAMINERS = "examiners"
 COLUMNS = {"examiner": "rater", "subject": "subject", "day": "day", "condition": "condition"}
 """Where rows hold what has an offset."""
 
-Kept = tuple[TableRow, str, float]
-"""A row of the table, its condition and its score."""
 _SHOWN = 4
 _LINE = "line "
 
@@ -213,8 +212,8 @@ def study_ratings(
     if not read.ratings:
         return None, []
     source = read.about.ratings
-    kept, notices = _kept(read, names)
-    rows = as_rows(_records(kept, groups))
+    records, notices = _kept(read, names)
+    rows = as_rows(record | {"group": groups.get(record["subject"], "")} for record in records)
     counts = {name: int((rows["condition"] == name).sum()) for name in names.pair}
     if min(counts.values()) == 0 or sum(counts.values()) < FEWEST:
         there = " and ".join(f"{n} in {name}" for name, n in counts.items() if name)
@@ -233,9 +232,12 @@ def study_ratings(
     return found, [*notices, *(Notice("warning", text) for text in (*odd, *found.model_notices))]
 
 
-def _kept(read: StudyFolder, names: Naming) -> tuple[list[Kept], list[Notice]]:
+def _kept(read: StudyFolder, names: Naming) -> tuple[list[dict[str, Any]], list[Notice]]:
+    """Return the records of the ratings that can be used, and what is wrong with the others."""
     low, high = read.about.rating.scale
-    kept: list[Kept] = []
+    days = {(row["subject"], row["day"]) for row in read.sessions}
+    kept: list[dict[str, Any]] = []
+    unrecorded: list[TableRow] = []
     notices: list[Notice] = []
     for row in read.ratings:
         condition = names.named(row["condition"])
@@ -256,14 +258,17 @@ def _kept(read: StudyFolder, names: Naming) -> tuple[list[Kept], list[Notice]]:
             text = f"{row.where}: {names.unknown(row['condition'])}; the rating is left out"
             notices.append(Notice("error", text))
         else:
-            kept.append((row, condition, score))
-    return kept, notices + _unrecorded(read, [row for row, _, _ in kept])
+            cells = {name: row[name] for name in ("subject", "day")}
+            cells |= {"epoch": f"{_LINE}{row.line}", "rater": row["examiner"]}
+            cells |= {"condition": condition, "measure": SCORE}
+            kept.append({**cells, "chosen": False, "value": score})
+            if (row["subject"], row["day"]) not in days:
+                unrecorded.append(row)
+    return kept, notices + _unrecorded(unrecorded)
 
 
-def _unrecorded(read: StudyFolder, kept: Sequence[TableRow]) -> list[Notice]:
+def _unrecorded(unrecorded: Sequence[TableRow]) -> list[Notice]:
     """Return that ratings are of days on which nothing was recorded."""
-    days = {(row["subject"], row["day"]) for row in read.sessions}
-    unrecorded = [row for row in kept if (row["subject"], row["day"]) not in days]
     if not unrecorded:
         return []
     first, several = unrecorded[0], len(unrecorded) > 1
@@ -274,21 +279,6 @@ def _unrecorded(read: StudyFolder, kept: Sequence[TableRow]) -> list[Notice]:
         "used all the same"
     )
     return [Notice("warning", text)]
-
-
-def _records(kept: Sequence[Kept], groups: Mapping[str, str]) -> Iterator[dict[str, object]]:
-    for row, condition, score in kept:
-        yield {
-            "subject": row["subject"],
-            "group": groups.get(row["subject"], ""),
-            "day": row["day"],
-            "epoch": f"{_LINE}{row.line}",
-            "rater": row["examiner"],
-            "condition": condition,
-            "chosen": False,
-            "measure": SCORE,
-            "value": score,
-        }
 
 
 def line_of(epoch: str) -> int:

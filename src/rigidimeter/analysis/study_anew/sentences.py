@@ -7,8 +7,9 @@ these recordings alone, whatever their number; only the last speaks of the condi
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import Literal, NamedTuple
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Literal, NamedTuple
 
 from rigidimeter.analysis.study_anew.caveats import groups_of
 from rigidimeter.analysis.study_anew.compared import Compared, Verdict, signed
@@ -36,6 +37,18 @@ FEWEST_SUBJECTS = 3
 MEASUREMENT_ALONE = (
     "In brackets: 95 % interval from measurement error only, without day-to-day variation."
 )
+KINDS = {
+    "not done": "not recorded",
+    "not planned": "not planned",
+    "out of order": "out of order",
+    "short wait": "begun too early",
+    "unknown wait": "begun after an unknown wait",
+    "other protocol": "with another protocol",
+    "cut short": "with epochs missing",
+    "plan edited": "before the plan was changed",
+}
+"""What a deviation from the plan is called in a sentence on several."""
+
 _ALL_PERCENT = 100.0
 _EACH = {"day": " in both conditions", "value": " in each", "recording": " in each"}
 
@@ -102,12 +115,12 @@ class _Pair:
         return text[:1].upper() + text[1:]
 
 
-def statements(study: Study, concluded: Sequence[Compared]) -> tuple[Statement, ...]:
-    """Return the statements on each pair of conditions, in the order of the pairs."""
-    return tuple(
-        Statement(_measured(pair), _tested(pair), tuple(_concluded(pair)))
+def statements(study: Study, concluded: Sequence[Compared]) -> dict[str, Statement]:
+    """Return the statements on each condition beside the reference, by its name."""
+    return {
+        pair.each[0].other: Statement(_measured(pair), _tested(pair), tuple(_concluded(pair)))
         for pair in _pairs(study, concluded)
-    )
+    }
 
 
 def statement(study: Study, concluded: Sequence[Compared]) -> Statement | None:
@@ -115,7 +128,7 @@ def statement(study: Study, concluded: Sequence[Compared]) -> Statement | None:
 
     Where there are several, each begins with the difference that it is of.
     """
-    each = statements(study, concluded)
+    each = tuple(statements(study, concluded).values())
     if len(each) < 2:
         return each[0] if each else None
     which = [f"{pair.other} − {pair.reference}: " for pair in _pairs(study, concluded)]
@@ -158,6 +171,24 @@ def lead(study: Study, concluded: Sequence[Compared]) -> str:
         are = "is" if len(paths) == 1 else "are"
         text += f" {len(paths)} of {plural(total, 'session')} {are} left out."
     return prefix + text
+
+
+def deviation_sentence(study: Study, again: Sequence[Mapping[str, Any]]) -> str:
+    """Return one sentence on all deviations from the plan, and what depends on them; or nothing.
+
+    Parameters
+    ----------
+    study : Study
+    again : sequence of mapping
+        As `without_deviating`.
+    """
+    if not study.deviations:
+        return ""
+    kinds = Counter(one.kind for one in study.deviations)
+    counted = series([f"{count} {KINDS[kind]}" for kind, count in kinds.items()])
+    words = series([row["words"] for row in again])
+    depends = f" Without the sessions that deviate: {words} (p unadjusted)." if again else ""
+    return f"Sessions not as planned: {counted}.{depends}"
 
 
 def _pairs(study: Study, concluded: Sequence[Compared]) -> list[_Pair]:
@@ -359,8 +390,9 @@ def _only_condition(study: Study) -> str:
     """Return the values of the only condition, where there is nothing to compare."""
     parts = []
     for one in precisions(study.rows, study.reference):
-        ends = "" if math.isnan(one.percent) else f" ± {number(one.percent, 2)} %"
-        parts.append(f"{within(one.measure.title)} {amount(one.value, one.measure.unit, 3)}{ends}")
+        half = one["half_width_percent"]
+        ends = "" if math.isnan(half) else f" ± {number(half, 2)} %"
+        parts.append(f"{within(one['title'])} {amount(one['value'], one['unit'], 3)}{ends}")
     if not parts:
         return "No epoch could be included; the reasons are listed under “Exclusions”."
     name = f"{condition_name(study.reference)}: " if study.reference else ""

@@ -1,24 +1,44 @@
-"""Sessions beside each other, and single epochs: which do not count, who said so, and why."""
+"""Sessions beside each other and their plan, and single epochs: what does not count, and why.
+
+No conclusion changes by a deviation from the plan: what deviates is listed, and each primary
+measure is tested once more without the sessions that deviate.
+"""
 
 from __future__ import annotations
 
-import difflib
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
-from rigidimeter.analysis.study_anew.study import Exclusion, SessionEntry
-from rigidimeter.core.records import Analysis, Epoch, Notice, Outcome
-from rigidimeter.core.settings import Settings, dump_settings
-from rigidimeter.core.study_files import TableRow
+from rigidimeter.analysis.study_anew.study import Deviation, Exclusion, SessionEntry
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.records import Analysis, Epoch, Notice
+from rigidimeter.core.session import session_settings
+from rigidimeter.core.settings import Settings, dump_settings, load_settings
+from rigidimeter.core.study_files import (
+    PlannedBlock,
+    RecordedBlock,
+    StudyPlan,
+    TableRow,
+    read_plan,
+    recorded_blocks,
+)
+from rigidimeter.core.words import plural, series
 
 _COMMANDED: Mapping[str, tuple[str, ...]] = {
     "prbs": ("controller", "prbs"),
     "sinusoid": ("controller", "sinusoid"),
 }
 """By task, the tables of the settings that say what the rig was commanded."""
+
+TOLERANCE_MIN = 0.5
+"""By which a wait may be shorter than planned."""
+
+_OF_PROTOCOL = ("prbs", "sinusoid", "protocol", "controller", "guard")
+"""The tables of the settings that a protocol file decides, and not the rig or the seed."""
 
 _ANALYSED = ("guard", "rig", "estimation", "scores", "diagnostics")
 """The tables of the settings that an analysis uses or shows."""
@@ -114,79 +134,130 @@ def other_settings(sessions: Sequence[Session]) -> Iterator[Notice]:
             yield Notice("warning", text)
 
 
-class Taken(NamedTuple):
-    """The operator's exclusions: epochs with them, the rows that met one, what met none."""
-
-    epochs: tuple[Epoch, ...]
-    rows: Mapping[tuple[str, str], TableRow]
-    notices: tuple[Notice, ...]
-
-
-def without_excluded(
-    rows: Sequence[TableRow],
+def exclusions_of(
     epochs: Sequence[Epoch],
-    sources: Mapping[str, str],
-    left_out: Sequence[str],
-    table: str,
-) -> Taken:
-    """Return the epochs less those that the operator takes out.
+    analysis: Analysis,
+    sessions: Mapping[str, SessionEntry],
+    operator: Mapping[tuple[str, str], TableRow],
+) -> Iterator[Exclusion]:
+    """Yield every epoch that does not count, with who said so.
 
     Parameters
     ----------
-    rows : sequence of TableRow
-        Of the study's table of exclusions.
     epochs : sequence of Epoch
-    sources : mapping of str to str
-        By path as `rows` write it: the source of its epochs; other paths are absent.
-    left_out : sequence of str
-        Paths of sessions that do not count anyhow.
-    table : str
-        The table of sessions, for messages.
+    analysis : Analysis
+    sessions : mapping of str to SessionEntry
+        By source.
+    operator : mapping of (str, str) to TableRow
+        What the operator excluded, by source and label.
     """
-    known = {(epoch.source, epoch.label): epoch for epoch in epochs}
-    labels: dict[str, list[str]] = {}
-    for source, label in known:
-        labels.setdefault(source, []).append(label)
-    met: dict[tuple[str, str], TableRow] = {}
-    notices = []
-    for row in rows:
-        path = row["path"]
-        key = (sources.get(path, ""), row["epoch"])
-        if key in met:
-            text = f"epoch {row['epoch']} of {path} is out already (line {met[key].line}); the "
-            notices.append(Notice("warning", f"{row.where}: {text}first reason counts"))
-        elif key in known:
-            met[key] = row
-            by = f" ({row['by']})" if row["by"] else ""
-            known[key] = replace(known[key], closed=Outcome("excluded", f"{row['reason']}{by}"))
-        elif path in sources:
-            there = ", ".join(labels.get(sources[path], [])) or "none"
-            text = f"{path} has no epoch {row['epoch']}; its epochs are {there}"
-            notices.append(Notice("error", f"{row.where}: {text}"))
-        elif path not in left_out:
-            near = difflib.get_close_matches(path.removeprefix("./"), labels, n=1, cutoff=0.5)
-            hint = f"; the nearest is {near[0]}" if near else ""
-            notices.append(Notice("error", f"{row.where}: {path} is no session of {table}{hint}"))
-    return Taken(tuple(known.values()), met, tuple(notices))
-
-
-def exclusions_of(
-    taken: Taken, analysis: Analysis, sessions: Mapping[str, SessionEntry]
-) -> Iterator[Exclusion]:
-    """Yield every epoch that does not count, with who said so; `sessions` are by source."""
     results = {(result.source, result.epoch): result for result in analysis.results}
-    for epoch in taken.epochs:
+    for epoch in epochs:
         key = (epoch.source, epoch.label)
         result = results.get(key)
         if result is None or result.outcome.included:
             continue
-        entry, row = sessions[epoch.source], taken.rows.get(key)
+        entry, row = sessions[epoch.source], operator.get(key)
         where = (entry.subject, entry.day, epoch.condition, *key, epoch.task or "")
         if row is not None:
             yield Exclusion(*where, "operator", row["reason"], row["by"])
         elif not epoch.closed.included:
             yield Exclusion(*where, "protocol", epoch.closed.reason)
-        elif result.outcome.kind == "failed":
-            yield Exclusion(*where, "estimate", result.outcome.reason)
         else:
-            yield Exclusion(*where, "check", result.outcome.reason)
+            by = "estimate" if result.outcome.kind == "failed" else "check"
+            yield Exclusion(*where, by, result.outcome.reason)  # type: ignore[arg-type]
+
+
+def deviations(folder: Path, sessions: Sequence[SessionEntry]) -> tuple[Deviation, ...]:
+    """Return every deviation of a study from its plan; none where it has no plan.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the study.
+    sessions : sequence of SessionEntry
+        Those that were analysed.
+
+    Raises
+    ------
+    UserError
+        If the plan or a manifest cannot be read.
+    """
+    plan = read_plan(folder)
+    if plan is None:
+        return ()
+    recorded = [one for one in recorded_blocks(folder) if one.begun]
+    planned = {block.key: block for block in plan.blocks}
+    listed = {entry.path: entry for entry in sessions}
+    found = list(_of_plan(plan, recorded))
+    for one in recorded:
+        if one.path in listed:
+            block = None if one.key is None else planned.get(one.key)
+            found += (
+                [_unplanned(listed[one.path])]
+                if block is None
+                else [
+                    _deviation(plan, block, one.path, *how) for how in _of_block(plan, block, one)
+                ]
+            )
+    known = {one.path for one in recorded}
+    return (*found, *(_unplanned(entry) for path, entry in listed.items() if path not in known))
+
+
+def _of_plan(plan: StudyPlan, recorded: Sequence[RecordedBlock]) -> Iterator[Deviation]:
+    """Yield what was planned and not done, and what was done in another order than planned."""
+    first = {one.key: k for k, one in reversed(list(enumerate(recorded)))}
+    for subject in plan.about.subjects:
+        latest = -1
+        for block in (block for block in plan.blocks if block.subject == subject):
+            at = first.get(block.key)
+            if at is None:
+                how = "not done", "was planned and is not recorded"
+                yield _deviation(plan, block, "", *how)
+                continue
+            if at < latest:
+                how = "out of order", "was recorded before a session that is planned before it"
+                yield _deviation(plan, block, recorded[at].path, *how)
+            latest = max(latest, at)
+
+
+def _of_block(
+    plan: StudyPlan, block: PlannedBlock, one: RecordedBlock
+) -> Iterator[tuple[str, str]]:
+    """Yield in what a recorded session differs from its place in the plan: kind and detail."""
+    since, reason = one.facts["since_change_min"], one.facts["wait_cut_short"]
+    because = f" ({reason})" if reason else ""
+    if one.facts["sha256"] != plan.sha256:
+        yield "plan edited", "plan.csv was changed after this session"
+    if since is None and block.wait_min > 0.0:
+        planned = f"{block.wait_min:g} min of wait were planned"
+        yield "unknown wait", f"{planned}; when it began is unknown{because}"
+    elif since is not None and since < block.wait_min - TOLERANCE_MIN:
+        begun = f"begun {since:.3g} min after the change"
+        yield "short wait", f"{begun}; {block.wait_min:g} planned{because}"
+    if one.good < one.planned:
+        yield "cut short", f"{one.good} of {plural(one.planned, 'epoch')} ended with success"
+    if changed := _changed_settings(plan, block, plan.folder / one.path):
+        detail = f"recorded with another {series(changed)} than {block.protocol} has now"
+        yield "other protocol", detail
+
+
+def _changed_settings(plan: StudyPlan, block: PlannedBlock, session: Path) -> list[str]:
+    try:
+        planned = dump_settings(load_settings(plan.folder / block.protocol))
+    except UserError:
+        return ["protocol, for its file cannot be read,"]
+    run = dump_settings(session_settings(session))
+    return [name for name in _OF_PROTOCOL if planned[name] != run[name]]
+
+
+def _deviation(
+    plan: StudyPlan, block: PlannedBlock, path: str, kind: str, detail: str
+) -> Deviation:
+    condition = plan.shown(block.condition)
+    return Deviation(block.subject, block.day, block.order, condition, path, kind, detail)
+
+
+def _unplanned(entry: SessionEntry) -> Deviation:
+    where = entry.subject, entry.day, 0, entry.code, entry.path
+    return Deviation(*where, "not planned", "was recorded and was not planned")

@@ -8,6 +8,7 @@ on them as they are, blinded.
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
@@ -16,9 +17,11 @@ import pandas as pd
 
 from rigidimeter.analysis.statistics import Mixed
 from rigidimeter.analysis.study_anew.measures import Primary
-from rigidimeter.core.records import Notice
+from rigidimeter.core.records import Analysis, Notice
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.study_files import ConditionTable, StudyFolder
+
+NO_ESTIMATES = Analysis("", (), (), math.nan, ())
 
 GROUP = "group"
 """The column that says of which group, such as patients, a subject is."""
@@ -200,6 +203,9 @@ class Study:
         Whether all epochs come from the virtual rig, and whether any does.
     digests : mapping of str to str
         SHA-256 of every file that was read, by its path below the study.
+    analysis : Analysis
+        The estimates that are concluded from, with everything that is known of each fit; empty for
+        columns of a table.
     """
 
     rows: pd.DataFrame = field(repr=False)
@@ -222,6 +228,12 @@ class Study:
     virtual: bool = False
     partly_virtual: bool = False
     digests: Mapping[str, str] = field(default_factory=dict, repr=False)
+    analysis: Analysis = field(default=NO_ESTIMATES, repr=False)
+
+    @property
+    def pair(self) -> tuple[str, str]:
+        """The two conditions that are compared first."""
+        return self.reference, self.other
 
     @property
     def others(self) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -35,11 +36,12 @@ from rigidimeter.analysis.study_anew.caveats import (
 from rigidimeter.analysis.study_anew.compared import Compared, Needed, Verdict
 from rigidimeter.analysis.study_anew.comparisons import OfMethod
 from rigidimeter.analysis.study_anew.measures import CHECK, LEVEL, PValue, adjusted
-from rigidimeter.analysis.study_anew.rows import counting
+from rigidimeter.analysis.study_anew.rows import ALIKE_IN_BOTH, counting
 from rigidimeter.analysis.study_anew.study import Study
 from rigidimeter.analysis.study_anew.tests import half_width
 from rigidimeter.core.findings import Finding, found_between
-from rigidimeter.core.records import PARAMETERS
+from rigidimeter.core.records import PARAMETERS, FindingGroup
+from rigidimeter.core.words import series
 from rigidimeter.planning import ASSUMED, day_difference_sd, pairs_needed
 
 _MIN_DEGREES = 2
@@ -47,6 +49,9 @@ _MIN_DEGREES = 2
 
 _FEW_DF = 3.0
 """With fewer degrees of freedom the SD of days is hardly known."""
+
+GOOD_SHARE, POOR_SHARE = 0.9, 0.5
+"""At least the first share of epochs is sound in good data; less than the second in poor data."""
 
 _DAY = ["subject", "day", "session"]
 
@@ -238,3 +243,79 @@ def _within_days(rows: pd.DataFrame) -> tuple[float, int]:
     degrees = len(rows) - _days(rows)
     squares = float(((rows["value"] - days.transform("mean")) ** 2).sum())
     return (math.sqrt(squares / degrees) if degrees else math.nan), degrees
+
+
+def reasons(concluded: Sequence[Compared]) -> tuple[FindingGroup, ...]:
+    """Return the findings that verdicts follow from, each with its measures."""
+    found: dict[Finding, list[str]] = {}
+    for one in concluded:
+        for why in (one.finding, one.caution):
+            if why is not None:
+                found.setdefault(why, []).append(one.measure.short)
+    return tuple(
+        FindingGroup(finding, (), series(list(dict.fromkeys(measures))))
+        for finding, measures in found.items()
+    )
+
+
+def traffic_light(study: Study, concluded: Sequence[Compared]) -> dict[str, Any] | None:
+    """Return the quality of the data; None where no epochs were recorded, as in a table.
+
+    An epoch is sound if it counts without a caution. What concerns all epochs together counts too,
+    but for checks that make no difference between conditions where two are compared.
+
+    Returns
+    -------
+    dict or None
+        `level` is ``good``, ``caution`` or ``poor``. `epochs` were recorded, of which `sound` are,
+        `excluded` do not count, and `doubted` count in spite of a caution. `doubt` is the finding
+        of most epochs, `doubt_epochs` of how many: 0 if only of all of them together; empty
+        without a caution, or where the reason in `text` is no finding of epochs. `remedy` is what
+        to do about it.
+    """
+    analysis = study.analysis
+    recorded = {(one.source, one.epoch) for one in analysis.results}
+    if not recorded:
+        return None
+    counting = {(one.source, one.epoch) for one in analysis.results if one.outcome.included}
+    included = [fit for fit in analysis.fits if fit.outcome.included]
+    flagged = {(fit.source, fit.epoch) for fit in included if fit.cautions}
+    carried = [
+        (len({(fit.source, fit.epoch) for fit in group.fits} & counting), group.finding)
+        for group in analysis.findings
+        if group.finding.level != "note"
+    ]
+    carried = [
+        (epochs, finding)
+        for epochs, finding in carried
+        if epochs or not (study.other and finding.name in ALIKE_IN_BOTH)
+    ]
+    doubt_epochs, main = max(carried, key=lambda one: one[0], default=(0, None))
+    doubt = "" if main is None else main.name
+    of_pair = [one for one in concluded if one.other == study.other]
+    unsupported = [one.reason for one in of_pair if one.verdict == "not supported"]
+    text = main.headline if main is not None else (*unsupported, "")[0]
+    if study.left_out and not text:
+        count = len({out.path for out in study.left_out})
+        text = f"{count} of the study's recordings could not be used"
+    impossible = any(fit.inertia_kg_m2 <= 0 for fit in included)
+    if impossible:
+        text, doubt = "J is not greater than zero in some epochs, which is impossible", ""
+    share = len(counting - flagged) / len(recorded)
+    together = main is not None and not doubt_epochs
+    level = "good"
+    if share < POOR_SHARE or impossible:
+        level = "poor"
+    elif share < GOOD_SHARE or together or unsupported or study.left_out:
+        level = "caution"
+    return {
+        "level": level,
+        "epochs": len(recorded),
+        "sound": len(counting - flagged),
+        "excluded": len(recorded - counting),
+        "doubted": len(flagged),
+        "doubt": doubt,
+        "doubt_epochs": doubt_epochs,
+        "text": text,
+        "remedy": "" if main is None else main.words.remedy,
+    }
