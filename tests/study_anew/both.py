@@ -118,7 +118,10 @@ def old_answers(result: old.StudyResult) -> Answers:
             "without": old.result_table(result, "without_deviating"),
             "quality": [] if (light := old.traffic_light(result)) is None else [light.row()],
         },
-        documents=[[(one.finding.row(), one.where) for one in result.findings]],
+        documents=[
+            [(one.finding.row(), one.where) for one in result.findings],
+            None if (said := result.statements) is None else tuple(said),
+        ],
         plan=old.deviation_words(result),
     )
 
@@ -163,7 +166,10 @@ def new_answers(study: new.Study, methods: Sequence[new.OfMethod]) -> Answers:
             "without": again,
             "quality": [] if light is None else [light],
         },
-        documents=[[(one.finding.row(), one.where) for one in findings]],
+        documents=[
+            [(one.finding.row(), one.where) for one in findings],
+            None if (every := new.statement(study, concluded)) is None else tuple(every),
+        ],
         plan=new.deviation_sentence(study, again),
     )
 

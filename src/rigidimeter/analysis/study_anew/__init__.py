@@ -14,22 +14,15 @@ from rigidimeter.analysis.study_anew.comparisons import (
     without_deviating,
 )
 from rigidimeter.analysis.study_anew.document import (
-    TABLES,
     Result,
     comparison_document,
-    comparison_rows,
-    comparison_values,
     conclude_study,
     conclusion_rows,
     result_table,
 )
 from rigidimeter.analysis.study_anew.from_folder import Loaded, analyse, load_study
 from rigidimeter.analysis.study_anew.measures import MEASURES, RATING, SCORE, Measure, Primary
-from rigidimeter.analysis.study_anew.rating_document import (
-    agreement,
-    ratings_document,
-    relations,
-)
+from rigidimeter.analysis.study_anew.rating_document import agreement
 from rigidimeter.analysis.study_anew.ratings import corrected, ratings_of
 from rigidimeter.analysis.study_anew.rows import (
     FIELDS,
@@ -42,7 +35,6 @@ from rigidimeter.analysis.study_anew.rows import (
     write_rows,
 )
 from rigidimeter.analysis.study_anew.sentences import (
-    Statement,
     deviation_sentence,
     lead,
     statement,

@@ -86,7 +86,8 @@ def compare(study: Study) -> tuple[Compared, ...]:
 
 def compare_values(study: Study) -> tuple[Compared, ...]:
     """Return the rank-sum test of each measure, in which each epoch counts, adjusted by Holm."""
-    found = [by_values(rows, measure, pair) for measure, pair, rows in _pairs(study)]
+    beside = basis_of(study.rows) != "values"
+    found = [by_values(rows, measure, pair, beside=beside) for measure, pair, rows in _pairs(study)]
     adjusted = holm([one.p for one in found])
     return tuple(replace(one, p_adjusted=p) for one, p in zip(found, adjusted, strict=True))
 
@@ -263,7 +264,8 @@ def sensitivity(rows: pd.DataFrame, pair: Pair) -> tuple[tuple[OfMethod, ...], t
                 own = fits[(fits["method"] == method) & (fits["inertia"] == inertia)]
                 concluded = bool(own["chosen"].any())
                 values = counting(own.assign(chosen=True), measure.name)
-                tests = by_values(values, measure, pair), by_units(values, measure, pair)
+                ranked = by_values(values, measure, pair, beside=True)
+                tests = ranked, by_units(values, measure, pair)
                 found.append(OfMethod(method, inertia, concluded, *tests))
     return tuple(found), tuple(notices)
 

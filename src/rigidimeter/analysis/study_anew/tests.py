@@ -24,6 +24,7 @@ import scipy
 from rigidimeter.analysis.statistics import DayDifference, day_difference, ranksum
 from rigidimeter.analysis.study_anew.compared import By, Compared, Weights
 from rigidimeter.analysis.study_anew.measures import Measure
+from rigidimeter.core.errors import UserError
 
 FEWEST_FOR_TEST = 3
 """Below this many values in a condition there is no test."""
@@ -65,8 +66,24 @@ def tested(rows: pd.DataFrame, measure: Measure, pair: Pair, by: By) -> Compared
     return by_values(rows, measure, pair) if by == "values" else by_units(rows, measure, pair, by)
 
 
-def by_values(rows: pd.DataFrame, measure: Measure, pair: Pair) -> Compared:
-    """Return the medians, and the shift and p of the rank-sum test: each value counts as one."""
+def by_values(
+    rows: pd.DataFrame, measure: Measure, pair: Pair, *, beside: bool = False
+) -> Compared:
+    """Return the medians, and the shift and p of the rank-sum test: each value counts as one.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+    measure : Measure
+    pair : (str, str)
+    beside : bool
+        Whether it is shown beside the test that counts: too many values are then a remark.
+
+    Raises
+    ------
+    UserError
+        If there are too many pairs of values.
+    """
     x, y = (_values(rows, name) for name in pair)
     first, second = (float(np.median(one)) if one.size else math.nan for one in (x, y))
     untested = Compared(
@@ -84,12 +101,15 @@ def by_values(rows: pd.DataFrame, measure: Measure, pair: Pair) -> Compared:
     )
     if untested.remark:
         return untested
-    test = ranksum(x, y)
+    try:
+        test = ranksum(x, y)
+    except UserError as error:
+        if beside:
+            return replace(untested, remark=str(error))
+        raise
     # All differences of too few values are no interval of this confidence.
     ends = (-test.shift_high, -test.shift_low) if test.shift_bounded else (math.nan, math.nan)
-    counts = " and ".join(
-        f"{one.size} values of {name}" for one, name in zip((x, y), pair, strict=True)
-    )
+    counts = " and ".join(f"{n} values of {name}" for n, name in zip(untested.n, pair, strict=True))
     return replace(
         untested,
         test=f"rank-sum test of {counts}",

@@ -18,12 +18,14 @@ from rigidimeter.analysis.study_anew import (
     by_units,
     by_values,
     compare,
+    compare_values,
     conclude,
     conclusion_rows,
     counting,
     read_rows,
     write_rows,
 )
+from rigidimeter.core.errors import UserError
 from rigidimeter.core.study_files import PrimaryTable
 
 PAIR = ("OFF", "DBS")
@@ -116,6 +118,15 @@ def test_a_refusal_is_a_row_with_its_reason(rows: pd.DataFrame) -> None:
         assert math.isnan(one.p)
         assert one.value_reference > one.value_other
         assert not one.tested
+
+
+def test_too_many_values_are_refused_alone_and_a_remark_beside_days() -> None:
+    values = {(day, "1", name): list(np.linspace(1.0, 2.0, 3600)) for day in "12" for name in PAIR}
+    many = rows_of(values)
+    (one,) = compare_values(Study(many, *PAIR))
+    assert "make 5.2e+07 pairs" in one.remark
+    with pytest.raises(UserError, match=r"make 5\.2e\+07 pairs"):
+        compare(Study(many.assign(day="", method=""), *PAIR))
 
 
 def test_one_condition_alone_is_summarised_and_not_concluded(rows: pd.DataFrame) -> None:
