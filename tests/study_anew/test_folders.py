@@ -5,8 +5,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from benchmarks.verdicts import sessions_of
 from tests.small_study import record
 from tests.study_anew.both import Answers, apart, of_folder
+from tests.traps.recorded_studies import write_study
 from tests.unit.analysis.study import test_deviations
 
 planned_study = test_deviations.study
@@ -132,3 +134,19 @@ def test_a_study_that_was_not_carried_out_as_planned(planned_study: Path, tmp_pa
     table.write_text(table.read_text().replace("15.0", "10.0"))
     kinds = {one["kind"] for one in same(planned).tables["deviations"]}
     assert {"plan edited", "other protocol"} <= kinds
+
+
+@pytest.mark.parametrize(
+    ("number", "finding"),
+    [
+        (1, "flagged_epochs"),
+        (15, "order_of_conditions"),
+        pytest.param(0, "", marks=pytest.mark.slow),
+        pytest.param(5, "flagged_epochs", marks=pytest.mark.slow),
+        pytest.param(13, "unused_recordings", marks=pytest.mark.slow),
+    ],
+)
+def test_of_a_study_of_tables_with_a_trap(tmp_path: Path, number: int, finding: str) -> None:
+    """A study as a laboratory has it, a CSV for each session, with what misleads in one of two."""
+    folder = write_study(tmp_path / "study", sessions_of(number, lower=True), number)
+    assert finding in {row["finding"] for row in same(folder).conclusion}
