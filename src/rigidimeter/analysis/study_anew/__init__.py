@@ -1,6 +1,6 @@
 """A study as one long table: a row for each epoch and measure, everything else a function of it.
 
-Not used by the program yet: it takes the place of `analysis.study` when it is whole.
+Not used by the program yet: it takes the place of `analysis.study` when it is complete.
 """
 
 from rigidimeter.analysis.study_anew.any_table import Columns, table_study

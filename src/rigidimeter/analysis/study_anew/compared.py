@@ -91,7 +91,7 @@ class Compared:
         supported`` (one was found and something else may have made it), ``cannot be decided``;
         empty before it is concluded.
     finding : Finding or None
-        The reason; None where the test is the whole reason.
+        The reason; None where the test is the only reason.
     caution : Finding or None
         What is to be known beside the verdict: that the inertia differs.
     needed : Needed or None

@@ -214,7 +214,7 @@ def analyse(loaded: Loaded, *, progress: Progress = lambda _: None) -> Study:
     parts = [estimate_rows(analyses, sessions, epochs, loaded.names.conditions)]
     notices += _lacking(main, epochs, pair)
     groups = {entry.subject: entry.group for entry in sessions.values()}
-    ratings, said = study_ratings(loaded.folder, loaded.names, groups)
+    ratings, of_ratings = study_ratings(loaded.folder, loaded.names, groups)
     if ratings is not None:
         parts += [typed(ratings.rows), corrected(ratings)]
     return Study(
@@ -232,7 +232,7 @@ def analyse(loaded: Loaded, *, progress: Progress = lambda _: None) -> Study:
             loaded.folder.folder, [session.entry for session in loaded.recordings.sessions]
         ),
         analysis=main,
-        notices=(*loaded.notices, *notices, *said),
+        notices=(*loaded.notices, *notices, *of_ratings),
         ratings=ratings,
         blinded=loaded.names.blinded,
         virtual=all(epoch.virtual for epoch in epochs),

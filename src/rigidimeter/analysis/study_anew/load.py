@@ -153,7 +153,7 @@ def load(
 def _read(
     read: StudyFolder, row: TableRow, names: Naming, beside: Sequence[TableRow], seen: _Seen
 ) -> tuple[Session, list[Notice]] | str:
-    """Return a session and what is to be said of it, or why it does not count."""
+    """Return a session and its notices, or why it does not count."""
     # One that is changed while it is read is refused, so digest and result belong together.
     with noted_digests() as noted:
         try:
@@ -196,9 +196,9 @@ def _session(
     _is_closed(path)
     options = _options(read, row)
     if row["join"]:
-        epochs, said = _joined(read.folder, row, options)
+        epochs, notices = _joined(read.folder, row, options)
     else:
-        epochs, said = read_recording(path, options)
+        epochs, notices = read_recording(path, options)
     for file in _files_of_samples(path):
         if file not in noted:
             open_regular(file, RECORDING_BYTES).close()
@@ -215,7 +215,7 @@ def _session(
         replace(epoch, source=source, condition=condition, task=task)
         for epoch, task in zip(epochs, tasks, strict=True)
     )
-    return Session(row, entry, kept, settings), [*said, *differing]
+    return Session(row, entry, kept, settings), [*notices, *differing]
 
 
 def _inside(column: str, path: str, remedy: str, then: str = "") -> None:
@@ -315,7 +315,7 @@ def _of_condition(
     which.
     """
     others = {names.named(other["condition"]) for other in beside} - {condition}
-    said, kept = [], []
+    notices, kept = [], []
     for epoch in epochs:
         recorded = epoch.condition
         if others and not recorded:
@@ -334,7 +334,7 @@ def _of_condition(
                 f"{path}: records its condition by name, so who sees the folder is not blinded; "
                 "the code of the table is used"
             )
-            said.append(Notice("warning", text))
+            notices.append(Notice("warning", text))
         found = names.named(recorded) if recorded and not hidden else condition
         if found is None:
             raise _Refused(f"{path} records a condition of its own: {names.unknown(recorded)}")
@@ -346,7 +346,7 @@ def _of_condition(
             raise _Refused(f"the table says {condition}, but {path} records {found}{by}; {more}")
     if others and not kept:
         raise _Refused(f"{path} records no epoch of {condition}; take the row out")
-    return kept, said
+    return kept, notices
 
 
 def without_excluded(

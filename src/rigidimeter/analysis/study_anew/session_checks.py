@@ -140,7 +140,7 @@ def exclusions_of(
     sessions: Mapping[str, SessionEntry],
     operator: Mapping[tuple[str, str], TableRow],
 ) -> Iterator[Exclusion]:
-    """Yield every epoch that does not count, with who said so.
+    """Yield every epoch that does not count, with who excluded it.
 
     Parameters
     ----------

@@ -89,7 +89,7 @@ class LeftOut(NamedTuple):
 
 
 class Exclusion(NamedTuple):
-    """One epoch that does not count, who said so, and why.
+    """One epoch that does not count, who excluded it, and why.
 
     `by` is ``protocol`` (ended early or was repeated), ``check`` (a diagnostic), ``estimate`` (no
     fit) or ``operator`` (the study's table of exclusions; `who` is whom it names).

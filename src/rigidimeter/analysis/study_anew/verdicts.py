@@ -72,7 +72,7 @@ def conclude(
     """
     tests = [one for one in tests if one.other]
     families = adjusted([PValue(one.measure, one.other, one.p) for one in tests], study.primary)
-    told = [
+    adjusted_tests = [
         replace(
             one,
             p_adjusted=p,
@@ -83,10 +83,10 @@ def conclude(
         for one, (p, family) in zip(tests, families, strict=True)
     ]
     found: list[Compared] = []
-    for other in dict.fromkeys(one.other for one in told):
+    for other in dict.fromkeys(one.other for one in adjusted_tests):
         cases = [
             Case(one, counting(study.rows, one.measure.name), study, methods)
-            for one in told
+            for one in adjusted_tests
             if one.other == other
         ]
         found += sorted(_of_pair(cases), key=lambda one: one.measure.place)

@@ -104,7 +104,8 @@ def test_findings_that_touch_a_value() -> None:
 
 def test_the_bias_that_findings_of_all_epochs_allow() -> None:
     bias = Finding("loop_bias", "caution", 200.0, 50.0)
-    known = fit("pooled", findings=(bias,))
+    alike = Finding("between_samples", "caution", 2.0, 1.0)  # no difference between conditions
+    known = fit("pooled", findings=(bias, alike))
     unknown = fit("pooled", "DBS", findings=(bias, CAUTION))
     fits = fit("p1"), fit("p2", "DBS")
     rows = estimate_rows({"iv": analysis(*fits, pooled=(known, unknown, fit("pooled", "")))})
