@@ -38,6 +38,8 @@ SOURCE = ROOT / "src"
 PACKAGE = "rigidimeter"
 ISLANDS = ("analysis", "rig", "core")
 """Those that have rooms."""
+STUDY = f"{PACKAGE}.analysis.study"
+"""What an estimate of one file has no need of."""
 NO_CODE = {
     *(tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE),
     *(tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER),
@@ -312,7 +314,9 @@ def trips(folder: Path) -> dict[str, Trip]:
 def ways(found: Mapping[str, Trip]) -> dict[str, int]:
     """Return trips as numbers that have ceilings."""
     modules = {f"{name} modules": len(one.modules) for name, one in found.items()}
-    return modules | {f"{name} functions": one.functions for name, one in found.items()}
+    functions = {f"{name} functions": one.functions for name, one in found.items()}
+    of_study = [one for one in found["estimate"].modules if one.startswith(STUDY)]
+    return modules | functions | {"estimate modules of study": len(of_study)}
 
 
 def toml(found: Mapping[str, Mapping[str, Any]]) -> str:

@@ -23,6 +23,12 @@ GONE = {
 READING = SOURCE / "rigidimeter" / "analysis" / "reading"
 READING_DIGEST = "a1b1a0963899826e1fdc095122dd2de69e6e69de8f9c2b29ead715c93043b77f"
 """Of the files of that room, which does not change while its successor is written."""
+STUDY = SOURCE / "rigidimeter" / "analysis" / "study"
+STUDY_NAMES = ("Test", "Difference", "Conclusion", "DifferenceRow", "DayMedian")
+"""Types for which a row of a comparison is enough."""
+STUDY_DIGEST = "f1b2b22849e34b19ce9bec9129c45d3425e323d0dd67c761d64b22d811105cd4"
+"""Of the files of the room, which does not change while its successor is written."""
+NOT_REACHED = pytest.mark.xfail(strict=True, reason="not reached")
 
 
 @pytest.fixture(scope="module")
@@ -153,3 +159,87 @@ class TestEndOfReading:
     @pytest.mark.parametrize(("of", "most"), [("modules", 75), ("functions", 450)])
     def test_way_of_a_csv_to_its_estimate(self, of: str, most: int) -> None:
         assert highest()["ways"][f"estimate {of}"] <= most
+
+
+def test_the_study_stays_as_it_is_while_its_successor_is_written() -> None:
+    digest = hashlib.sha256()
+    for path in sorted(STUDY.rglob("*.py")):
+        digest.update(path.relative_to(STUDY).as_posix().encode() + b"\0" + path.read_bytes())
+    assert digest.hexdigest() == STUDY_DIGEST, f"{STUDY.relative_to(ROOT)} changed"
+
+
+class TestEndOfStudy:
+    """The study as one long table: what is missing of it is marked, a line each."""
+
+    @pytest.mark.parametrize(
+        ("room", "most"),
+        [
+            pytest.param("analysis.study", 2900 + 715, marks=NOT_REACHED),
+            pytest.param("analysis.report", 2900, marks=NOT_REACHED),
+            pytest.param("cli", 3000, marks=NOT_REACHED),
+        ],
+    )
+    def test_code_lines(self, now: dict[str, dict[str, int]], room: str, most: int) -> None:
+        assert now["rooms"][room] <= most
+
+    @NOT_REACHED
+    def test_modules(self, rooms: House) -> None:
+        assert rooms.rooms["analysis.study"][1] <= 18
+
+    @NOT_REACHED
+    def test_one_room_alone(self) -> None:
+        assert not STUDY.with_name("study_anew").exists()
+
+    @pytest.mark.parametrize(
+        "name",
+        [
+            *(pytest.param(name, marks=NOT_REACHED) for name in STUDY_NAMES),
+            "Preparation",
+        ],
+    )
+    def test_types_that_are_gone(self, name: str) -> None:
+        trees = [ast.parse(path.read_text("utf-8")) for path in STUDY.rglob("*.py")]
+        defined = [n.name for t in trees for n in ast.walk(t) if isinstance(n, ast.ClassDef)]
+        assert name not in defined
+
+    @pytest.mark.parametrize(
+        "room",
+        [
+            pytest.param("analysis.study", marks=NOT_REACHED),
+            pytest.param("analysis.report", marks=NOT_REACHED),
+        ],
+    )
+    def test_nothing_is_taken_from_inside(self, now: dict[str, dict[str, int]], room: str) -> None:
+        assert not now["inside"].get(room)
+
+    @NOT_REACHED
+    def test_the_room_that_has_no_front_yet_is_reading(self) -> None:
+        assert highest()["fronts"]["not_yet"] <= 1
+
+    @pytest.mark.parametrize(
+        ("room", "most"),
+        [
+            pytest.param("study", 1100, marks=NOT_REACHED),
+            pytest.param("report", 1800, marks=NOT_REACHED),
+        ],
+    )
+    def test_lines_of_unit_tests(self, room: str, most: int) -> None:
+        folder = ROOT / "tests" / "unit" / "analysis" / room
+        lines = [len(code_lines(path.read_text("utf-8"))) for path in folder.rglob("*.py")]
+        assert sum(lines) <= most
+
+    @pytest.mark.parametrize(
+        ("way", "most"),
+        [
+            pytest.param("compare modules", 100, marks=NOT_REACHED),
+            pytest.param("compare functions", 800, marks=NOT_REACHED),
+            pytest.param("estimate modules of study", 0, marks=NOT_REACHED),
+        ],
+    )
+    def test_ways_by_their_ceilings(self, way: str, most: int) -> None:
+        """What CI measures is at most its ceiling (`python -m benchmarks.house --trips`)."""
+        assert highest()["ways"][way] <= most
+
+    @NOT_REACHED
+    def test_no_circle_anywhere(self, rooms: House) -> None:
+        assert not rooms.circles

@@ -108,7 +108,7 @@ def identify(
     epoch = Epoch("arrays", "1", channels, task="prbs")
     recorded = prepare([epoch], settings)
     if method == "auto":
-        method, _ = choose_method(recorded.perturbed, recorded.observed)
+        method, _ = choose_method(recorded.perturbed)
     lacking = [name for name in method_named(method).needs if name not in channels]
     if lacking:
         raise ValueError(f"method {method} needs {' and '.join(lacking)}")

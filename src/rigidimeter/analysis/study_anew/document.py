@@ -1,0 +1,431 @@
+"""What a study concludes as one result, its tables and its document: every number, unrounded.
+
+A table of one name has the same rows and columns wherever it is written. Two analyses of the same
+inputs give the same bytes: neither time nor place is written down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any
+
+import pandas as pd
+
+from rigidimeter.analysis.statistics import DayDifference, Effects, RankSum, Summary, summarise
+from rigidimeter.analysis.study_anew.compared import Compared
+from rigidimeter.analysis.study_anew.comparisons import (
+    EffectPair,
+    OfMethod,
+    Progress,
+    compare,
+    compare_values,
+    effects,
+    method_caveats,
+    precisions_of_each,
+    sensitivity,
+    without_deviating,
+)
+from rigidimeter.analysis.study_anew.measures import MEASURE_NAMES, RATING, Measure
+from rigidimeter.analysis.study_anew.rating_document import (
+    rating_contrast,
+    rating_offsets,
+    rating_rows,
+    ratings_document,
+    relations,
+)
+from rigidimeter.analysis.study_anew.rows import counting, measures_of, recorded
+from rigidimeter.analysis.study_anew.sentences import deviation_sentence, lead, statements
+from rigidimeter.analysis.study_anew.study import Ratings, Study
+from rigidimeter.analysis.study_anew.verdicts import conclude, reasons, traffic_light
+from rigidimeter.core.files import plain_values
+from rigidimeter.core.records import Fit, Notice, Score
+from rigidimeter.core.words import within
+
+Rows = Sequence[Mapping[str, Any]]
+
+TEST = "Wilcoxon rank-sum, two-sided, asymptotic, tie and continuity corrected"
+TESTS_SHARE = 0.1
+"""Of the work on a study: what its tests take."""
+
+COMPARISON_SCHEMA = "rigidimeter.comparison/3"
+
+_IN_DOCUMENT = ("conditions", "sessions", "left_out", "conclusion", "days", "effect_differences",
+                "deviations", "rating_relation", "sensitivity", "excluded_epochs")  # fmt: skip
+_RANKS = tuple(one.name for one in fields(RankSum))
+_SIZES = ("r_low", "r_high", "rank_biserial", "rank_biserial_low", "rank_biserial_high")
+_SUMMARY = ("median", "q1", "q3", "sd_percent")
+_EXCLUDED_BY = ("protocol", "check", "estimate", "operator")
+
+
+@dataclass(frozen=True)
+class Result:
+    """A study, compared and concluded.
+
+    Attributes
+    ----------
+    study : Study
+    concluded : tuple of Compared
+        For each pair of conditions and measure; the first pair is the main one.
+    values : tuple of Compared
+        The rank-sum tests, in which each epoch counts, with p by Holm's method.
+    effects : mapping of str to Effects
+        Effect sizes of the main pair, by the name of the measure.
+    effect_pairs : tuple of EffectPair
+    methods : tuple of OfMethod
+        The main pair by every method.
+    notices : tuple of Notice
+    seed, resamples : int
+        Of the bootstrap.
+    """
+
+    study: Study
+    concluded: tuple[Compared, ...]
+    values: tuple[Compared, ...]
+    effects: Mapping[str, Effects] = field(default_factory=dict)
+    effect_pairs: tuple[EffectPair, ...] = ()
+    methods: tuple[OfMethod, ...] = ()
+    notices: tuple[Notice, ...] = ()
+    seed: int = 1
+    resamples: int = 9999
+
+
+def conclude_study(
+    study: Study,
+    *,
+    seed: int = 1,
+    resamples: int = 9999,
+    progress: Progress = lambda _: None,
+) -> Result:
+    """Compare a study and conclude from it, once.
+
+    Parameters
+    ----------
+    study : Study
+    seed, resamples : int
+        Of the bootstrap; with 0 resamples there are no effect sizes with intervals.
+    progress : callable
+        Called with the share of the work that was done since, 1 in all.
+    """
+    values = compare_values(study)
+    sizes, pairs = effects(study, values, seed=seed, resamples=resamples, progress=progress)
+    methods: tuple[OfMethod, ...] = ()
+    notices = study.notices
+    if study.sessions and study.other:
+        methods, lacking = sensitivity(study.rows, study.pair)
+        notices = (*notices, *lacking)
+    concluded = conclude(study, compare(study), methods)
+    return Result(study, concluded, values, sizes, pairs, methods, notices, seed, resamples)
+
+
+def conclusion_rows(
+    concluded: Iterable[Compared], methods: Sequence[OfMethod] = ()
+) -> list[dict[str, Any]]:
+    """Return what is concluded as rows of a document."""
+    caveats = method_caveats(methods)
+    return [
+        {
+            **one.measure.names,
+            "reference": one.reference,
+            "other": one.other,
+            "verdict": one.verdict,
+            **one.numbers(),
+            "p_holm": one.p_adjusted,
+            "role": one.role,
+            "adjusted_for": one.family.tests,
+            "level": one.family.level,
+            "half_width": one.half_width,
+            "wanted_percent": one.wanted_percent,
+            "tested_by": one.by,
+            "test": one.test,
+            "reason": one.reason,
+            "finding": "" if one.finding is None else one.finding.name,
+            "caution": "" if one.caution is None else within(one.caution.headline),
+            **_needed(one),
+            "caveat": caveats.get(one.measure.name, ""),
+            **_simulated(one),
+        }
+        for one in concluded
+    ]
+
+
+def _needed(one: Compared) -> dict[str, Any]:
+    number, unit = one.needed or (None, "")
+    of_days = number if unit == "day" else None
+    return {"days_to_decide": of_days, "units_to_decide": number, "unit_to_decide": unit}
+
+
+def _simulated(one: Compared) -> dict[str, float]:
+    if one.simulated is None:
+        return {}
+    first, second = one.simulated
+    known = first > 0 and one.measure != RATING
+    return {
+        "simulated_reference": first,
+        "simulated_other": second,
+        "simulated_difference": second - first,
+        "simulated_difference_percent": 100 / first * (second - first) if known else float("nan"),
+    }
+
+
+def comparison_values(result: Result) -> list[dict[str, Any]]:
+    """Return each measure in each pair of conditions: summaries, rank-sum test, test by days."""
+    days = _by_days(result)
+    return [
+        {
+            **one.measure.names,
+            "reference": one.reference,
+            "other": one.other,
+            "groups": _groups(result, one),
+            "test": TEST,
+            **_tested(result, one),
+            "remark": one.remark,
+            "days": days.get((one.measure, one.other)),
+        }
+        for one in result.values
+    ]
+
+
+def comparison_rows(result: Result) -> list[dict[str, Any]]:
+    """Return the same as a table, one row for each measure and pair."""
+    rows = []
+    for values in comparison_values(result):
+        groups, days = values.pop("groups"), values.pop("days")
+        del values["test"]
+        row = {name: values.pop(name) for name in (*MEASURE_NAMES, "reference", "other")}
+        for side in ("reference", "other"):
+            own = groups.get(row[side], {})
+            row |= {f"{name}_{side}": own.get(name) for name in ("n", "excluded", *_SUMMARY)}
+        row |= values
+        for name, value in (days or {}).items():
+            cell = " + ".join(value) if name == "offsets" else value
+            row[name if name.startswith("days_") else f"days_{name}"] = cell
+        rows.append(row)
+    return rows
+
+
+def _groups(result: Result, one: Compared) -> dict[str, dict[str, Any]]:
+    every = recorded(result.study.rows, one.measure.name)
+    names = one.pair if one.other else (one.reference,)
+    of_each = {name: _summary(every, name) for name in names}
+    return {name: asdict(own) | {"excluded": out} for name, (own, out) in of_each.items()}
+
+
+def _summary(every: pd.DataFrame, condition: str) -> tuple[Summary, int]:
+    """Return the summary of a condition's values that count, and how many do not."""
+    own = every[every["condition"] == condition]
+    included = own["outcome"] == "included"
+    return summarise(own.loc[included, "value"].to_numpy()), int((~included).sum())
+
+
+def _tested(result: Result, one: Compared) -> dict[str, Any]:
+    sizes = result.effects.get(one.measure.name) if one.other == result.study.other else None
+    return {
+        **{name: getattr(one.statistic, name, None) for name in _RANKS},
+        "p_holm": one.p_adjusted,
+        **{name: getattr(sizes, name, None) for name in _SIZES},
+        "interval_method": getattr(sizes, "method", None),
+    }
+
+
+def _by_days(result: Result) -> dict[tuple[Measure, str], dict[str, Any]]:
+    """Return the tests by days, by measure and other condition."""
+    found = {}
+    for one in result.concluded:
+        if one.by == "days" and isinstance(one.statistic, DayDifference):
+            row = asdict(one.statistic)
+            del row["weights"]
+            row["days_reference"], row["days_other"] = row.pop("n_days_x"), row.pop("n_days_y")
+            row["days_both"] = row.pop("n_days_both")
+            row["mean_reference"], row["mean_other"] = row.pop("mean_x"), row.pop("mean_y")
+            found[one.measure, one.other] = row | {"p_holm": one.p_adjusted}
+    return found
+
+
+def condition_names(study: Study) -> tuple[str, ...]:
+    """Return all conditions in the order of the study or the protocol, then as recorded."""
+    order = [each.name for each in study.conditions]
+    order = order or [block.condition for block in study.settings.protocol.blocks]
+    recorded_ones = map(str, study.rows["condition"].drop_duplicates())
+    names = dict.fromkeys([*filter(None, study.pair), *recorded_ones])
+    return tuple(sorted(names, key=lambda n: order.index(n) if n in order else len(order)))
+
+
+def _summaries(result: Result) -> Iterator[dict[str, Any]]:
+    study = result.study
+    for measure in measures_of(study.rows):
+        every = recorded(study.rows, measure.name)
+        there = {*every["condition"], *study.pair}
+        for name in filter(there.__contains__, condition_names(study)):
+            summary, excluded = _summary(every, name)
+            if summary.n or excluded:
+                counts = {"condition": name, "n": summary.n, "excluded": excluded}
+                yield measure.names | counts | asdict(summary)
+
+
+def _days(result: Result) -> Iterator[dict[str, Any]]:
+    """Yield median and quartiles of every day of every subject and condition, ratings excepted."""
+    if not any(one.by == "days" for one in result.concluded):
+        return
+    for measure in measures_of(result.study.rows):
+        rows = counting(result.study.rows, measure.name)
+        if measure == RATING:
+            continue
+        key = ["subject", "day", "condition"]
+        for labels, values in rows.groupby(key, sort=False)["value"]:
+            summary = asdict(summarise(values.to_numpy()))
+            numbers = {name: summary[name] for name in ("n", "median", "q1", "q3")}
+            yield {"measure": measure.name} | dict(zip(key, labels, strict=True)) | numbers
+
+
+def _effect_differences(result: Result) -> Iterator[dict[str, Any]]:
+    titles = {one.measure.name: one.measure.title for one in result.values}
+    for pair in result.effect_pairs:
+        yield {
+            "first": pair.first,
+            "second": pair.second,
+            "first_title": titles[pair.first],
+            "second_title": titles[pair.second],
+            **asdict(pair.difference),
+            "p_holm": pair.p_holm,
+        }
+
+
+def _precision(result: Result) -> Iterator[dict[str, Any]]:
+    """Yield the measures of the only condition, or of each of two without a test."""
+    study = result.study
+    if study.other and any(one.tested for one in result.concluded if one.other == study.other):
+        return
+    yield from precisions_of_each(study.rows, study.pair)
+
+
+def _conditions(result: Result) -> Iterator[dict[str, Any]]:
+    """Yield each condition; a code without its stimulation, which would give it away."""
+    for condition in result.study.conditions:
+        mine = [each for each in result.study.sessions if each.condition == condition.name]
+        about = asdict(condition)
+        del about["simulated"]  # the conclusions have it beside each estimate
+        if result.study.blinded:
+            about = dict.fromkeys(about) | {"name": condition.name}
+        days = len({(each.subject, each.day) for each in mine})
+        yield about | {"days": days, "sessions": len(mine)}
+
+
+def _account(result: Result) -> Iterator[dict[str, Any]]:
+    """Yield for each task and condition what was recorded, what counts, and who left out the rest.
+
+    `unlisted` are epochs that neither count nor are among the exclusions.
+    """
+    study = result.study
+    out = {(one.source, one.epoch): one.by for one in reversed(study.exclusions)}
+    # A fit counts where it counts with J held, too.
+    fits = study.analysis.fixed_inertia if study.sessions else ()
+    scores = study.analysis.scores if study.sessions else ()
+    tasks: tuple[tuple[str, Sequence[Fit | Score]], ...] = ("prbs", fits), ("sinusoid", scores)
+    for task, of_task in tasks:
+        for name in condition_names(study):
+            own = {(o.source, o.epoch): o.outcome.included for o in of_task if o.condition == name}
+            if own:
+                by: list[str] = [out[key] for key in own if key in out]
+                included = sum(counts and key not in out for key, counts in own.items())
+                yield {
+                    "task": task,
+                    "condition": name,
+                    "recorded": len(own),
+                    "included": included,
+                    **{f"by_{one}": by.count(one) for one in _EXCLUDED_BY},
+                    "unlisted": len(own) - included - len(by),
+                }
+
+
+def _of_ratings(
+    result: Result, rows: Callable[[Ratings], Iterable[dict[str, Any]]]
+) -> Iterable[dict[str, Any]]:
+    return [] if result.study.ratings is None else rows(result.study.ratings)
+
+
+TABLES: Mapping[str, Callable[[Result], Iterable[Mapping[str, Any]]]] = {
+    "conclusion": lambda result: conclusion_rows(result.concluded, result.methods),
+    "precision": _precision,
+    "comparisons": comparison_rows,
+    "summaries": _summaries,
+    "days": _days,
+    "effect_differences": _effect_differences,
+    "ratings": lambda result: _of_ratings(result, rating_rows),
+    "rating_offsets": lambda result: _of_ratings(result, rating_offsets),
+    "rating_contrast": lambda result: _of_ratings(
+        result, lambda found: rating_contrast(found, result.study.pair)
+    ),
+    "rating_relation": lambda result: [one.row() for one in relations(result.study.rows)],
+    "sensitivity": lambda result: [one.row() for one in result.methods],
+    "conditions": _conditions,
+    "sessions": lambda result: [one._asdict() for one in result.study.sessions],
+    "excluded_epochs": lambda result: [one._asdict() for one in result.study.exclusions],
+    "left_out": lambda result: [one._asdict() for one in result.study.left_out],
+    "deviations": lambda result: [one._asdict() for one in result.study.deviations],
+    "without_deviating": lambda result: without_deviating(result.study, result.concluded),
+    "account": _account,
+}
+"""The tables of conclusions by name, each made alone."""
+
+
+def result_table(result: Result, name: str) -> Rows:
+    """Return one of the tables of conclusions; the others are not made."""
+    return list(TABLES[name](result))
+
+
+def comparison_document(result: Result, place: str = "") -> dict[str, Any]:
+    """Return every conclusion as plain values; what does not exist is null.
+
+    `place` is the study's folder as sentences name it; it is taken out of them.
+    """
+    study, analysis = result.study, result.study.analysis
+    light = traffic_light(study, result.concluded)
+    again = result_table(result, "without_deviating")
+    subjects = {session.subject for session in study.sessions}
+    of_study = ("title", "source", "by", "reference", "other")
+    tables = {name: result_table(result, name) for name in _IN_DOCUMENT}
+    document = {
+        "schema": COMPARISON_SCHEMA,
+        **{name: getattr(study, name) for name in of_study},
+        "seed": result.seed,
+        "resamples": result.resamples,
+        "blinded": study.blinded,
+        "virtual": study.virtual,
+        **{name: tables[name] for name in ("conditions", "sessions", "left_out")},
+        "method": analysis.method,
+        "method_reason": analysis.method_reason,
+        "inertia_kg_m2": analysis.inertia_kg_m2,
+        "inertia_by_subject": len(subjects) > 1,
+        "lead": lead(study, result.concluded),
+        "statements": [
+            {"reference": study.reference, "other": other, **one._asdict()}
+            for other, one in statements(study, result.concluded).items()
+        ],
+        "primary": study.primary.row(measures_of(study.rows)),
+        "conclusion": tables["conclusion"],
+        "reasons": [
+            reason.row() | {"measures": measures}
+            for reason, _, measures in reasons(result.concluded)
+        ],
+        "quality": light,
+        "comparisons": comparison_values(result),
+        "days": tables["days"],
+        "effect_differences": tables["effect_differences"],
+        "plan": {
+            "words": deviation_sentence(study, again),
+            "deviations": tables["deviations"],
+            "without_deviating": again,
+        },
+        "ratings": None if study.ratings is None else ratings_document(study.ratings, study.pair),
+        "rating_relation": tables["rating_relation"],
+        "sensitivity": tables["sensitivity"],
+        "exclusions": tables["excluded_epochs"],
+        "notices": [
+            {"level": one.level, "text": one.text.replace(f"{place}/", "") if place else one.text}
+            for one in result.notices
+        ],
+    }
+    plain = plain_values(document)
+    assert isinstance(plain, dict)
+    return plain
