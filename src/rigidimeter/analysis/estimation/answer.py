@@ -207,6 +207,9 @@ class Answer(NamedTuple):
         Without a perturbation p of anything linear beside J, B and K, NaN if they hardly hinge on
         the frequencies that count.
     case, state : Case, State
+    better : bool
+        Whether J, B and K beside the terms are to be preferred to those without. Without a
+        perturbation a subject who gives way looks like a linear term: beside one none are.
     """
 
     joint: Array
@@ -223,15 +226,7 @@ class Answer(NamedTuple):
     follows: float
     case: Case
     state: State
-
-    @property
-    def better(self) -> bool:
-        """Whether J, B and K beside the terms are to be preferred to those without.
-
-        Without a perturbation a subject who gives way looks like a linear term: beside one none is.
-        """
-        linear = any(one.term.linear for one in self.found)
-        return self.answered and bool(self.found) and (self.case.caused or not linear)
+    better: bool
 
 
 def answer(solution: Solution, *, person: bool = True, most: int = MOST_TERMS) -> Answer:
@@ -751,9 +746,11 @@ def _answered(
         values = one.inner[: own.stop - own.start] if one.term.bent else fit.values[own]
         errors = half_of_all[own], covariance[own, own]
         told.append(Found(*named[one.term.name], values, *errors, one.inner))
+    straight = any(one.term.linear for one in told)
+    better = answered and bool(told) and (case.caused or not straight)
     return Answer(
         joint, half + away, away, of_joint, tuple(told), remains, left, change, answered,
-        frozenset(little), _differs(state, model), follows, case, state,
+        frozenset(little), _differs(state, model), follows, case, state, better,
     )  # fmt: skip
 
 

@@ -218,23 +218,25 @@ def prepare(
     measured = [screened(one, settings) for one in perturbed]
     active = activities(perturbed, measured, settings)
     sources = dict.fromkeys(one.source for one in everyone)
-    sound = [
-        one for one, _ in active if one.closed.included and not obstacle(one, settings.estimation)
-    ]
+    commands = [one.channels.get("velocity_command_rad_s") for one, _ in active]
+    rates = [f"{one.mean_rate_hz:.2g}" if one and len(one) > 1 else "" for one in commands]
+    # One recording may hold commands of several rates: each has a drive.
+    rigs = [(one.source, rate) for (one, _), rate in zip(active, rates, strict=True)]
     driven: dict[tuple[str, str], list[Epoch]] = {}
-    for one in sound:
-        driven.setdefault(_driven(one), []).append(one)
-    drives = {key: find_drive(own, settings) for key, own in driven.items()}
+    for (one, _), rig in zip(active, rigs, strict=True):
+        if one.closed.included and not obstacle(one, settings.estimation):
+            driven.setdefault(rig, []).append(one)
+    drives = {rig: find_drive(own, settings) for rig, own in driven.items()}
     ready = [
         Ready(
             epoch,
             settings,
-            drives.get(_driven(epoch)),
+            drives.get(rig),
             obstacle(epoch, settings.estimation),
             activity,
             whole if epoch is not whole else None,
         )
-        for whole, (epoch, activity) in zip(measured, active, strict=True)
+        for whole, (epoch, activity), rig in zip(measured, active, rigs, strict=True)
     ]
     causes: list[tuple[Array, Cause]] = []
     observed = [
@@ -250,13 +252,6 @@ def prepare(
     return Recorded(
         everyone, settings, tuple(ready), tuple(imposed), tuple(delays), tuple(observed)
     )
-
-
-def _driven(epoch: Epoch) -> tuple[str, str]:
-    """Return what epochs with one drive share: the recording, and the rate of the command."""
-    command = epoch.channels.get("velocity_command_rad_s")
-    rate_hz = command.mean_rate_hz if command is not None and len(command) > 1 else 0.0
-    return epoch.source, f"{rate_hz:.2g}"
 
 
 def _delay_of(source: str, ready: Sequence[Ready], observed: Sequence[Observation | str]) -> Delay:
@@ -497,7 +492,12 @@ def estimate_recorded(
     ]
     pooled, bands, parts = fitted.pooled, list[BandEstimate](), list[Part]()
     if not fits_alone:
-        counted = [_closed_as(one, fit) for one, fit in zip(epochs, fits, strict=True)]
+        counted = [
+            one._replace(epoch=replace(one.epoch, closed=fit.outcome))
+            if one.epoch.closed.included and fit.n_samples and not fit.outcome.included
+            else one
+            for one, fit in zip(epochs, fits, strict=True)
+        ]
         if any(a is not b for a, b in zip(counted, epochs, strict=True)):
             # What a check excludes must not be in the pool either.
             fitted = stage(counted, pooled=True)
@@ -610,13 +610,6 @@ def _fitted(
 
     alone, together = with_clock_error(epochs, fits, pools, delays, again)
     return fitted._replace(fits=alone, pooled=together)
-
-
-def _closed_as(ready: Ready, fit: Fit) -> Ready:
-    """Return the epoch as excluded, where a check of its fit excludes it."""
-    if fit.outcome.included or not ready.epoch.closed.included or fit.n_samples == 0:
-        return ready
-    return ready._replace(epoch=replace(ready.epoch, closed=fit.outcome))
 
 
 def _pull(method: Method, seen: Observation | str, fit: Fit) -> Pull:
