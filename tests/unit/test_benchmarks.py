@@ -35,6 +35,7 @@ SMALLEST = {
     "drive_torque": "--hours 1e-5",
     "file_faults": "--files 8",
     "house": "--trip design",
+    "reading": "--rows 3000",
     "held_at_limit": "--hours 1e-5",
     "joint_impedance.__main__": "\n--packages lstsq --only relaxed --recordings 1",
     "joint_impedance.score": "{results}/lstsq.csv",

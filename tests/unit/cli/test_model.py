@@ -128,7 +128,7 @@ def test_the_checks_of_an_estimate_are_shown(rigidimeter, joint, tmp_path):
     ran = rigidimeter("model", joint, "--band-hz", 0.15, 15, "--json", tmp_path / "m.json")
     assert ran.status == 0, ran.err
     (epoch,) = json.loads((tmp_path / "m.json").read_text())["epochs"]
-    assert "residual_whiteness" in [finding["name"] for finding in epoch["findings"]]
+    assert "varying_with_angle" in [finding["name"] for finding in epoch["findings"]]
     headline = epoch["findings"][0]["headline"]
     assert f"{epoch['findings'][0]['name']} {headline}" in " ".join(ran.out.split())
 

@@ -885,13 +885,16 @@ def findings_of(
         if not found.answered:
             how = "withheld"
         effect = Effect.of(added, values, half)
+        # Friction beside an imposed movement looks like damping by the phase.
+        phase = any(one.term.name == "B over phase" for one in own)
+        sure = how == "answered" and not phase
         told.append(
             said(
                 kind, limits, value, limit, p=max(one.p for one in own),
                 variant=f"{variant} {how}".strip() if how in ("beside", "withheld") else variant,
-                effect=UNKNOWN_EFFECT if how == "withheld" else effect,
+                effect=UNKNOWN_EFFECT if how == "withheld" or phase else effect,
                 facts={**facts, "remains": found.remains},
-                harmless=how if how == "answered" else "",
+                harmless=how if sure else "",
                 excludes=how == "withheld",
             )
         )  # fmt: skip

@@ -219,14 +219,17 @@ def prepare(
     active = activities(perturbed, measured, settings)
     sources = dict.fromkeys(one.source for one in everyone)
     commands = [one.channels.get("velocity_command_rad_s") for one, _ in active]
-    rates = [f"{one.mean_rate_hz:.2g}" if one and len(one) > 1 else "" for one in commands]
     # One recording may hold commands of several rates: each has a drive.
-    rigs = [(one.source, rate) for (one, _), rate in zip(active, rates, strict=True)]
-    driven: dict[tuple[str, str], list[Epoch]] = {}
-    for (one, _), rig in zip(active, rigs, strict=True):
+    rigs: list[tuple[str, float]] = []
+    driven: dict[tuple[str, float], list[Epoch]] = {}
+    for (one, _), command in zip(active, commands, strict=True):
+        rate_hz = command.mean_rate_hz if command and len(command) > 1 else 0.0
+        like = (r for r in driven if r[0] == one.source and abs(r[1] - rate_hz) <= 0.05 * rate_hz)
+        rigs.append(next(like, (one.source, rate_hz)))
+        sound = driven.setdefault(rigs[-1], [])
         if one.closed.included and not obstacle(one, settings.estimation):
-            driven.setdefault(rig, []).append(one)
-    drives = {rig: find_drive(own, settings) for rig, own in driven.items()}
+            sound.append(one)
+    drives = {rig: find_drive(some, settings) for rig, some in driven.items()}
     ready = [
         Ready(
             epoch,
@@ -473,8 +476,8 @@ def estimate_recorded(
     ValueError
         If there is no such method.
     """
-    settings, reason = recorded.settings, ""
-    if method == "auto":
+    settings, reason, auto = recorded.settings, "", method == "auto"
+    if auto:
         method, reason = choose_method(recorded.perturbed, recorded.observed)
     estimator = method_named(method)
     delays = () if estimator.as_recorded else recorded.delays
@@ -501,7 +504,9 @@ def estimate_recorded(
         if any(a is not b for a, b in zip(counted, epochs, strict=True)):
             # What a check excludes must not be in the pool either.
             fitted = stage(counted, pooled=True)
-        parts = _parts(estimator, epochs, observed, fits, fitted)
+        # The perturbation that the motion does not follow is no instrument of terms either.
+        own = IV if not auto or estimator is IV else BANDLIMITED
+        parts = _parts(estimator, own, epochs, observed, fits, fitted)
         if any(part.beside for part in parts):
             fitted = stage(counted, parts, pooled=True)
             each = zip(observed, fits, pulls, fitted.fits, strict=True)
@@ -699,30 +704,32 @@ class Part(NamedTuple):
 
     def places(self, fit: Fit) -> list[int]:
         """Return which of its epochs a fit is made of: of one, of the condition, or of all."""
-        if fit.condition not in ("", self.condition):
+        pooled = fit.epoch == "pooled"
+        if fit.condition != self.condition and not (pooled and not fit.condition):
             return []
         epochs = [one.observation.epoch for one in self.problems]
         both = (fit.source, fit.epoch)
         return [i for i, one in enumerate(epochs)
-                if fit.epoch == "pooled" or (one.source, one.label) == both]  # fmt: skip
+                if pooled or (one.source, one.label) == both]  # fmt: skip
 
 
 def _parts(
     method: Method,
+    own: Method,
     epochs: Sequence[Ready],
     observed: Sequence[Observation | str],
     fits: Sequence[Fit],
     fitted: Fitted,
 ) -> list[Part]:
-    """Return what the torque of each condition holds beside J, B and K.
+    """Return what the torque of each condition holds beside J, B and K, by a method of its `own`.
 
-    By the perturbation where all epochs recorded it, whatever the method: at J, B and K of least
-    squares the subject's own torque would show in the residual as well. Epochs in which a term is
-    not the same are parts of their own.
+    By the perturbation where all epochs recorded it and the motion follows it, whatever the method:
+    at J, B and K of least squares the subject's own torque would show in the residual as well.
+    Epochs in which a term is not the same are parts of their own.
     """
     counting = [i for i, fit in enumerate(fits) if fit.outcome.included]
     epochs, seen = [epochs[i] for i in counting], [observed[i] for i in counting]
-    own = BANDLIMITED if any(no_instrument(one.epoch) for one in epochs) else IV
+    own = BANDLIMITED if any(no_instrument(one.epoch) for one in epochs) else own
     shared, fits = fitted.shared, [fits[i] for i in counting]
     if own is not method:
         seen = observed_for(own, epochs)
@@ -863,7 +870,8 @@ def _together(
         seen = [p.observation for part in those for p in part.problems]
         labels[condition] = tuple(label for part in those for label in part.labels)
         pool = next((fit for fit in pooled if fit.condition == condition), None)
-        if seen[0].cause is not None:
+        # Other bands are seen without terms.
+        if seen[0].cause is not None and not any(part.beside for part in those):
             values = [value for part in those for value in part.values]
             bands += band_estimates(seen, values, pool if method.uses_perturbation else None)
     told = [_told(part, fits) for part in parts]
@@ -872,7 +880,8 @@ def _together(
         by_name: dict[str, Finding] = {}
         for part, findings in zip(parts, told, strict=True):
             for finding in findings if part.places(fit) else ():
-                by_name.setdefault(finding.name, finding)
+                before = by_name.setdefault(finding.name, finding)
+                by_name[finding.name] = max(before, finding, key=lambda one: abs(one.value))
         shared = list(by_name.values())
         own = [band for band in bands if band.condition == fit.condition]
         if own and by_name.keys() <= {"lack_of_fit"}:  # what has no other name
@@ -884,7 +893,8 @@ def _together(
         serious = [finding for finding in shared if finding.level == "exclude"]
         if serious and outcome.included:
             outcome = _excluded(serious[0])
-        found = (*fit.findings, *shared, *more)
+        own_findings = [one for one in fit.findings if one.name not in by_name]
+        found = (*own_findings, *shared, *more)
         return in_half_intervals(replace(fit, outcome=outcome, findings=found))
 
     alone = []

@@ -187,3 +187,34 @@ def test_the_error_of_two_clocks_is_in_the_intervals_beside_terms_too(joint):
         assert fit.se[1] > 0.5 * truth[0, 2] * error_s
         assert fit.se[0] > 0.5 * truth[0, 1] * error_s
     assert all(fit.se[1] > 0.2 * truth[0, 2] * error_s for fit in found.fixed_inertia)
+
+
+def test_epochs_without_a_condition_beside_named_ones_have_their_own_terms():
+    plain, _ = RELAXED.simulated(0, 2)
+    other, _ = with_reflex(reflex_nm_s_rad=0.3).simulated(1, 2)
+    epochs = [replace(one, condition=name) for own, name in ((plain, ""), (other, "ON"))
+              for one in own]  # fmt: skip
+    for fit in estimated(epochs).fits:
+        assert ("missing_term" in names(fit)) == (fit.condition == "ON")
+
+
+def test_damping_by_the_phase_of_a_movement_may_be_friction_and_is_a_caution():
+    moved = {"imposed_rad": 0.2, "imposed_hz": 0.5}
+    made = scenario("friction", joint={"coulomb_nm": 0.1}, subject=moved)
+    for fit in estimated(made.simulated(0, 2)[0]).fits:
+        (told,) = (one for one in fit.findings if one.name == "varying_with_phase")
+        assert told.level == "caution"
+
+
+def test_a_perturbation_that_the_motion_does_not_follow_is_no_instrument_of_terms():
+    made = scenario("friction", joint={"coulomb_nm": 0.1})
+    epochs, truth = made.simulated(0, 2)
+    rng = np.random.default_rng(3)
+    other = []
+    for one in epochs:
+        channel = one.channels["perturbation_nm"]
+        unlike = replace(channel, values=rng.permutation(channel.values))
+        other.append(replace(one, channels={**one.channels, channel.name: unlike}))
+    found = estimated(other, made, "auto")
+    assert found.method == "bandlimited"
+    assert_right(found.fits, truth[0])
