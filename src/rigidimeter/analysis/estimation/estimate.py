@@ -870,8 +870,7 @@ def _together(
         seen = [p.observation for part in those for p in part.problems]
         labels[condition] = tuple(label for part in those for label in part.labels)
         pool = next((fit for fit in pooled if fit.condition == condition), None)
-        # Other bands are seen without terms.
-        if seen[0].cause is not None and not any(part.beside for part in those):
+        if seen[0].cause is not None:
             values = [value for part in those for value in part.values]
             bands += band_estimates(seen, values, pool if method.uses_perturbation else None)
     told = [_told(part, fits) for part in parts]
