@@ -208,8 +208,10 @@ class Answer(NamedTuple):
         the frequencies that count.
     case, state : Case, State
     better : bool
-        Whether J, B and K beside the terms are to be preferred to those without. Without a
-        perturbation a subject who gives way looks like a linear term: beside one none are.
+        Whether J, B and K beside the terms are to be preferred to those without.
+    straight : Answer, optional
+        Without a perturbation a linear term that was found beside these, and J, B and K beside it
+        too: a subject who gives way looks like one, so it is told and changes none.
     """
 
     joint: Array
@@ -227,6 +229,7 @@ class Answer(NamedTuple):
     case: Case
     state: State
     better: bool
+    straight: Answer | None = None
 
 
 def answer(solution: Solution, *, person: bool = True, most: int = MOST_TERMS) -> Answer:
@@ -248,6 +251,7 @@ def answer(solution: Solution, *, person: bool = True, most: int = MOST_TERMS) -
     offered = [one for one in TERMS if _offered(case, one, person)]
     found: list[tuple[Term, float, float]] = []
     nameless: Score | None = None
+    straight: Answer | None = None
     little: set[str] = set()
     strongest = 0.0
     while True:
@@ -274,14 +278,24 @@ def answer(solution: Solution, *, person: bool = True, most: int = MOST_TERMS) -
         chosen = _chosen(case, state, tested, sure, gains, little)
         if chosen is None:
             break
-        state, size = chosen
-        term = state.taken[-1].term
-        found.append((term, p[of.DELAY.name if term is of.FILTER else term.name], size))
+        new, size = chosen
+        term = new.taken[-1].term
+        entry = term, p[of.DELAY.name if term is of.FILTER else term.name], size
+        if term.linear and not case.caused:
+            beyond = _tested(case, new, [])
+            straight = _answered(case, new, beyond, [*found, entry], nameless, little)
+            break
+        state = new
+        found.append(entry)
         if term.name in of.FINER:
             state = _also(case, state, of.FINER[term.name])
         gone = {term.name, *NOT_BESIDE.get(term.name, ())}
         offered = [one for one in offered if one.name not in gone]
-    return _answered(case, state, tested, found, nameless, little)
+    made = _answered(case, state, tested, found, nameless, little)
+    if straight is None:
+        return made
+    straight = straight._replace(found=straight.found[-1:], follows=np.nan)
+    return made._replace(straight=straight, follows=np.nan)
 
 
 def case_of(problems: Sequence[Problem]) -> Case:
@@ -746,11 +760,9 @@ def _answered(
         values = one.inner[: own.stop - own.start] if one.term.bent else fit.values[own]
         errors = half_of_all[own], covariance[own, own]
         told.append(Found(*named[one.term.name], values, *errors, one.inner))
-    straight = any(one.term.linear for one in told)
-    better = answered and bool(told) and (case.caused or not straight)
     return Answer(
         joint, half + away, away, of_joint, tuple(told), remains, left, change, answered,
-        frozenset(little), _differs(state, model), follows, case, state, better,
+        frozenset(little), _differs(state, model), follows, case, state, answered and bool(told),
     )  # fmt: skip
 
 

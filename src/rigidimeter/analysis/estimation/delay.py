@@ -383,7 +383,8 @@ def _of_other_terms(used: Sequence[Observation], pose: Pose, delay_s: float) -> 
         told = answer(solve(turned, pose, start_of(turned)), person=person, most=1)
     except ValueError as error:
         return str(error)
-    first = next((one.term for one in told.found), None)
+    named = told.found or (told.straight.found if told.straight else ())
+    first = next((one.term for one in named), None)
     if first is not None and first.finding != "torque_delay":
         return (
             f"{first.label} explains the torque better; `rigidimeter model --compare` fits "

@@ -735,13 +735,13 @@ def _parts(
         seen = observed_for(own, epochs)
         fitted = fit_epochs(own, epochs, seen, pooled=False)
         shared, fits = fitted.shared, fitted.fits
-    known = {(one.source, one.epoch): one.value for one in fits if one.outcome.included}
+    known = {(f.condition, f.source, f.epoch): f.value for f in fits if f.outcome.included}
 
     def part_of(condition: str, solution: Solution) -> Part:
         those = [one.observation for one in solution.problems]
         found = answer(solution, person=those[0].settings.diagnostics.subject_present)
         better = own is method and found.better
-        keys = [(one.epoch.source, one.epoch.label) for one in those]
+        keys = [(condition, one.epoch.source, one.epoch.label) for one in those]
         return Part(
             condition,
             found,
@@ -934,16 +934,15 @@ def _together(
 
 def _told(part: Part, fits: Sequence[Fit]) -> list[Finding]:
     """Return the findings of what a part holds; where J, B and K are not beside it, of theirs."""
-    shown = None
-    if not part.beside:
-        own = [fit for fit in fits if part.places(fit)]
-        halves = [(np.asarray(one.high) - np.asarray(one.low)) / 2 for one in own]
-        shown = np.mean([one.value for one in own], axis=0), np.mean(halves, axis=0)
-    settings = part.problems[0].observation.settings
-    return [
-        replace(finding, condition=part.condition, epochs=part.labels)
-        for finding in findings_of(part.answer, settings, shown)
-    ]
+    own = [fit for fit in fits if part.places(fit)]
+    halves = [(np.asarray(one.high) - np.asarray(one.low)) / 2 for one in own]
+    shown = np.mean([one.value for one in own], axis=0), np.mean(halves, axis=0)
+    settings, straight = part.problems[0].observation.settings, part.answer.straight
+    told = [*findings_of(part.answer, settings, None if part.beside else shown)]
+    if straight is not None:
+        names = {one.name for one in told}
+        told += [one for one in findings_of(straight, settings, shown) if one.name not in names]
+    return [replace(one, condition=part.condition, epochs=part.labels) for one in told]
 
 
 def _of_every(pool: Fit, own: Sequence[Fit]) -> list[Finding]:

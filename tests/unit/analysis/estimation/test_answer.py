@@ -218,3 +218,13 @@ def test_a_perturbation_that_the_motion_does_not_follow_is_no_instrument_of_term
     found = estimated(other, made, "auto")
     assert found.method == "bandlimited"
     assert_right(found.fits, truth[0])
+
+
+def test_without_a_perturbation_a_late_torque_is_told_and_friction_stays():
+    """1 ms late takes K times that, 1.3 %, from B, and what it does by the loop; friction 183 %."""
+    made = scenario("friction", joint={"coulomb_nm": 0.1}, torque={"late_s": 0.001})
+    epochs, truth = made.simulated(0, 2)
+    found = estimated([measured_alone(one) for one in epochs], made, "bandlimited")
+    for fit in found.fits:
+        assert {"missing_term", "torque_delay"} <= names(fit)
+        assert abs(fit.value[1] / truth[0, 1] - 1) < 0.25

@@ -113,6 +113,7 @@ LATE = 0.1
 On rigs of 200 to 1000 ticks/s it was .34 to .50 late with velocity PI drives, with drives of second
 order at most .06 where these take less than 2 % off J."""
 
+FEWEST_TICKS = 1000
 AT_ONCE, ERRORS, SHORT = (0.75, 1.25), 2.0, 0.5
 """What is gained in the first tick after a step of a motor's torque, over what is gained in the
 fourth (`EACH`), is above the first by so many standard errors, and not above the second. Measured
@@ -490,6 +491,8 @@ def holds_torque(epoch: Epoch, fastest_rad_s: float) -> bool:
     of_angle, held = int(motion.name == "angle_rad"), pushed.values
     inside = (pushed.time_s >= motion.time_s[0]) & (pushed.time_s <= motion.time_s[-1])
     rows = np.flatnonzero(inside)
+    if rows.size < FEWEST_TICKS:
+        return False
     gained = np.diff(values_at(motion, pushed.time_s[rows]), 1 + of_angle)
     if of_angle:  # two mean velocities differ by half of what the torques of both ticks give
         held = (held + np.append(held[:1], held[:-1])) / 2
