@@ -121,7 +121,7 @@ def test_a_file_that_changes_between_two_readings_is_refused(tmp_path):
 
 SCHEMAS = {
     *("batch/1", "check/1", "commissioning/1", "comparison/3", "design/3", "estimates/2"),
-    *("export/1", "mapping/1", "model/2", "plan/1", "ratings/1", "repeated/1"),
+    *("export/1", "mapping/1", "model/2", "plan/1", "ratings/1", "repeated/1", "rows/1"),
     *("session/1", "session/2", "study-inputs/1", "study/1"),
 }
 
