@@ -98,6 +98,12 @@ def _terms() -> Iterator[Scenario]:
         yield another(
             f"friction in the joint {torque_nm} N·m", TERM, joint={"coulomb_nm": torque_nm}
         )
+    turned = {"joint": {"coulomb_nm": 0.1}}
+    yield another(
+        "friction 0.1 N·m, tremor 1.0 N·m", (*TERM, *OWN), **turned, subject={"tremor_nm": 1.0}
+    )
+    moved = {"imposed_rad": np.radians(10.0), "imposed_hz": 0.5}
+    yield another("friction 0.1 N·m, imposed movement", (*TERM, "varying"), **turned, subject=moved)
     yield another("damping 3:1 by direction", TERM, joint={"damping_asymmetry": 0.5})
     yield another("cubic stiffness 40 N·m/rad³", (*TERM, "varying"), joint={"cubic_nm_rad3": 40.0})
     yield another(

@@ -16,6 +16,7 @@ from tests.scenarios.motion import (
     ADDED,
     COGWHEEL,
     COURSE_HZ,
+    DAMPING,
     IMPOSED,
     REST,
     STIFFNESS,
@@ -71,6 +72,7 @@ class Subject:
     posture_rad: float = 0.0
     stiffness: Literal["constant", "step", "drift", "phase"] = "constant"
     stiffness_depth: float = 0.0
+    damping_depth: float = 0.0
     between: tuple[float, ...] = (1.0,)
     tool_kg_m2: tuple[float, ...] = (0.0,)
     imposed_rad: float = 0.0
@@ -99,6 +101,7 @@ def courses(subject: Subject, duration_s: float, number: int, rng: np.random.Gen
     found[STIFFNESS] = _stiffness(subject, time_s, duration_s)
     found[STIFFNESS] *= subject.between[number % len(subject.between)]
     omega = 2 * np.pi * subject.imposed_hz
+    found[DAMPING] += subject.damping_depth * np.sin(omega * time_s)
     # From rest: the first second of it is faded in.
     found[IMPOSED] = subject.imposed_rad * omega * np.cos(omega * time_s) * np.minimum(time_s, 1.0)
     if subject.sensor_drift_nm > 0:

@@ -33,7 +33,7 @@ from rigidimeter.analysis.estimation.checks import found as said
 from rigidimeter.analysis.estimation.drive import passed
 from rigidimeter.analysis.estimation.grid import SAME_TIME, Array, Complex
 from rigidimeter.analysis.estimation.methods import DEPENDS, opened
-from rigidimeter.analysis.estimation.observation import LEAST, Observation, torque_filter_of
+from rigidimeter.analysis.estimation.observation import LEAST, Caused, Observation, torque_filter_of
 from rigidimeter.analysis.estimation.score import EVERY, Part, Place, Score, real
 from rigidimeter.analysis.estimation.signals import motion_channels, values_at, velocity_at
 from rigidimeter.analysis.estimation.solve import Problem, Solution, noise_powers
@@ -71,8 +71,9 @@ loop reaches 0.5 of the first at its slowest line."""
 STEADY = 0.3
 """In rad: a movement whose phase is so even is taken to be of one frequency."""
 
-FAINT = 0.01
-"""Of the window: what was simulated rings at its end."""
+FAINT, MOVED = 0.01, 0.1
+"""Of the window: what was simulated rings at its end. Power of the velocity that the perturbation
+does not cause, over that which it causes: with less it moves no instrument."""
 
 PLACES, INNER_TIME, INNER_ANGLE = 61, 0.8, (0.05, 0.95)
 """Where a parameter that changes is looked at: at the ends polynomials follow the noise."""
@@ -400,26 +401,38 @@ def _rows(motion: Motion, state: State, tested: Tested) -> list[Complex]:
     for one in state.taken:
         motion = one.term.bent(motion, one.inner) if one.term.bent is not None else motion
     own = [one.columns(motion) for one in state.taken]
-    own += [term.columns(motion, inner) for term, inner in tested]
+    own += [term.seen(motion, inner) for term, inner in tested]
     return [motion.torque[None, :, 0], motion.lines.T, *own]
+
+
+def _beside(own: Motion, caused: Array) -> Array | None:
+    """Return the motion that a perturbation does not cause; None where it is little."""
+    w = own.grid.coarse_window[0]
+    rest = np.stack([own.velocity, own.angle]) - caused
+    rest -= (rest @ w / w.sum())[:, None]
+    return rest if rest[0] ** 2 @ w > MOVED * (caused[0] ** 2 @ w) else None
 
 
 def caused_motions(case: Case, joint: Array) -> list[Motion]:
     """Return what the perturbations cause; epochs that share one share the object."""
     if not case.caused:
         return case.measured
+    causes: dict[int, Caused] = {}
     made: dict[tuple[int, int], Motion] = {}
     found = []
     for one, own in zip(case.observations, case.measured, strict=True):
-        key = id(one.cause), id(own.phase)
-        if key not in made and one.cause is not None:
-            caused, s = one.cause.at(joint), 1j * one.grid.omega_rad_s
+        assert one.cause is not None
+        caused, s = causes.get(id(one.cause)) or one.cause.at(joint), 1j * one.grid.omega_rad_s
+        causes[id(one.cause)] = caused
+        coarse = caused.coarse * (one.grid.coarse_window[0] > FAINT)
+        beside = _beside(own, coarse)
+        key = id(one.cause), id(own.phase if beside is None else beside)
+        if key not in made:
             lines = one.of_lines(caused.lines)
             torque = (lines @ joint)[:, None] * np.stack([s**0, s, s * s], axis=1)
-            velocity, angle = caused.coarse * (one.grid.coarse_window[0] > FAINT)
             made[key] = own._replace(
-                velocity=velocity, angle=angle, lines=lines, torque=torque, measured=False,
-                unseen=0.0, every=NONE,
+                velocity=coarse[0], angle=coarse[1], lines=lines, torque=torque, measured=False,
+                unseen=0.0, every=NONE, beside=beside,
             )  # fmt: skip
         found.append(made[key])
     return found
@@ -897,16 +910,13 @@ def findings_of(
         if not found.answered:
             how = "withheld"
         effect = Effect.of(added, values, half)
-        # Friction beside an imposed movement looks like damping by the phase.
-        phase = any(one.term.name == "B over phase" for one in own)
-        sure = how == "answered" and not phase
         told.append(
             said(
                 kind, limits, value, limit, p=max(one.p for one in own),
                 variant=f"{variant} {how}".strip() if how in ("beside", "withheld") else variant,
-                effect=UNKNOWN_EFFECT if how == "withheld" or phase else effect,
+                effect=UNKNOWN_EFFECT if how == "withheld" else effect,
                 facts={**facts, "remains": found.remains},
-                harmless=how if sure else "",
+                harmless=how if how == "answered" else "",
                 excludes=how == "withheld",
             )
         )  # fmt: skip

@@ -610,7 +610,7 @@ def _best(model: _Sum, place: int, motions: Motions, powers: Powers, made: Made)
         for (Z, X, *_), (looked, own) in zip(problems, motions, strict=True):
             X[:, column] = term.columns(own, inner[None])[0]
             same = looked.measured
-            Z[:, column] = X[:, column] if same else term.columns(looked, inner[None])[0]
+            Z[:, column] = X[:, column] if same else term.seen(looked, inner[None])[0]
         remains, values = _left([made(one) for one in problems], powers)
         return remains * (2.0 if values[column] < 0 else 1.0)
 

@@ -36,6 +36,9 @@ best instrument of a jump is smooth where the caused velocity is not quite the t
 FIR_LAGS_S, FIR_SPACING_S = np.arange(0.04, 0.441, 0.02), 0.02
 """Of triangles that overlap. Before 40 ms no stretch reflex can act."""
 
+SHIFTS = 3
+"""Other times at which the perturbation might have come."""
+
 FINELY, MEMORY_S = 4, 2.0
 """Samples for a coarse one, where a function jumps or bends; the past that a reflex answers."""
 
@@ -71,6 +74,8 @@ class Motion(NamedTuple):
         The velocity at all samples of the grid.
     zero : float
         The mean of the angle from the sensor's own zero.
+    beside : array, shape (2, c), optional
+        Velocity and angle that the perturbation does not cause, beside a caused motion.
     """
 
     grid: Grid
@@ -85,6 +90,7 @@ class Motion(NamedTuple):
     unseen: Complex | float = 0.0
     every: Array = np.zeros(0)
     zero: float = 0.0
+    beside: Array | None = None
 
     def of(self, values: Array, window: Array | None = None) -> Complex:
         """Return the lines of coarse samples, behind the filter of the torque."""
@@ -153,11 +159,35 @@ class Term(NamedTuple):
     inner_names: tuple[tuple[str, str], ...] = ()
     tested: bool = True
 
+    def seen(self, motion: Motion, inner: Array) -> Complex:
+        """Return the columns; as instruments, beside motion that the perturbation does not cause.
+
+        Where the joint moves by c + u, c caused and u the rest, a term C(c + u) has the instrument
+
+            D = C(c + u) − mean of C(c' + u),   c' what is caused, at other times.
+
+        C(c) alone would be far from it: friction turns where c + u does. Noise that does not depend
+        on when the perturbation comes is correlated with both parts of D alike, so not with D.
+        """
+        if motion.beside is None or not self.curved:
+            return self.columns(motion, inner)
+        caused, n = np.stack([motion.velocity, motion.angle]), motion.angle.size
+        at_times = []
+        for k in range(SHIFTS + 1):
+            velocity, angle = motion.beside + np.roll(caused, k * n // (SHIFTS + 1), axis=1)
+            at_times.append(self.columns(motion._replace(velocity=velocity, angle=angle), inner))
+        return np.asarray(at_times[0] - np.mean(at_times[1:], axis=0))
+
+    @property
+    def curved(self) -> bool:
+        """Whether it is no linear function of the motion, nor one that changes."""
+        return not self.linear and self.finding in ("missing_term", "varying_with_angle")
+
     def with_slopes(self, motion: Motion, inner: Array, moving: NDArray[np.bool_]) -> Complex:
         """Return the columns, then their slopes by the inner parameters that move."""
         steps = np.diag(self.steps)[moving] if self.steps.size else np.zeros((0, inner.size))
         count = len(steps)
-        found = self.columns(motion, np.concatenate([inner[None], inner + steps, inner - steps]))
+        found = self.seen(motion, np.concatenate([inner[None], inner + steps, inner - steps]))
         if not count:
             return found
         slopes = (found[1 : count + 1] - found[count + 1 :]) / (2 * steps.sum(axis=1))[:, None]
