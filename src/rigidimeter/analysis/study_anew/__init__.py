@@ -63,6 +63,7 @@ from rigidimeter.analysis.study_anew.sentences import (
     statement,
     statements,
 )
+from rigidimeter.analysis.study_anew.store import UNCHANGED, keep
 from rigidimeter.analysis.study_anew.study import (
     Condition,
     Deviation,
@@ -72,5 +73,6 @@ from rigidimeter.analysis.study_anew.study import (
     SessionEntry,
     Study,
 )
+from rigidimeter.analysis.study_anew.tables import columns_of_rows, table_csv
 from rigidimeter.analysis.study_anew.tests import by_units, by_values
 from rigidimeter.analysis.study_anew.verdicts import conclude, reasons, traffic_light
