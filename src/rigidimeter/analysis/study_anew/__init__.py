@@ -77,7 +77,7 @@ from rigidimeter.analysis.study_anew.sentences import (
     statement,
     statements,
 )
-from rigidimeter.analysis.study_anew.store import UNCHANGED, keep
+from rigidimeter.analysis.study_anew.store import UNCHANGED, keep, kept_study
 from rigidimeter.analysis.study_anew.study import (
     Condition,
     Deviation,
