@@ -163,9 +163,7 @@ def precision_tables(result: StudyResult) -> dict[str, list[PrecisionRow]]:
         found.setdefault(_caption(row["condition"], result.study.other), []).append(row)
     halves = [row["half_width_percent"] for each in found.values() for row in each]
     to = reach([WANTED_PERCENT, *halves], MOST_PERCENT)
-    return {
-        caption: [_precision_row(row, to) for row in each] for caption, each in found.items()
-    }
+    return {caption: [_precision_row(row, to) for row in each] for caption, each in found.items()}
 
 
 def _caption(condition: str, other: str) -> str:

@@ -16,7 +16,7 @@ from rigidimeter.analysis.report.report_folder import (
     joined_names,
     why_not_own,
 )
-from rigidimeter.analysis.report.shown import Shown, of_recording, of_result, of_study
+from rigidimeter.analysis.report.shown import Shown
 from rigidimeter.analysis.study_anew import (
     StudyResult,
     analyse,
@@ -116,11 +116,11 @@ def _shown(
     if isinstance(result, Shown):
         return result
     if isinstance(result, StudyResult):
-        return of_result(result)
+        return Shown.of_result(result)
     if isinstance(result, Analysis):
         return Shown(conclude_study(analysis_study(result), resamples=0))
     if isinstance(result, Recording):
-        return of_recording(result, estimate(result))
+        return Shown.of_recording(result, estimate(result))
     if not isinstance(result, (str, PathLike, Sequence)):
         raise UserError(
             "report takes what compare, estimate or read returned, or paths; not something of type "
@@ -130,5 +130,5 @@ def _shown(
     if len(paths) == 1 and is_study(paths[0]):
         loaded = load_study(paths[0])
         prepared = prepare_study(loaded)
-        return of_study(conclude_study(analyse(loaded, prepared)), loaded, prepared)
+        return Shown.of_study(conclude_study(analyse(loaded, prepared)), loaded, prepared)
     return _shown(read(paths))

@@ -179,7 +179,7 @@ def render_page(shown: Shown, made: Contents, svg: Mapping[str, str]) -> str:
     light = traffic_light(study, concluded)
     traces = page_traces(shown)
     script = _script() if traces else ""
-    made_parts = parts(made)
+    own = parts(made)
     return _template().render(
         shown=shown,
         show=lambda row, column: shown_value(row, column, names),
@@ -187,11 +187,11 @@ def render_page(shown: Shown, made: Contents, svg: Mapping[str, str]) -> str:
         shown_columns=lambda table: table.shown_columns(several_sources=len(names) > 1),
         # The style is this package's own file and needs no escaping.
         css=Markup("\n".join([_text("page.css"), *([_plot(".min.css")] if traces else [])])),
-        parts=made_parts,
+        parts=own,
         most_printed=MOST_PRINTED,
         most_open=MOST_OPEN,
         not_printed=[
-            section.title for part in made_parts for section, _ in part.sections if not section.printed
+            section.title for each in own for section, _ in each.sections if not section.printed
         ],
         images=_images(made, svg, {key: place for place, key in enumerate(traces)}, names),
         traces=Markup(traces_json(traces.values())) if traces else "",

@@ -8,11 +8,11 @@ from typing import Any
 
 from markupsafe import Markup
 
+from rigidimeter.analysis.recording import split_pooled
 from rigidimeter.analysis.report.contents import Block, Section, from_result, paragraph, part
 from rigidimeter.analysis.report.methods_prose import method_of
 from rigidimeter.analysis.report.sections.what_was_done import longest_s
 from rigidimeter.analysis.report.shown import Shown
-from rigidimeter.analysis.recording import split_pooled
 from rigidimeter.core.records import AMPLITUDE, PARAMETER_VECTORS, PARAMETERS, Fit
 from rigidimeter.core.units import deg_from_rad
 from rigidimeter.core.words import INTERVAL, Column, Table, number

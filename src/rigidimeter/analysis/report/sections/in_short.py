@@ -12,15 +12,20 @@ from rigidimeter.analysis.report.contents import (
     Figure,
     Section,
     bullets,
-    from_result,
     from_study_folder,
     paragraph,
     part,
 )
-from rigidimeter.analysis.report.points import day_groups, day_rows, draw_days, longest_day
+from rigidimeter.analysis.report.points import (
+    day_groups,
+    day_rows,
+    draw_days,
+    longest_day,
+    values_of,
+)
 from rigidimeter.analysis.report.shown import Shown
 from rigidimeter.analysis.report.style import drawn
-from rigidimeter.analysis.study_anew import result_table, traffic_light
+from rigidimeter.analysis.study_anew import Rows, measures_of, result_table, traffic_light
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Analysis, FindingGroup, Fit, notes_text
 from rigidimeter.core.words import (
@@ -69,32 +74,37 @@ def _numbers(shown: Shown) -> Iterator[Block]:
         yield Table("quality", "Quality of the data", (), [light])
 
 
-def _days(result: StudyResult) -> Iterator[Block]:
-    yield from_result(result, "days", "Medians of the days")
-    shown = sorted((c for c in result.comparisons if c.day_medians), key=lambda c: c.measure.place)
-    if not shown:
+def _days(shown: Shown) -> Iterator[Block]:
+    result = shown.result
+    medians = result_table(result, "days")
+    yield Table("days", "Medians of the days", (), medians)
+    if not medians:
         return
     yield paragraph(
         "Each small point is an included epoch. Beside the points of a day are their median and, "
         "as a bar, their quartiles; a line joins the medians of a day that has both conditions."
     )
-    order = [condition_name(name) for name in result.condition_names]
-    for c in shown:
+    order = [condition_name(name) for name in shown.condition_names]
+    for measure in sorted(measures_of(result.study.rows), key=lambda one: one.place):
+        own = [row for row in medians if row["measure"] == measure.name]
+        if not own:
+            continue
         words = "; ".join(
-            f"{m.subject} day {m.day} {condition_name(m.condition)}: median {number(m.median)}, "
-            f"n = {m.n}"
-            for m in c.day_medians
+            f"{row['subject']} day {row['day']} {condition_name(row['condition'])}: median "
+            f"{number(row['median'])}, n = {row['n']}"
+            for row in own
         )
-        groups = day_groups(c)
+        values = values_of(result, measure)
+        groups = day_groups(values)
         count = sum(map(len, groups.values()))
-        n_days = len({(m.subject, m.day) for m in c.day_medians})
-        rows = len(day_rows(c))
-        size = DAYS_WIDTH, 0.35 + (2.1 + 0.5 * (longest_day(c) > 3)) * rows
+        n_days = len({(row["subject"], row["day"]) for row in own})
+        rows = len(day_rows(values))
+        size = DAYS_WIDTH, 0.35 + (2.1 + 0.5 * (longest_day(values) > 3)) * rows
         yield Figure(
-            f"days_{c.measure.name}",
-            f"{c.measure.title}: {plural(count, 'included epoch')} of {plural(n_days, 'day')}.",
-            f"{c.measure.title} by day. {words} ({c.measure.unit}).",
-            partial(drawn, size, draw_days, c, order, rows=rows, sharey=True),
+            f"days_{measure.name}",
+            f"{measure.title}: {plural(count, 'included epoch')} of {plural(n_days, 'day')}.",
+            f"{measure.title} by day. {words} ({measure.unit}).",
+            partial(drawn, size, draw_days, values, order, rows=rows, sharey=True),
             "page",
             marks=groups,
         )
