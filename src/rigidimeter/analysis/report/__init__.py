@@ -14,11 +14,13 @@ if TYPE_CHECKING:
     from rigidimeter.analysis.report.plots import plot
     from rigidimeter.analysis.report.report_folder import inputs_seen_from, why_not_own
     from rigidimeter.analysis.report.sections import SECTIONS
+    from rigidimeter.analysis.report.shown import Shown
 
 __all__ = [
     "SECTIONS",
     "Figure",
     "Section",
+    "Shown",
     "inputs_seen_from",
     "paragraph",
     "plot",
@@ -37,5 +39,6 @@ __getattr__ = lazy_names(
         "plots": ("plot",),
         "report_folder": ("inputs_seen_from", "why_not_own"),
         "sections": ("SECTIONS",),
+        "shown": ("Shown",),
     },
 )
