@@ -20,7 +20,7 @@ from rigidimeter.analysis.report.style import (
     note,
     write_at,
 )
-from rigidimeter.analysis.study.drawn_signals import Response, Spectrum
+from rigidimeter.analysis.traces import Response, Spectrum
 from rigidimeter.core.records import Channel, Epoch, Fit
 from rigidimeter.core.spectrum import SEGMENT_S
 from rigidimeter.core.words import amount, number
