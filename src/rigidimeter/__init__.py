@@ -26,8 +26,9 @@ from rigidimeter.core.version import __version__
 
 if TYPE_CHECKING:
     from rigidimeter.analysis.batch import batch
+    from rigidimeter.analysis.figures import plot
     from rigidimeter.analysis.reading import data, identify, read
-    from rigidimeter.analysis.report import plot, report
+    from rigidimeter.analysis.report import report
     from rigidimeter.analysis.study import compare, estimate, fit_terms
     from rigidimeter.planning import design
     from rigidimeter.virtual import simulate
@@ -56,7 +57,7 @@ _ROOMS = {
     "fit_terms": "rigidimeter.analysis.study",
     "simulate": "rigidimeter.virtual",
     "design": "rigidimeter.planning",
-    "plot": "rigidimeter.analysis.report",
+    "plot": "rigidimeter.analysis.figures",
     "report": "rigidimeter.analysis.report",
     "batch": "rigidimeter.analysis.batch",
 }
