@@ -21,6 +21,7 @@ from rigidimeter.analysis.study_anew.comparisons import (
 from rigidimeter.analysis.study_anew.document import (
     TABLES,
     TEST,
+    Rows,
     comparison_document,
     comparison_rows,
     conclusion_rows,
