@@ -121,7 +121,7 @@ def design(
         )
     show(design_blocks(designed, full=full))
     if out is not None:
-        from rigidimeter.analysis.report.design_folder import write_design_folder
+        from rigidimeter.analysis.figures import write_design_folder
 
         echo(f"\nWritten to {out}: {', '.join(write_design_folder(out, designed))}")
     if declare is not None:
