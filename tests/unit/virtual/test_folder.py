@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 from tests.unit.virtual.tiny import SHORT, tiny
 
-from rigidimeter.analysis.study import compare_analysis, estimate
+from rigidimeter.analysis.recording import estimate
+from rigidimeter.analysis.study import compare_analysis
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import read_session, session_settings
 from rigidimeter.virtual import PAPER, PUSHING, plan_study, study_length_s, write_virtual_study

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import jinja2
 from markupsafe import Markup
 
+from rigidimeter.analysis.figures import svg_text
 from rigidimeter.analysis.report import first_screen
 from rigidimeter.analysis.report.contents import Block, Figure, Section, deviations_in_words
 from rigidimeter.analysis.report.epoch_traces import page_traces, traces_json
@@ -21,7 +22,6 @@ from rigidimeter.analysis.report.inline_svg import inline_svg
 from rigidimeter.analysis.report.methods_prose import methods_prose
 from rigidimeter.analysis.report.sections import SECTIONS
 from rigidimeter.analysis.report.shown import Shown
-from rigidimeter.analysis.report.style import svg_text
 from rigidimeter.analysis.study_anew import lead, traffic_light
 from rigidimeter.core.files import DICTIONARY, csv_text, dictionary_text, visible
 from rigidimeter.core.version import __version__

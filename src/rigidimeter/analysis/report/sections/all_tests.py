@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 
 from markupsafe import Markup
 
+from rigidimeter.analysis.figures import (
+    Values,
+    condition_colours,
+    distribution_size,
+    draw_effects,
+    draw_values,
+    drawn,
+    drawn_values,
+    effect_rows,
+    effect_words,
+    effects_label,
+    effects_size,
+    epoch_keys,
+)
 from rigidimeter.analysis.report.contents import (
     Block,
     Figure,
@@ -16,31 +30,14 @@ from rigidimeter.analysis.report.contents import (
     paragraph,
     part,
 )
-from rigidimeter.analysis.report.interval_rows import (
-    Row,
-    draw_effects,
-    effect_rows,
-    effect_words,
-    effects_label,
-    effects_size,
-)
 from rigidimeter.analysis.report.methods_prose import (
-    day_tests_in_words,
     method_of,
-)
-from rigidimeter.analysis.report.points import (
-    Values,
-    distribution_size,
-    draw_values,
-    drawn_values,
-    epoch_keys,
 )
 from rigidimeter.analysis.report.sections.every_epoch import pooled_table
 from rigidimeter.analysis.report.sections.examiners import RATINGS, RELATION
 from rigidimeter.analysis.report.shown import Shown
-from rigidimeter.analysis.report.style import condition_colours, drawn
 from rigidimeter.analysis.statistics import summarise
-from rigidimeter.analysis.study_anew import result_table
+from rigidimeter.analysis.study_anew import RATING, Rows, result_table
 from rigidimeter.core.words import (
     INTERVAL,
     TURNED,
@@ -84,8 +81,9 @@ def _comparison(shown: Shown) -> Iterator[Block]:
             yield from _by_days(shown, name, rows)
 
 
-def _by_days(shown: Shown, name: str, rows: Sequence[Row]) -> Iterator[Block]:
-    used = dict.fromkeys(day_tests_in_words(shown)) or ("No test by days could be made",)
+def _by_days(shown: Shown, name: str, rows: Rows) -> Iterator[Block]:
+    tests = [row.get("days_test") for row in rows if row["measure"] != RATING.name]
+    used = dict.fromkeys(filter(None, tests)) or ("No test by days could be made",)
     ratings = (
         " Ratings are those less the examiners’ offsets; their model has an offset for each "
         "examiner too."
@@ -121,7 +119,7 @@ def _by_days(shown: Shown, name: str, rows: Sequence[Row]) -> Iterator[Block]:
     )
 
 
-def _epochs(table: str, rows: Sequence[Row]) -> Iterator[Block]:
+def _epochs(table: str, rows: Rows) -> Iterator[Block]:
     """Yield the comparison over epochs, as it is in every report."""
     signs = _signs(rows)
     columns = [Column("title", "Measure", "text", below="unit")]
@@ -172,14 +170,14 @@ def _epochs(table: str, rows: Sequence[Row]) -> Iterator[Block]:
         )
 
 
-def _signs(rows: Sequence[Row]) -> dict[str, str]:
+def _signs(rows: Rows) -> dict[str, str]:
     """Return the two conditions, and what differences are on the page and in the file."""
     reference, other = (condition_name(rows[0][side]) for side in ("reference", "other"))
     signs = {"pair": f"{other} − {reference}", "turned": f"{reference} − {other}"}
     return {"reference": reference, "other": other} | signs
 
 
-def _percent(rows: Sequence[Row], name: str) -> str:
+def _percent(rows: Rows, name: str) -> str:
     known = [row[name] for row in rows if row.get(name) is not None]
     return " and ".join(dict.fromkeys(f"{100 * each:g} %" for each in known)) or "95 %"
 

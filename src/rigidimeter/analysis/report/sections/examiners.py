@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
+from rigidimeter.analysis.figures import draw_ratings, draw_relations, drawn, relation_words
 from rigidimeter.analysis.report.contents import (
     Block,
     Figure,
@@ -13,9 +14,7 @@ from rigidimeter.analysis.report.contents import (
     from_study_folder,
     paragraph,
 )
-from rigidimeter.analysis.report.points import draw_ratings, draw_relations, relation_words
 from rigidimeter.analysis.report.shown import Shown
-from rigidimeter.analysis.report.style import drawn
 from rigidimeter.analysis.statistics import contrast, interval_of
 from rigidimeter.analysis.study_anew import Ratings, agreement, relations
 from rigidimeter.core.words import (

@@ -7,6 +7,14 @@ from functools import partial
 
 from markupsafe import Markup
 
+from rigidimeter.analysis.figures import (
+    day_groups,
+    day_rows,
+    draw_days,
+    drawn,
+    longest_day,
+    values_of,
+)
 from rigidimeter.analysis.report.contents import (
     Block,
     Figure,
@@ -16,15 +24,7 @@ from rigidimeter.analysis.report.contents import (
     paragraph,
     part,
 )
-from rigidimeter.analysis.report.points import (
-    day_groups,
-    day_rows,
-    draw_days,
-    longest_day,
-    values_of,
-)
 from rigidimeter.analysis.report.shown import Shown
-from rigidimeter.analysis.report.style import drawn
 from rigidimeter.analysis.study_anew import Rows, measures_of, result_table, traffic_light
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Analysis, FindingGroup, Fit, notes_text

@@ -10,22 +10,24 @@ import numpy as np
 from markupsafe import Markup
 
 from rigidimeter.analysis.estimation import Signals, epoch_signals, scoring_cycles
-from rigidimeter.analysis.recording import split_pooled
-from rigidimeter.analysis.report.contents import Block, Figure, Section, named, paragraph, part
-from rigidimeter.analysis.report.curves import (
+from rigidimeter.analysis.figures import (
     TORQUE_HEIGHTS,
     TORQUE_SIZE,
     WINDOW_S,
+    Look,
+    condition_colours,
     draw_impedance,
     draw_loops,
     draw_torque,
     draw_unexplained,
+    drawn,
     origin_s,
     torque_limit_nm,
 )
+from rigidimeter.analysis.recording import split_pooled
+from rigidimeter.analysis.report.contents import Block, Figure, Section, named, paragraph, part
 from rigidimeter.analysis.report.methods_prose import method_of
 from rigidimeter.analysis.report.shown import Shown
-from rigidimeter.analysis.report.style import Look, condition_colours, drawn
 from rigidimeter.analysis.traces import (
     analysed_epoch,
     representative_fits,

@@ -8,6 +8,16 @@ from functools import partial
 
 import numpy as np
 
+from rigidimeter.analysis.figures import (
+    band_label,
+    band_percent,
+    by_measure,
+    draw_bands,
+    draw_methods,
+    drawn,
+    methods_in,
+    shift,
+)
 from rigidimeter.analysis.recording import split_pooled
 from rigidimeter.analysis.report.contents import (
     Block,
@@ -18,17 +28,7 @@ from rigidimeter.analysis.report.contents import (
     paragraph,
     part,
 )
-from rigidimeter.analysis.report.interval_rows import (
-    band_label,
-    band_percent,
-    by_measure,
-    draw_bands,
-    draw_methods,
-    methods_in,
-    shift,
-)
 from rigidimeter.analysis.report.shown import Shown
-from rigidimeter.analysis.report.style import drawn
 from rigidimeter.analysis.study_anew import method_caveats, result_table
 from rigidimeter.core.records import PARAMETERS
 from rigidimeter.core.words import INTERVAL, TURNED, Column, Table, condition_name, interval, number

@@ -8,6 +8,15 @@ from typing import Any
 
 from markupsafe import Markup
 
+from rigidimeter.analysis.figures import (
+    CHANNELS,
+    WINDOW_S,
+    draw_recorded,
+    drawn,
+    origin_s,
+    recorded_size,
+    shown_channels,
+)
 from rigidimeter.analysis.report.contents import (
     Block,
     Figure,
@@ -19,18 +28,9 @@ from rigidimeter.analysis.report.contents import (
     paragraph,
     part,
 )
-from rigidimeter.analysis.report.curves import (
-    CHANNELS,
-    WINDOW_S,
-    draw_recorded,
-    origin_s,
-    recorded_size,
-    shown_channels,
-)
 from rigidimeter.analysis.report.methods_prose import method_of
 from rigidimeter.analysis.report.sections.every_epoch import HOW, WHO
 from rigidimeter.analysis.report.shown import Shown
-from rigidimeter.analysis.report.style import drawn
 from rigidimeter.analysis.study_anew import result_table
 from rigidimeter.analysis.traces import analysed_epoch, representative_fits
 from rigidimeter.core.records import Delay, Fit, Score

@@ -12,6 +12,13 @@ import numpy as np
 from markupsafe import Markup
 from pydantic import BaseModel
 
+from rigidimeter.analysis.figures import (
+    EXCITATION_HEIGHTS,
+    EXCITATION_SIZE,
+    draw_excitation,
+    drawn,
+    origin_s,
+)
 from rigidimeter.analysis.report.contents import (
     Block,
     Figure,
@@ -22,15 +29,8 @@ from rigidimeter.analysis.report.contents import (
     paragraph,
     part,
 )
-from rigidimeter.analysis.report.curves import (
-    EXCITATION_HEIGHTS,
-    EXCITATION_SIZE,
-    draw_excitation,
-    origin_s,
-)
 from rigidimeter.analysis.report.methods_prose import methods_prose
 from rigidimeter.analysis.report.shown import Shown
-from rigidimeter.analysis.report.style import drawn
 from rigidimeter.analysis.traces import ChannelFacts, perturbed_epoch
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.units import rad_from_deg

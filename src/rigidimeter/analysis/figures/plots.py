@@ -15,8 +15,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation import aligned, epoch_signals, longest_part
-from rigidimeter.analysis.reading import Recording
-from rigidimeter.analysis.report.curves import (
+from rigidimeter.analysis.figures.curves import (
     EXCITATION_HEIGHTS,
     EXCITATION_SIZE,
     TORQUE_HEIGHTS,
@@ -29,21 +28,22 @@ from rigidimeter.analysis.report.curves import (
     shown_channels,
     torque_limit_nm,
 )
-from rigidimeter.analysis.report.estimate_points import draw_epochs, draw_pairs, quantities
-from rigidimeter.analysis.report.interval_rows import (
+from rigidimeter.analysis.figures.estimate_points import draw_epochs, draw_pairs, quantities
+from rigidimeter.analysis.figures.interval_rows import (
     draw_effects,
     effect_rows,
     effects_label,
     effects_size,
 )
-from rigidimeter.analysis.report.points import (
+from rigidimeter.analysis.figures.points import (
     Values,
     draw_days,
     draw_measures,
     drawn_values,
     values_of,
 )
-from rigidimeter.analysis.report.style import condition_colours, drawable, plain_ticks, styled
+from rigidimeter.analysis.figures.style import condition_colours, drawable, plain_ticks, styled
+from rigidimeter.analysis.reading import Recording
 from rigidimeter.analysis.study_anew import StudyResult, measures_of
 from rigidimeter.core.records import Analysis, Channel, Epoch, Fit
 from rigidimeter.core.words import condition_name, epoch_name, short_names
@@ -180,7 +180,7 @@ def plot_result(
 def plot_days(result: StudyResult, measure: str = "stiffness_nm_rad", axes: Any = None) -> Axes:
     """Draw a measure day by day."""
     v = _values(result, measure)
-    if not result.study.sessions:
+    if v.measure.origin == "ratings" or not any(v.rows["day"]):
         raise ValueError(f"{measure} has no days: they are known of a study folder alone")
     order = [condition_name(name) for name in result.condition_names]
     drawn: Axes = _plotted(axes, 1, (7.4, 2.9), draw_days, v, order)[0]

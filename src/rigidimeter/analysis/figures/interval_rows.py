@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from rigidimeter.analysis.report.style import (
+from rigidimeter.analysis.figures.style import (
     GREY,
     INK,
     Look,

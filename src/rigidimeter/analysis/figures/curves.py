@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from rigidimeter.analysis.estimation import Cycles, Signals
-from rigidimeter.analysis.report.style import (
+from rigidimeter.analysis.figures.style import (
     GREY,
     INK,
     Look,

@@ -12,7 +12,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike, NDArray
 
-from rigidimeter.analysis.report.style import (
+from rigidimeter.analysis.figures.style import (
     GREY,
     MARKERS,
     Look,
