@@ -20,6 +20,7 @@ from rigidimeter.analysis.study_anew.comparisons import (
     precisions_of_each,
     without_deviating,
 )
+from rigidimeter.analysis.study_anew.estimate_tables import estimate_table, score_table
 from rigidimeter.analysis.study_anew.measures import MEASURE_NAMES, RATING, Measure
 from rigidimeter.analysis.study_anew.rating_document import (
     rating_contrast,
@@ -181,8 +182,8 @@ def condition_names(study: Study) -> tuple[str, ...]:
     """Return all conditions in the order of the study or the protocol, then as recorded."""
     order = [each.name for each in study.conditions]
     order = order or [block.condition for block in study.settings.protocol.blocks]
-    of_epochs = study.rows[study.rows["scope"] == "epoch"]  # that of all epochs has no condition
-    recorded_ones = map(str, of_epochs["condition"].drop_duplicates())
+    epochs = study.rows[study.rows["scope"] == "epoch"]  # that of all epochs has no condition
+    recorded_ones = map(str, epochs["condition"].drop_duplicates())
     names = dict.fromkeys([*filter(None, study.pair), *recorded_ones])
     return tuple(sorted(names, key=lambda n: order.index(n) if n in order else len(order)))
 
@@ -301,6 +302,8 @@ TABLES: Mapping[str, Callable[[StudyResult], Iterable[Mapping[str, Any]]]] = {
     "deviations": lambda result: [one._asdict() for one in result.study.deviations],
     "without_deviating": lambda result: without_deviating(result.study, result.comparisons),
     "account": _account,
+    "estimates": lambda result: estimate_table(result.study),
+    "scores": lambda result: score_table(result.study),
 }
 """The tables of conclusions by name, each made alone."""
 
