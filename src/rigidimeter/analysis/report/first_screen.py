@@ -12,8 +12,8 @@ import jinja2
 from markupsafe import Markup
 
 from rigidimeter.analysis.report.shown import Shown
+from rigidimeter.analysis.statistics import WANTED_PERCENT
 from rigidimeter.analysis.study_anew import (
-    WANTED_PERCENT,
     DifferenceRow,
     Statement,
     StudyResult,
