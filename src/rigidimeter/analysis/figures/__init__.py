@@ -24,8 +24,8 @@ from rigidimeter.analysis.figures.curves import (
     shown_channels,
     torque_limit_nm,
 )
-from rigidimeter.analysis.figures.design_folder import write_design_folder
-from rigidimeter.analysis.figures.inspected_columns import draw_columns
+from rigidimeter.analysis.figures.design_folder import draw_bode, write_design_folder
+from rigidimeter.analysis.figures.inspected_columns import columns_figure, draw_columns
 from rigidimeter.analysis.figures.interval_rows import (
     band_label,
     band_percent,
@@ -61,6 +61,7 @@ from rigidimeter.analysis.figures.style import (
     GREY,
     Look,
     condition_colours,
+    condition_markers,
     drawn,
     note,
     styled,
