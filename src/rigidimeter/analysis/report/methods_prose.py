@@ -100,7 +100,7 @@ def _facts(shown: Shown) -> dict[str, Any]:
         held = f"of all conditions ({number(analysis.inertia_kg_m2)} kg·m²)"
     fit = None if ratings is None else ratings.fit
     estimated = [name for name in fit.offsets if name not in fit.inseparable] if fit else []
-    day_tests = day_tests_in_words(result)
+    day_tests = day_tests_in_words(shown)
     return {
         **{name: getattr(settings, name) for name in ("controller", "guard", "prbs", "scores")},
         "sinusoid": settings.sinusoid,
@@ -216,9 +216,9 @@ def day_tests_of(result: StudyResult) -> list[Compared]:
     return sorted((one for one in main if one.by == "days"), key=lambda o: order.index(o.measure))
 
 
-def day_tests_in_words(result: StudyResult) -> list[str]:
+def day_tests_in_words(shown: Shown) -> list[str]:
     """Return the test by days of each measure; that of the ratings is told with their model."""
-    return [one.test for one in day_tests_of(result) if one.test and one.measure != RATING]
+    return [one.test for one in day_tests_of(shown.result) if one.test and one.measure != RATING]
 
 
 def _primary(result: StudyResult) -> str:
