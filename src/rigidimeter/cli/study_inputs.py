@@ -56,9 +56,7 @@ def compare_recordings(
     UserError
         If there are not two, a name is unknown, or a group is asked for.
     """
-    study = estimates_study(
-        analysis, pair, group, epochs=read.epochs, settings=read.settings
-    )
+    study = estimates_study(analysis, pair, group, epochs=read.epochs, settings=read.settings)
     return conclude_study(study, seed=seed, resamples=resamples, progress=progress)
 
 
