@@ -84,5 +84,6 @@ from rigidimeter.analysis.study_anew.study import (
     Study,
     naming,
 )
+from rigidimeter.analysis.study_anew.tables import columns_of_rows, table_csv
 from rigidimeter.analysis.study_anew.tests import by_units, by_values
 from rigidimeter.analysis.study_anew.verdicts import conclude, reasons, traffic_light

@@ -31,6 +31,7 @@ from rigidimeter.analysis.study_anew.rating_document import (
 from rigidimeter.analysis.study_anew.rows import counting, measures_of, recorded
 from rigidimeter.analysis.study_anew.sentences import deviation_sentence, lead, statements
 from rigidimeter.analysis.study_anew.study import Ratings, Study
+from rigidimeter.analysis.study_anew.tables import Rows, estimates_table, scores_table
 from rigidimeter.analysis.study_anew.verdicts import reasons, traffic_light
 from rigidimeter.core.files import plain_values
 from rigidimeter.core.records import Fit, Score
@@ -38,8 +39,6 @@ from rigidimeter.core.words import within
 
 if TYPE_CHECKING:
     from rigidimeter.analysis.study_anew.results import StudyResult
-
-Rows = Sequence[Mapping[str, Any]]
 
 TEST = "Wilcoxon rank-sum, two-sided, asymptotic, tie and continuity corrected"
 
@@ -301,6 +300,8 @@ TABLES: Mapping[str, Callable[[StudyResult], Iterable[Mapping[str, Any]]]] = {
     "deviations": lambda result: [one._asdict() for one in result.study.deviations],
     "without_deviating": lambda result: without_deviating(result.study, result.comparisons),
     "account": _account,
+    "estimates": lambda result: estimates_table(result.study),
+    "scores": lambda result: scores_table(result.study),
 }
 """The tables of conclusions by name, each made alone."""
 
