@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -84,11 +84,16 @@ def compare(
     is_json = any(path.suffix.lower() == ".json" for path in paths)
     if value and len(paths) != 1:
         raise UserError(f"--value takes one table, but {len(paths)} inputs were given")
-    bootstrap = {"seed": seed, "resamples": resamples}
     if not value and (folder := study_of(recordings, key)) is not None:
         keep_inputs(outputs, study_files(folder, key))
         shown, analysed = analyse_study_folder(
-            folder, recordings, key, pair=pair, group=group, **bootstrap
+            folder,
+            recordings,
+            key,
+            pair=pair,
+            group=group,
+            seed=seed,
+            resamples=resamples,
         )
         try:
             _write(shown.result, *outputs, str(folder))
@@ -107,23 +112,14 @@ def compare(
     status = 0
     try:
         with Meter("compare", 1.0) as meter:
+            work: dict[str, Any] = {"seed": seed, "resamples": resamples}
+            work["progress"] = meter.advance
             if of_files is not None:
                 read, analysed = of_files
-                found = compare_recordings(
-                    read, analysed.analysis, pair, group, progress=meter.advance, **bootstrap
-                )
+                found = compare_recordings(read, analysed.analysis, pair, group, **work)
             else:
-                found = studies.compare(
-                    paths[0],
-                    other,
-                    reference=reference,
-                    value=value,
-                    by=by,
-                    session=session,
-                    group=group,
-                    progress=meter.advance,
-                    **bootstrap,
-                )
+                work |= {"value": value, "by": by, "session": session, "group": group}
+                found = studies.compare(paths[0], other, reference=reference, **work)
         _write(found, *outputs)
         epochs = () if of_files is None else of_files[0].epochs
         show(comparison_blocks(Shown(found, epochs), full=full))

@@ -57,8 +57,7 @@ def ratings(
       rigidimeter ratings demo-study/ratings.csv --json ratings.json
       rigidimeter ratings demo-study/ratings.csv --scale 0 4 --step 0.5
     """
-    from rigidimeter.analysis.study.ratings_found import ratings_document
-    from rigidimeter.analysis.study.ratings_model import model_ratings
+    from rigidimeter.analysis.study_anew import ratings_document, table_ratings
     from rigidimeter.core.files import read_text_table, write_json
     from rigidimeter.core.records import Notice
     from rigidimeter.core.study_files import is_study, table_path
@@ -77,18 +76,13 @@ def ratings(
         "subject": subject,
         "day": day,
     }
-    found = model_ratings(
-        read_text_table(table),
-        columns,
-        random,
-        scale=scale,
-        step=step,
-        pair=contrast,
+    found, pair = table_ratings(
+        read_text_table(table), columns, random, scale=scale, step=step, contrast=contrast
     )
     say(tuple(Notice("warning", text) for text in found.notices))
     if json_out is not None:
-        write_json(json_out, ratings_document(found))
-    show(_blocks(found, full))
+        write_json(json_out, ratings_document(found, pair))
+    show(_blocks(found, pair, full))
 
 
 def _blocks(found: Ratings, pair: tuple[str, str], full: bool) -> Iterator[Block]:
@@ -101,7 +95,9 @@ def _blocks(found: Ratings, pair: tuple[str, str], full: bool) -> Iterator[Block
     yield Heading(f"{found.source}: {fit.n} ratings in {len(fit.conditions)} conditions")
     yield f"score = mean of condition + {offsets} + error, fitted by REML"
     counts, means, errors = (document[name] for name in ("counts", "means", "means_se"))
-    rows = [(name, f"{counts[name]}", f"{means[name]:.4f}", f"{errors[name]:.4f}") for name in means]
+    rows = [
+        (name, f"{counts[name]}", f"{means[name]:.4f}", f"{errors[name]:.4f}") for name in means
+    ]
     yield from ("", Table(("condition", "n", "mean", "SE"), rows, "<>>>"))
     for group, each in groupby(rating_offsets(found), lambda row: row["grouping"]):
         groups = [(row["name"], f"{row['ratings']}", f"{row['offset']:.4f}") for row in each]

@@ -4,10 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-
-from rigidimeter.analysis.estimation import impedance as without_model
-from rigidimeter.analysis.estimation import prepare
-from rigidimeter.analysis.report import SECTIONS, Figure
 from rigidimeter.analysis.report.curves import (
     COHERENT,
     draw_impedance,
@@ -15,6 +11,10 @@ from rigidimeter.analysis.report.curves import (
     model_nm_rad,
 )
 from rigidimeter.analysis.report.style import condition_colours, drawn, svg_text
+
+from rigidimeter.analysis.estimation import impedance as without_model
+from rigidimeter.analysis.estimation import prepare
+from rigidimeter.analysis.report import SECTIONS, Figure
 from rigidimeter.analysis.study import StudyResult
 from rigidimeter.analysis.study.drawn_signals import Response, Spectrum
 from rigidimeter.analysis.study.examples import analysed_epoch
