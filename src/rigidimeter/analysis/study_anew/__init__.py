@@ -23,14 +23,23 @@ from rigidimeter.analysis.study_anew.comparisons import (
     sensitivity,
     without_deviating,
 )
+from rigidimeter.analysis.study_anew.day_scatter import DayScatter, day_scatter
+from rigidimeter.analysis.study_anew.difference_rows import (
+    DifferenceRow,
+    difference_cells,
+    difference_rows,
+    p_name,
+)
 from rigidimeter.analysis.study_anew.document import (
     TABLES,
     TEST,
     Rows,
+    columns_of_rows,
     comparison_document,
     comparison_rows,
     conclusion_rows,
     result_table,
+    table_csv,
 )
 from rigidimeter.analysis.study_anew.from_folder import (
     Loaded,
@@ -46,9 +55,13 @@ from rigidimeter.analysis.study_anew.rating_document import (
     Agreement,
     Relation,
     agreement,
+    rating_contrast,
+    rating_offsets,
+    rating_rows,
     ratings_document,
     relations,
 )
+from rigidimeter.analysis.study_anew.rating_table import table_ratings
 from rigidimeter.analysis.study_anew.ratings import corrected, ratings_of
 from rigidimeter.analysis.study_anew.results import TESTS_SHARE, StudyResult, conclude_study
 from rigidimeter.analysis.study_anew.rows import (
@@ -61,6 +74,7 @@ from rigidimeter.analysis.study_anew.rows import (
     pooled,
     read_rows,
     recorded,
+    split_pooled,
     together,
     write_rows,
 )
@@ -84,6 +98,5 @@ from rigidimeter.analysis.study_anew.study import (
     Study,
     naming,
 )
-from rigidimeter.analysis.study_anew.tables import columns_of_rows, table_csv
 from rigidimeter.analysis.study_anew.tests import by_units, by_values
 from rigidimeter.analysis.study_anew.verdicts import conclude, reasons, traffic_light

@@ -20,11 +20,15 @@ from pathlib import Path
 from typing import Any
 
 from rigidimeter.analysis.reading import estimates_document
-from rigidimeter.analysis.study_anew.document import comparison_document, result_table
+from rigidimeter.analysis.study_anew.document import (
+    columns_of_rows,
+    comparison_document,
+    result_table,
+    table_csv,
+)
 from rigidimeter.analysis.study_anew.from_folder import ANALYSIS, COMPARISON, Loaded
 from rigidimeter.analysis.study_anew.measures import RATING
 from rigidimeter.analysis.study_anew.results import StudyResult
-from rigidimeter.analysis.study_anew.tables import columns_of_rows, table_csv
 from rigidimeter.core.errors import UserError, refused
 from rigidimeter.core.files import (
     DICTIONARY,
