@@ -19,12 +19,14 @@ from rigidimeter.analysis.figures.curves import (
     draw_torque,
     draw_unexplained,
     loop_limits,
+    model_nm_rad,
     origin_s,
     recorded_size,
     shown_channels,
     torque_limit_nm,
 )
 from rigidimeter.analysis.figures.design_folder import draw_bode, write_design_folder
+from rigidimeter.analysis.figures.inline_svg import inline_svg
 from rigidimeter.analysis.figures.inspected_columns import columns_figure, draw_columns
 from rigidimeter.analysis.figures.interval_rows import (
     band_label,

@@ -14,11 +14,10 @@ from typing import Any, NamedTuple
 import jinja2
 from markupsafe import Markup
 
-from rigidimeter.analysis.figures import svg_text
+from rigidimeter.analysis.figures import inline_svg, svg_text
 from rigidimeter.analysis.report import first_screen
 from rigidimeter.analysis.report.contents import Block, Figure, Section, deviations_in_words
 from rigidimeter.analysis.report.epoch_traces import page_traces, traces_json
-from rigidimeter.analysis.report.inline_svg import inline_svg
 from rigidimeter.analysis.report.methods_prose import methods_prose
 from rigidimeter.analysis.report.sections import SECTIONS
 from rigidimeter.analysis.report.shown import Shown

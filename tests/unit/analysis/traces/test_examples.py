@@ -1,57 +1,15 @@
-"""Which fits a report shows: those of conditions together, and those that stand for one."""
+"""Which epochs stand for a condition, and as what."""
 
 import dataclasses
-import math
 
-import pytest
+import numpy as np
 
-from rigidimeter.analysis.study import StudyResult, split_pooled
-from rigidimeter.analysis.study.examples import representative_fits
-from rigidimeter.core.records import Outcome
-
-
-def test_estimates_bring_their_intervals(study: StudyResult) -> None:
-    included = [fit for fit in study.analysis.fits if fit.outcome.included]
-    off = [fit for fit in included if fit.condition == "OFF"]
-    stiffness = study.comparison("stiffness_nm_rad")
-    assert [o.low for o in stiffness.of("OFF")] == [fit.stiffness_nm_rad_low for fit in off]
-    pooled, _ = split_pooled(study.analysis)
-    assert stiffness.pooled["DBS"].high == pooled["DBS"].stiffness_nm_rad_high
-    assert all(math.isnan(o.low) for o in study.comparison("work_j").of("OFF"))
-    assert study.comparison("work_j").pooled == {}
+from rigidimeter.analysis.report import Shown
+from rigidimeter.analysis.traces import analysed_epoch, perturbed_epoch, representative_fits
+from rigidimeter.core.records import Delay, Outcome
 
 
-@pytest.mark.parametrize(
-    ("recorded", "pooled", "named", "overall"),
-    [
-        (["OFF", "DBS"], ["OFF", "DBS", ""], ["OFF", "DBS"], True),
-        (["OFF"], ["OFF"], ["OFF"], False),
-        ([""], [""], [""], False),
-        (["", "OFF"], ["", "OFF", ""], ["", "OFF"], True),
-        (["OFF", "DBS"], ["OFF", "DBS"], ["OFF", "DBS"], False),
-        (["OFF"], [], [], False),
-    ],
-)
-def test_the_fit_to_all_conditions_is_distinguished_from_that_without_a_name(
-    recorded, pooled, named, overall, make_analysis
-) -> None:
-    analysis = make_analysis(dict.fromkeys(recorded, 2))
-    fits = tuple(
-        dataclasses.replace(analysis.fits[0], condition=name, epoch="pooled", n_samples=place)
-        for place, name in enumerate(pooled)
-    )
-    by_condition, everything = split_pooled(dataclasses.replace(analysis, pooled=fits))
-    assert list(by_condition) == named
-    assert everything is (fits[-1] if overall else None)
-
-
-def test_conditions_keep_one_order(study: StudyResult) -> None:
-    assert study.condition_names == ("OFF", "DBS")
-
-
-def test_the_representative_is_the_included_fit_with_the_median_stiffness(
-    make_study, make_analysis
-) -> None:
+def test_the_representative_is_the_included_fit_with_the_median_stiffness(make_analysis) -> None:
     analysis = make_analysis({"OFF": 5, "DBS": 4})
     values = [2.3, 1.6, 1.8, 2.9, 1.7, 1.5, 1.1, 1.3, 1.2]
     fits = [
@@ -60,7 +18,33 @@ def test_the_representative_is_the_included_fit_with_the_median_stiffness(
     ]
     fits[3] = dataclasses.replace(fits[3], outcome=Outcome("excluded", "limit"))
     fits[0] = dataclasses.replace(fits[0], outcome=Outcome("excluded", "limit"))
-    made = make_study([], analysis=dataclasses.replace(analysis, fits=tuple(fits)))
-    chosen = [(fit.condition, fit.stiffness_nm_rad) for fit in representative_fits(made)]
+    found = representative_fits(dataclasses.replace(analysis, fits=tuple(fits)), ["OFF", "DBS"])
+    chosen = [(fit.condition, fit.stiffness_nm_rad) for fit in found]
     # Three are left of OFF; of the four of DBS the lower middle one is taken.
     assert chosen == [("OFF", 1.7), ("DBS", 1.2)]
+
+
+def test_an_epoch_is_on_the_clock_it_was_analysed_on(
+    study: Shown, make_study, make_analysis
+) -> None:
+    epoch = study.epochs[1]
+    analysis = make_analysis({"OFF": 1})
+    late = Delay(epoch.source, 0.012, 0.001, corrected=True)
+    made = make_study([epoch], analysis=dataclasses.replace(analysis, delays=(late,)))
+    fit = dataclasses.replace(analysis.fits[0], source=epoch.source, epoch=epoch.label)
+    moved = analysed_epoch(made.as_analysed, fit)
+    assert moved is not None
+    np.testing.assert_allclose(
+        moved.channels["torque_nm"].time_s, epoch.channels["torque_nm"].time_s - 0.012
+    )
+    assert moved.channels["angle_rad"] is epoch.channels["angle_rad"]
+    assert analysed_epoch(made.as_analysed, analysis.fits[0]) is None
+
+
+def test_the_perturbation_of_an_example_is_drawn_if_any_epoch_has_one(study: Shown) -> None:
+    names, without = study.condition_names, [e for e in study.epochs if e.task == "sinusoid"]
+    first = representative_fits(study.analysis, names)[0]
+    shown = perturbed_epoch(study.analysis, names, study.as_analysed, study.epochs)
+    assert shown is not None
+    assert (shown.source, shown.label) == (first.source, first.epoch)
+    assert perturbed_epoch(study.analysis, names, {}, without) is None
