@@ -5,7 +5,12 @@ It takes the place of `analysis.study` when it is complete.
 
 from rigidimeter.analysis.study_anew.any_table import Columns, table_study
 from rigidimeter.analysis.study_anew.caveats import groups_of
-from rigidimeter.analysis.study_anew.compare_input import analysis_study, compare, conditions
+from rigidimeter.analysis.study_anew.compare_input import (
+    analysis_study,
+    compare,
+    conditions,
+    estimates_study,
+)
 from rigidimeter.analysis.study_anew.compared import Compared
 from rigidimeter.analysis.study_anew.comparisons import (
     EffectPair,
@@ -43,6 +48,8 @@ from rigidimeter.analysis.study_anew.from_folder import (
     load_study,
     prepare_study,
 )
+from rigidimeter.analysis.study_anew.load import load as load_recordings
+from rigidimeter.analysis.study_anew.load import place_of, source_of, without_excluded
 from rigidimeter.analysis.study_anew.measures import MEASURES, RATING, SCORE, Measure, Primary
 from rigidimeter.analysis.study_anew.rating_document import (
     Agreement,
@@ -78,14 +85,18 @@ from rigidimeter.analysis.study_anew.sentences import (
     statement,
     statements,
 )
+from rigidimeter.analysis.study_anew.session_checks import Session
+from rigidimeter.analysis.study_anew.store import UNCHANGED, keep
 from rigidimeter.analysis.study_anew.study import (
     Condition,
     Deviation,
     Exclusion,
     LeftOut,
+    Naming,
     Ratings,
     SessionEntry,
     Study,
+    naming,
 )
 from rigidimeter.analysis.study_anew.tests import by_units, by_values
 from rigidimeter.analysis.study_anew.verdicts import conclude, reasons, traffic_light
