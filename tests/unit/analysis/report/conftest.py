@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigidimeter.analysis.recording import estimate
 from scipy import signal
 
+from rigidimeter.analysis.recording import estimate
 from rigidimeter.analysis.report import Shown
 from rigidimeter.analysis.study_anew import analysis_study, conclude_study
 from rigidimeter.core.records import Analysis, Channel, Epoch, Fit, Motion, Notice, Outcome, Score
