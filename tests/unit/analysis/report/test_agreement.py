@@ -6,47 +6,23 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from statistics import fmean, stdev
 from typing import Any
 
 import pytest
 from tests.unit.analysis.report.cohorts import Design, made_study, of_study
-from tests.unit.analysis.report.parsed_page import ParsedPage
+from tests.unit.analysis.report.parsed_page import ParsedPage, assert_shows
 
-from rigidimeter.analysis.reading import Recording, estimates_document
-from rigidimeter.analysis.recording import condition_precisions
+from rigidimeter.analysis.reading import estimates_document
 from rigidimeter.analysis.report import SECTIONS, Shown, report, shown_tables
 from rigidimeter.analysis.study_anew import comparison_document, difference_rows, statements
 from rigidimeter.cli.comparison_text import difference_blocks, full_blocks, statement_blocks
-from rigidimeter.cli.estimate_text import estimate_blocks
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
 from rigidimeter.core.files import read_json, write_json
-from rigidimeter.core.records import Analysis
-from rigidimeter.core.settings import Settings
 from rigidimeter.core.words import Column
 
-NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:·10[⁻⁰-⁹¹²³]+)?")
-SHARED = re.compile(r"\[([^]]*)\](·10[⁻⁰-⁹¹²³]+)")
-LOWERED = str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789")
-PARAMETERS = ("inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad")
 DRAWN = ("distributions", "days", "perturbation", "torque", "voluntary", "loops", "impedance")
 
 Row = dict[str, str]
-
-
-def numbers(text: str) -> list[float]:
-    text = SHARED.sub(lambda all_: NUMBER.sub(rf"\g<0>{all_[2]}", all_[1]), text)
-    return [float(found.replace("·10", "e").translate(LOWERED)) for found in NUMBER.findall(text)]
-
-
-def assert_shows(text: str, values: Sequence[float | None], digits: int) -> None:
-    """Assert that the text has these numbers in this order, rounded to so many digits or more."""
-    expected = [value for value in values if value is not None]
-    found = numbers(text)
-    assert len(found) == len(expected), (text, expected)
-    for one, value in zip(found, expected, strict=True):
-        size = math.floor(math.log10(abs(value))) if value else 0
-        assert abs(one - value) <= 0.501 * 10.0 ** (size - digits + 1), (text, expected)
 
 
 @pytest.fixture(scope="module")
@@ -244,7 +220,8 @@ def test_each_cell_of_the_page_rounds_a_number_of_its_table(study, page) -> None
     for one in shown_tables(study):
         columns = one.shown_columns(several_sources=True)
         cells = page.table(one.title)[1 + any(column.group for column in columns) :]
-        for row, line in zip(one.rows, cells, strict=True):
+        # The report adds to the provenance what it is of.
+        for row, line in zip(one.rows, cells, strict=one.name != "provenance"):
             for column, cell in zip(columns, line, strict=True):
                 if column.kind in digits and not column.error:
                     assert_shows(cell, [*sizes_of(row, column)], digits[column.kind])
@@ -303,84 +280,3 @@ def test_ratings(json, folder: Path, page: ParsedPage) -> None:
         found[key][name] for name in ("OFF", "DBS") for key in ("means", "means_low", "means_high")
     ]
     assert_shows(means.partition(" Contrast")[0], expected, 3)
-
-
-def first_screen(analysis: Analysis, column: str, *recorded: Any) -> list[Sequence[str]]:
-    """Return the rows of the table of the first screen of `estimate` with this first heading."""
-    read = Recording(recorded, (), Settings(), ())
-    for _, table in tables_of(estimate_blocks(read, analysis)):
-        if table.headings and table.headings[0] == column:
-            return [row for row in table.rows if not isinstance(row, str)]
-    raise AssertionError(column)
-
-
-def test_the_first_screen_of_estimates_has_the_numbers_of_the_document(study, json) -> None:
-    """Value ± standard error to two digits of the error: the first four epochs, and the last."""
-    epochs = json["estimates"]["epochs"]
-    assert len(epochs) > 8
-    fits = tuple(replace(fit, source="x.csv") for fit in study.analysis.fits)
-    one_file = replace(study.analysis, fits=fits, fixed_inertia=fits, scores=())
-    shown = first_screen(one_file, "epoch", *study.epochs)[:6]
-    assert (
-        first_screen(study.analysis, "epoch", *study.epochs)[0][0] == "together"
-    )  # of several recordings
-    assert shown[4][0] == "…"
-    for row, one in zip([*shown[:4], shown[5]], [*epochs[:4], epochs[-1]], strict=True):
-        assert row[0] == one["epoch"]
-        assert row[1] == one["condition"]
-        for name, cell in zip(PARAMETERS, row[2:5], strict=True):
-            factor = 1e3 if name == "inertia_kg_m2" else 1.0
-            value, error = (factor * one[key] for key in (name, f"{name}_se"))
-            found, spread = numbers(cell)
-            size = 10.0 ** (math.floor(math.log10(error)) - 1)
-            assert abs(found - value) <= 0.51 * size
-            assert abs(spread - error) <= 0.51 * size
-            decimals = [len(part.partition(".")[2]) for part in cell.split(" ± ")]
-            assert decimals[0] == decimals[1]
-        assert_shows(row[5], [math.degrees(one["angle_rms_rad"])], 3)
-        assert_shows(row[6], [one["vaf_percent"]], 3)
-        assert row[7] == ("" if one["outcome"] == "included" else one["outcome"])
-
-
-def test_the_first_screen_has_all_epochs_together(study, json) -> None:
-    """Value, 95 % interval and SD between epochs of each condition."""
-    pooled = json["estimates"]["pooled"]["conditions"]
-    rows = first_screen(study.analysis, "epoch", *study.epochs)
-    for name in ("OFF", "DBS"):
-        begin = next(k for k, row in enumerate(rows) if row[:2] == ("together", name))
-        value, ends, sd = rows[begin : begin + 3]
-        assert (ends[0], sd[0]) == ("95 %", "SD")
-        own = [
-            one
-            for one in json["estimates"]["epochs"]
-            if one["condition"] == name and one["outcome"] == "included"
-        ]
-        for k, parameter in enumerate(PARAMETERS, start=2):
-            factor = 1e3 if parameter == "inertia_kg_m2" else 1.0
-            sizes = [factor * pooled[name][f"{parameter}{end}"] for end in ("", "_low", "_high")]
-            for one, size in zip(numbers(f"{value[k]} {ends[k]}"), sizes, strict=True):
-                places = len(value[k].partition(".")[2])
-                assert abs(one - size) <= 0.501 * 10.0**-places
-            each = [one[parameter] for one in own]
-            assert_shows(sd[k], [100 * stdev(each) / fmean(each)], 2)
-
-
-def test_the_first_screen_has_the_precision_of_one_condition(make_analysis) -> None:
-    """Without a fit to all epochs together: means over epochs, of one epoch without an interval."""
-    analysis = make_analysis({"DBS": 3})
-    found = condition_precisions(Recording((), (), Settings(), ()), analysis)["DBS"]
-    value, ends, sd = first_screen(analysis, "epoch")[-3:]
-    for k, name in enumerate(PARAMETERS, start=2):
-        one = found[name]
-        factor = 1e3 if name == "inertia_kg_m2" else 1.0
-        shown = numbers(f"{value[k]} {ends[k]}")
-        places = len(value[k].partition(".")[2])
-        for number, size in zip(shown, (one.value, one.low, one.high), strict=True):
-            assert abs(number - factor * size) <= 0.501 * 10.0**-places
-        assert_shows(sd[k], [one.sd_percent], 2)
-    (scores,) = first_screen(analysis, "sinusoids")
-    assert scores[1] == "3"
-    for cell, name in zip(scores[2:], ("impulse_nm_s", "work_j"), strict=True):
-        assert_shows(cell, [found[name].value, found[name].sd_percent], 2)
-    (scores,) = first_screen(make_analysis({"DBS": 1}), "sinusoids")
-    assert "SD" not in " ".join(scores)
