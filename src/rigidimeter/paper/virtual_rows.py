@@ -126,7 +126,7 @@ def measure_figure(name: str, measure: str, context: Context) -> Claim:
     values = {
         name: rows.loc[rows["condition"] == name, "value"].tolist() for name in compared.pair
     }
-    label = compared.measure.label
+    label = f"{compared.measure.title} ({compared.measure.unit})"
     return Claim(
         ours=f"virtual study: medians {medians} {compared.measure.unit}; p = {p}, "
         f"r = {r}; when days count, not epochs, p = {by_day}",
