@@ -22,7 +22,7 @@ Many more studies are drawn as values of B and K, without recordings, and conclu
 code (`STUDIES`): without a difference, with one (`TRUE`), and with one of the size that is worth
 finding, of which none may be excluded. The chance that `rigidimeter design` predicts stands beside.
 
-    python -m benchmarks.verdicts days --studies 2000   # ten minutes of processor time
+    python -m benchmarks.verdicts days --studies 2000   # 40 minutes of processor time
 """
 
 from __future__ import annotations
