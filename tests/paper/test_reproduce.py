@@ -6,7 +6,6 @@ import json
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 from tests.unit.virtual.tiny import tiny
 
@@ -274,11 +273,12 @@ def test_the_ratings_effect_is_not_significantly_smaller() -> None:
 
 
 def test_the_drawn_epoch_is_of_median_stiffness(rows: dict[str, Claim], context: Context) -> None:
-    fits = [fit for fit in context.study.analysis.fixed_inertia if fit.condition == "OFF"]
+    fits = [fit for fit in context.study.study.analysis.fixed_inertia if fit.condition == "OFF"]
     ranked = sorted(fit.stiffness_nm_rad for fit in fits if fit.outcome.included)
     median = ranked[(len(ranked) - 1) // 2]
-    assert f"with the median stiffness (J {number(context.study.analysis.inertia_kg_m2)}, " in (
-        rows["fig-4b"].ours
+    assert (
+        f"with the median stiffness (J {number(context.study.study.analysis.inertia_kg_m2)}, "
+        in (rows["fig-4b"].ours)
     )
     assert f"K {number(median)})" in rows["fig-4b"].ours
 

@@ -123,9 +123,7 @@ def measure_figure(name: str, measure: str, context: Context) -> Claim:
         for condition, summary in context.study.summaries(measure).items()
     )
     rows = counting(context.study.study.rows, measure)
-    values = {
-        name: rows.loc[rows["condition"] == name, "value"].tolist() for name in compared.pair
-    }
+    values = {name: rows.loc[rows["condition"] == name, "value"].tolist() for name in compared.pair}
     label = f"{compared.measure.title} ({compared.measure.unit})"
     return Claim(
         ours=f"virtual study: medians {medians} {compared.measure.unit}; p = {p}, "
