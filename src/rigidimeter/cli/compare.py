@@ -76,12 +76,8 @@ def compare(
     """
     from rigidimeter.analysis import study as studies
     from rigidimeter.cli.comparison_text import comparison_blocks
-    from rigidimeter.cli.inputs import (
-        analyse_recordings,
-        analyse_study_folder,
-        study_files,
-        study_of,
-    )
+    from rigidimeter.cli.inputs import analyse_recordings, study_of
+    from rigidimeter.cli.study_inputs import analyse_study_folder, study_files
 
     outputs = (json_out, csv_out)
     paths = recordings.paths
@@ -90,7 +86,7 @@ def compare(
         raise UserError(f"--value takes one table, but {len(paths)} inputs were given")
     if not value and (folder := study_of(recordings, key)) is not None:
         keep_inputs(outputs, study_files(folder, key))
-        study = analyse_study_folder(
+        found, analysed = analyse_study_folder(
             folder,
             recordings,
             key,
@@ -100,21 +96,21 @@ def compare(
             resamples=resamples,
         )
         try:
-            _write(study.result, *outputs, str(folder))
-            show(comparison_blocks(study.result, full=full))
-            _say_changes(study.result, folder, kept=group is None and not study.not_kept)
+            _write(found, *outputs, str(folder))
+            show(comparison_blocks(found, full=full))
+            _say_changes(found, folder, kept=group is None and not analysed.not_kept)
         finally:
-            status = study.say()
+            status = analysed.say()
         raise typer.Exit(status)
     keep_inputs(outputs, paths)
     if is_json and not value and len(paths) > 1:
         raise UserError("compare takes one JSON file of estimates, or recordings, not both")
-    analysed = None if value or is_json else analyse_recordings(recordings)[1]
+    of_files = None if value or is_json else analyse_recordings(recordings)
     status = 0
     try:
         with Meter("compare", 1.0) as meter:
             found = studies.compare(
-                paths[0] if analysed is None else analysed.result.analysis,
+                paths[0] if of_files is None else of_files[1].analysis,
                 other,
                 reference=reference,
                 value=value,
@@ -125,15 +121,15 @@ def compare(
                 resamples=resamples,
                 progress=meter.advance,
             )
-        if analysed is not None:
-            read = analysed.result
+        if of_files is not None:
+            read, _ = of_files
             found = replace(found, epochs=read.epochs, settings=read.settings)
         _write(found, *outputs)
         show(comparison_blocks(found, full=full))
         say(found.notices)
     finally:
-        if analysed is not None:
-            status = analysed.say()
+        if of_files is not None:
+            status = of_files[1].say()
     raise typer.Exit(status)
 
 

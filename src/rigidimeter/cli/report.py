@@ -49,7 +49,8 @@ def report(
     """
     from rigidimeter.analysis.report import inputs_seen_from, why_not_own
     from rigidimeter.analysis.study import lead
-    from rigidimeter.cli.inputs import analyse_recordings, analyse_study_folder, study_of
+    from rigidimeter.cli.inputs import analyse_recordings, study_of
+    from rigidimeter.cli.study_inputs import analyse_study_folder, of_recording
     from rigidimeter.core.session import is_session
 
     if any(is_session(folder) for folder in (out, *out.resolve().parents)):
@@ -68,14 +69,15 @@ def report(
                 f"--out {out}: is the study or its stored analysis; name another folder, such as "
                 f"{folder / 'report'}"
             )
-        analysed = analyse_study_folder(folder, recordings, key, group=group)
+        result, analysed = analyse_study_folder(folder, recordings, key, group=group)
     elif group is not None:
         raise UserError(f"--group {group}: recordings name no group; give a study folder")
     else:
-        _, analysed = analyse_recordings(recordings)
+        read, analysed = analyse_recordings(recordings)
+        result = of_recording(read, analysed.analysis)
     try:
-        page = write_page(analysed.result, out, recordings.paths, title, overwrite=overwrite)
-        show([Heading(lead(analysed.result)), ""])
+        page = write_page(result, out, recordings.paths, title, overwrite=overwrite)
+        show([Heading(lead(result)), ""])
         echo(str(page))
     finally:
         status = analysed.say()

@@ -17,7 +17,7 @@ from rigidimeter.analysis.batch.archive_inputs import Input, content_digest, dig
 from rigidimeter.analysis.batch.parts import Row
 from rigidimeter.analysis.reading.formats import ReadOptions
 from rigidimeter.analysis.reading.recording import read_as
-from rigidimeter.analysis.study import estimate
+from rigidimeter.analysis.recording import estimate
 from rigidimeter.analysis.study.exclusions import operators_exclusions
 from rigidimeter.analysis.study.sessions import gather, source_of
 from rigidimeter.core.errors import UserError
