@@ -84,7 +84,7 @@ _WHO = (
     *("subject", "group", "day", "session", "block", "epoch", "rater", "unit", "condition"),
     *("outcome", "findings"),
 )
-_WHAT = ("value", "low", "high", "bias")
+_WHAT = ("value", "se", "low", "high", "bias")
 _EMPTY = {str: "", float: np.nan, bool: True}
 _DTYPE = {str: "category", float: "float64", bool: "bool"}
 
