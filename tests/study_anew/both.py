@@ -128,7 +128,7 @@ def old_answers(result: old.StudyResult) -> Answers:
 
 def new_answers(study: new.Study, methods: Sequence[new.OfMethod]) -> Answers:
     """Return what the new room says."""
-    concluded = new.conclude(study, new.compare(study), methods)
+    concluded = new.conclude(study, new.day_tests(study), methods)
     said = new.statements(study, concluded)
     again = new.without_deviating(study, concluded)
     light = new.traffic_light(study, concluded)

@@ -1,40 +1,63 @@
 """A study as one long table: a row for each epoch and measure, everything else a function of it.
 
-Not used by the program yet: it takes the place of `analysis.study` when it is complete.
+It takes the place of `analysis.study` when it is complete.
 """
 
 from rigidimeter.analysis.study_anew.any_table import Columns, table_study
 from rigidimeter.analysis.study_anew.caveats import groups_of
+from rigidimeter.analysis.study_anew.compare_input import analysis_study, compare, conditions
 from rigidimeter.analysis.study_anew.compared import Compared
 from rigidimeter.analysis.study_anew.comparisons import (
+    EffectPair,
     OfMethod,
-    compare,
     compare_values,
+    day_tests,
+    method_caveats,
+    precisions,
+    precisions_of_each,
     sensitivity,
     without_deviating,
 )
 from rigidimeter.analysis.study_anew.document import (
-    Result,
+    TABLES,
+    TEST,
     comparison_document,
-    conclude_study,
+    comparison_rows,
     conclusion_rows,
     result_table,
 )
-from rigidimeter.analysis.study_anew.from_folder import Loaded, analyse, load_study
+from rigidimeter.analysis.study_anew.from_folder import (
+    Loaded,
+    analyse,
+    estimate_study,
+    load_study,
+    prepare_study,
+)
 from rigidimeter.analysis.study_anew.measures import MEASURES, RATING, SCORE, Measure, Primary
-from rigidimeter.analysis.study_anew.rating_document import agreement
+from rigidimeter.analysis.study_anew.rating_document import (
+    Agreement,
+    Relation,
+    agreement,
+    ratings_document,
+    relations,
+)
 from rigidimeter.analysis.study_anew.ratings import corrected, ratings_of
+from rigidimeter.analysis.study_anew.results import TESTS_SHARE, StudyResult, conclude_study
 from rigidimeter.analysis.study_anew.rows import (
     FIELDS,
     as_rows,
     blocks,
     counting,
     estimate_rows,
+    measures_of,
+    pooled,
     read_rows,
+    recorded,
     together,
     write_rows,
 )
 from rigidimeter.analysis.study_anew.sentences import (
+    Statement,
     deviation_sentence,
     lead,
     statement,

@@ -67,7 +67,7 @@ class EffectPair(NamedTuple):
     p_holm: float
 
 
-def compare(study: Study) -> tuple[Compared, ...]:
+def day_tests(study: Study) -> tuple[Compared, ...]:
     """Return the test of each measure in each pair of conditions, before anything is concluded.
 
     The test is by days where days are known, and of ratings that of their mixed model; else by

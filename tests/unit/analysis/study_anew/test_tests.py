@@ -17,11 +17,11 @@ from rigidimeter.analysis.study_anew import (
     as_rows,
     by_units,
     by_values,
-    compare,
     compare_values,
     conclude,
     conclusion_rows,
     counting,
+    day_tests,
     read_rows,
     write_rows,
 )
@@ -126,12 +126,12 @@ def test_too_many_values_are_refused_alone_and_a_remark_beside_days() -> None:
     (one,) = compare_values(Study(many, *PAIR))
     assert "make 5.2e+07 pairs" in one.remark
     with pytest.raises(UserError, match=r"make 5\.2e\+07 pairs"):
-        compare(Study(many.assign(day="", method=""), *PAIR))
+        day_tests(Study(many.assign(day="", method=""), *PAIR))
 
 
 def test_one_condition_alone_is_summarised_and_not_concluded(rows: pd.DataFrame) -> None:
     study = Study(rows, "OFF")
-    (one,) = compare(study)
+    (one,) = day_tests(study)
     assert one.remark == "only one condition was recorded"
     assert conclude(study, [one]) == ()
 
@@ -171,6 +171,6 @@ def test_rows_of_a_file_are_concluded_alike(
     flagged = rows.assign(findings=np.where(rows["condition"] == "DBS", "tremor", ""))
     write_rows(tmp_path / f"rows{ending}", flagged)
     before, after = (Study(one, *PAIR) for one in (flagged, read_rows(tmp_path / f"rows{ending}")))
-    found = conclusion_rows(conclude(after, compare(after)))
-    assert found == conclusion_rows(conclude(before, compare(before)))
+    found = conclusion_rows(conclude(after, day_tests(after)))
+    assert found == conclusion_rows(conclude(before, day_tests(before)))
     assert found[0]["finding"] == "flagged_epochs"
