@@ -33,7 +33,14 @@ from rigidimeter.analysis.study_anew.from_folder import (
     load_study,
     prepare_study,
 )
-from rigidimeter.analysis.study_anew.measures import MEASURES, RATING, SCORE, Measure, Primary
+from rigidimeter.analysis.study_anew.measures import (
+    LEVEL,
+    MEASURES,
+    RATING,
+    SCORE,
+    Measure,
+    Primary,
+)
 from rigidimeter.analysis.study_anew.rating_document import (
     Agreement,
     Relation,
@@ -41,7 +48,12 @@ from rigidimeter.analysis.study_anew.rating_document import (
     ratings_document,
     relations,
 )
-from rigidimeter.analysis.study_anew.ratings import corrected, ratings_of
+from rigidimeter.analysis.study_anew.ratings import (
+    corrected,
+    fit_scores,
+    ratings_of,
+    study_ratings,
+)
 from rigidimeter.analysis.study_anew.results import TESTS_SHARE, StudyResult, conclude_study
 from rigidimeter.analysis.study_anew.rows import (
     FIELDS,
