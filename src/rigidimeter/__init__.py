@@ -26,9 +26,10 @@ from rigidimeter.core.version import __version__
 
 if TYPE_CHECKING:
     from rigidimeter.analysis.batch import batch
+    from rigidimeter.analysis.figures import plot
     from rigidimeter.analysis.reading import data, identify, read
     from rigidimeter.analysis.recording import estimate, fit_terms
-    from rigidimeter.analysis.report import plot, report
+    from rigidimeter.analysis.report import report
     from rigidimeter.analysis.study_anew import compare
     from rigidimeter.planning import design
     from rigidimeter.virtual import simulate
@@ -57,7 +58,7 @@ _ROOMS = {
     "fit_terms": "rigidimeter.analysis.recording",
     "simulate": "rigidimeter.virtual",
     "design": "rigidimeter.planning",
-    "plot": "rigidimeter.analysis.report",
+    "plot": "rigidimeter.analysis.figures",
     "report": "rigidimeter.analysis.report",
     "batch": "rigidimeter.analysis.batch",
 }

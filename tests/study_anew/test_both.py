@@ -3,7 +3,7 @@
 import pytest
 from tests.study_anew.both import apart, new_answers, new_study, of_table, old_answers
 from tests.study_anew.designs import random_study
-from tests.unit.analysis.report.cohorts import Design, made_study
+from tests.study_anew.old_cohorts import Design, made_study
 
 from rigidimeter.analysis.study import conclusion_rows
 

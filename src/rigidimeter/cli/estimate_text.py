@@ -65,10 +65,12 @@ def estimate_blocks(read: Recording, analysis: Analysis, *, full: bool = False) 
     screens = map(first_screen, (MOST_EPOCHS, FIRST_EPOCHS + 2, 0))
     yield from next((one for one in screens if len(text_lines(one)) <= ROWS), first_screen(0))
     if full:
+        from rigidimeter.analysis.report import Shown
         from rigidimeter.cli.comparison_text import full_blocks
-        from rigidimeter.cli.study_inputs import of_recording
+        from rigidimeter.cli.inputs import command_line
 
-        yield from full_blocks(of_recording(read, analysis), by_epoch=True)
+        shown = Shown.of_recording(read, analysis, command_line())
+        yield from full_blocks(shown, by_epoch=True)
 
 
 def _about(read: Recording, analysis: Analysis) -> str:

@@ -211,10 +211,10 @@ def demo(
     )
     _simulated(out, short_design(days, prbs_epochs, sinusoid_epochs), seed)
     _write_plain_table(out / "sessions" / "day-1-OFF", out / "elbow.csv")
-    found, analysed = analyse_study_folder(out, plain_recordings(out))
+    shown, analysed = analyse_study_folder(out, plain_recordings(out))
     try:
-        page = write_page(found, out / "report", [out])
-        show(["", *comparison_blocks(found), ""])
+        page = write_page(shown, out / "report", [out])
+        show(["", *comparison_blocks(shown), ""])
         echo(f"Done in {time.monotonic() - start_s:.0f} s. Open {page.resolve()}")
         echo(
             f"Next: rigidimeter compare {out} --full; rigidimeter inspect {out / 'elbow.csv'}; "

@@ -11,10 +11,15 @@ from functools import partial
 import numpy as np
 
 from rigidimeter.analysis.estimation import Signals, epoch_signals, scoring_cycles, zero_phase_band
-from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.curves import draw_loops, loop_limits
-from rigidimeter.analysis.report.points import distribution_size, draw_distribution
-from rigidimeter.analysis.report.style import condition_colours, drawn
+from rigidimeter.analysis.figures import (
+    condition_colours,
+    distribution_size,
+    draw_distribution,
+    draw_loops,
+    drawn,
+    loop_limits,
+)
+from rigidimeter.analysis.report import Figure
 from rigidimeter.analysis.statistics import RankSum, difference, summarise
 from rigidimeter.analysis.study_anew import Compared, counting, fit_scores
 from rigidimeter.analysis.traces import analysed_epoch, representative_scores, representatives

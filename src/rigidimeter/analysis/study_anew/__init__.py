@@ -5,7 +5,12 @@ It takes the place of `analysis.study` when it is complete.
 
 from rigidimeter.analysis.study_anew.any_table import Columns, table_study
 from rigidimeter.analysis.study_anew.caveats import groups_of
-from rigidimeter.analysis.study_anew.compare_input import analysis_study, compare, conditions
+from rigidimeter.analysis.study_anew.compare_input import (
+    analysis_study,
+    compare,
+    conditions,
+    estimates_study,
+)
 from rigidimeter.analysis.study_anew.compared import Compared
 from rigidimeter.analysis.study_anew.comparisons import (
     EffectPair,
@@ -18,13 +23,23 @@ from rigidimeter.analysis.study_anew.comparisons import (
     sensitivity,
     without_deviating,
 )
+from rigidimeter.analysis.study_anew.day_scatter import DayScatter, day_scatter
+from rigidimeter.analysis.study_anew.difference_rows import (
+    DifferenceRow,
+    difference_cells,
+    difference_rows,
+    p_name,
+)
 from rigidimeter.analysis.study_anew.document import (
     TABLES,
     TEST,
+    Rows,
+    columns_of_rows,
     comparison_document,
     comparison_rows,
     conclusion_rows,
     result_table,
+    table_csv,
 )
 from rigidimeter.analysis.study_anew.from_folder import (
     Loaded,
@@ -33,6 +48,8 @@ from rigidimeter.analysis.study_anew.from_folder import (
     load_study,
     prepare_study,
 )
+from rigidimeter.analysis.study_anew.load import load as load_recordings
+from rigidimeter.analysis.study_anew.load import place_of, source_of, without_excluded
 from rigidimeter.analysis.study_anew.measures import (
     LEVEL,
     MEASURES,
@@ -45,9 +62,13 @@ from rigidimeter.analysis.study_anew.rating_document import (
     Agreement,
     Relation,
     agreement,
+    rating_contrast,
+    rating_offsets,
+    rating_rows,
     ratings_document,
     relations,
 )
+from rigidimeter.analysis.study_anew.rating_table import table_ratings
 from rigidimeter.analysis.study_anew.ratings import (
     corrected,
     fit_scores,
@@ -65,6 +86,7 @@ from rigidimeter.analysis.study_anew.rows import (
     pooled,
     read_rows,
     recorded,
+    split_pooled,
     together,
     write_rows,
 )
@@ -75,14 +97,18 @@ from rigidimeter.analysis.study_anew.sentences import (
     statement,
     statements,
 )
+from rigidimeter.analysis.study_anew.session_checks import Session
+from rigidimeter.analysis.study_anew.store import UNCHANGED, keep
 from rigidimeter.analysis.study_anew.study import (
     Condition,
     Deviation,
     Exclusion,
     LeftOut,
+    Naming,
     Ratings,
     SessionEntry,
     Study,
+    naming,
 )
 from rigidimeter.analysis.study_anew.tests import by_units, by_values
 from rigidimeter.analysis.study_anew.verdicts import conclude, reasons, traffic_light

@@ -20,6 +20,7 @@ from rigidimeter.analysis.study_anew.comparisons import (
     precisions_of_each,
     without_deviating,
 )
+from rigidimeter.analysis.study_anew.estimate_cells import estimate_cells, score_cells
 from rigidimeter.analysis.study_anew.measures import MEASURE_NAMES, RATING, Measure
 from rigidimeter.analysis.study_anew.rating_document import (
     rating_contrast,
@@ -32,7 +33,7 @@ from rigidimeter.analysis.study_anew.rows import counting, measures_of, recorded
 from rigidimeter.analysis.study_anew.sentences import deviation_sentence, lead, statements
 from rigidimeter.analysis.study_anew.study import Ratings, Study
 from rigidimeter.analysis.study_anew.verdicts import reasons, traffic_light
-from rigidimeter.core.files import plain_values
+from rigidimeter.core.files import csv_text, plain_values
 from rigidimeter.core.records import Fit, Score
 from rigidimeter.core.words import within
 
@@ -93,14 +94,9 @@ def _needed(one: Compared) -> dict[str, Any]:
 def _simulated(one: Compared) -> dict[str, float]:
     if one.simulated is None:
         return {}
-    first, second = one.simulated
-    known = first > 0 and one.measure != RATING
-    return {
-        "simulated_reference": first,
-        "simulated_other": second,
-        "simulated_difference": second - first,
-        "simulated_difference_percent": 100 / first * (second - first) if known else float("nan"),
-    }
+    names = ("reference", "other", "difference", "difference_percent")
+    cells = (*one.simulated, *one.simulated_difference)
+    return {f"simulated_{name}": cell for name, cell in zip(names, cells, strict=True)}
 
 
 def comparison_values(result: StudyResult) -> list[dict[str, Any]]:
@@ -181,7 +177,8 @@ def condition_names(study: Study) -> tuple[str, ...]:
     """Return all conditions in the order of the study or the protocol, then as recorded."""
     order = [each.name for each in study.conditions]
     order = order or [block.condition for block in study.settings.protocol.blocks]
-    recorded_ones = map(str, study.rows["condition"].drop_duplicates())
+    epochs = study.rows[study.rows["scope"] == "epoch"]  # that of all epochs has no condition
+    recorded_ones = map(str, epochs["condition"].drop_duplicates())
     names = dict.fromkeys([*filter(None, study.pair), *recorded_ones])
     return tuple(sorted(names, key=lambda n: order.index(n) if n in order else len(order)))
 
@@ -300,6 +297,8 @@ TABLES: Mapping[str, Callable[[StudyResult], Iterable[Mapping[str, Any]]]] = {
     "deviations": lambda result: [one._asdict() for one in result.study.deviations],
     "without_deviating": lambda result: without_deviating(result.study, result.comparisons),
     "account": _account,
+    "estimates": lambda result: estimate_cells(result.study),
+    "scores": lambda result: score_cells(result.study),
 }
 """The tables of conclusions by name, each made alone."""
 
@@ -307,6 +306,16 @@ TABLES: Mapping[str, Callable[[StudyResult], Iterable[Mapping[str, Any]]]] = {
 def result_table(result: StudyResult, name: str) -> Rows:
     """Return one of the tables of conclusions; the others are not made."""
     return list(TABLES[name](result))
+
+
+def table_csv(rows: Rows) -> str:
+    """Return a table as CSV; a column is there if any row has it."""
+    return csv_text(columns_of_rows(rows), rows)
+
+
+def columns_of_rows(rows: Rows) -> list[str]:
+    """Return the columns of a table, in their order."""
+    return list(dict.fromkeys(name for row in rows for name in row))
 
 
 def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:

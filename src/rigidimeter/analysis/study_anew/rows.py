@@ -86,7 +86,7 @@ _WHO = (
 )
 _WHAT = ("value", "se", "low", "high", "bias")
 _EMPTY = {str: "", float: np.nan, bool: True}
-_DTYPE = {str: "category", float: "float64", bool: "bool"}
+_DTYPE = {float: "float64", bool: "bool"}
 
 
 def as_rows(records: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
@@ -112,7 +112,18 @@ def as_rows(records: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
 
 def typed(rows: pd.DataFrame) -> pd.DataFrame:
     """Return rows whose text is plain as the table has them: columns in order, each of its type."""
-    return rows[list(FIELDS)].astype({name: _DTYPE[field.kind] for name, field in FIELDS.items()})
+    found = rows[list(FIELDS)].astype(
+        {name: _DTYPE[field.kind] for name, field in FIELDS.items() if name not in TEXT}
+    )
+    return found.assign(**{name: _text(rows[name]) for name in TEXT})
+
+
+def _text(cells: pd.Series) -> pd.Series:
+    """Return text as categories; as it is where names of files are not UTF-8: pandas refuses it."""
+    try:
+        return cells.astype("category")
+    except UnicodeEncodeError:
+        return cells.astype(object)
 
 
 def together(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
@@ -125,11 +136,17 @@ def together(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
         return as_rows(())
     joined = {
         name: pd.Series(pd.api.types.union_categoricals([part[name] for part in parts]))
-        if name in TEXT
+        if all(isinstance(part[name].dtype, pd.CategoricalDtype) for part in parts)
         else pd.concat([part[name] for part in parts], ignore_index=True)
         for name in FIELDS
     }
     return pd.DataFrame(joined)
+
+
+def grouped(rows: pd.DataFrame, *columns: str) -> Any:
+    """Return rows by the labels in some columns: as `groupby`, which refuses names not in UTF-8."""
+    codes = [pd.factorize(rows[name].to_numpy(dtype=object))[0] for name in columns]
+    return rows.groupby(codes, sort=False)
 
 
 def recorded(rows: pd.DataFrame, measure: str) -> pd.DataFrame:
@@ -383,19 +400,13 @@ def _of_scores(
 def _of_pooled(
     analysis: Analysis, place: _Place, made_by: Mapping[str, Any]
 ) -> Iterator[dict[str, Any]]:
-    """Yield the fits to all epochs of each condition, and the one to all epochs.
-
-    The latter has no condition, as recordings without a name for theirs have none: it comes last.
-    """
-    known = {fit.condition for fit in analysis.fits}
-    seen: set[str] = set()
+    """Yield the fits to all epochs of each condition, and the one to all epochs."""
+    of_each, _ = split_pooled(analysis)
     for fit in analysis.pooled:
-        of_one = fit.condition in known and fit.condition not in seen
-        seen.add(fit.condition)
         cells = {
             **place.condition(fit.condition),
             **made_by,
-            "scope": "condition" if of_one else "all",
+            "scope": "condition" if of_each.get(fit.condition) is fit else "all",
             "session": fit.source,
             "epoch": fit.epoch,
             "task": "prbs",
@@ -404,6 +415,22 @@ def _of_pooled(
         }
         for row in _of_fit(fit, cells):
             yield row | {"bias": _bias(fit.findings, (row["high"] - row["low"]) / 2.0)}
+
+
+def split_pooled(analysis: Analysis) -> tuple[dict[str, Fit], Fit | None]:
+    """Return the fit to all epochs of each condition, and the one to all epochs if there is one.
+
+    The latter has no condition, as recordings without a name for theirs have none: it comes last.
+    """
+    recorded = {fit.condition for fit in analysis.fits}
+    of_each: dict[str, Fit] = {}
+    overall = None
+    for fit in analysis.pooled:
+        if fit.condition in of_each or fit.condition not in recorded:
+            overall = fit
+        else:
+            of_each[fit.condition] = fit
+    return of_each, overall
 
 
 def _bias(findings: Iterable[Finding], half: float) -> float:

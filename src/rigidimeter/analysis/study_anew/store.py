@@ -21,7 +21,6 @@ from typing import Any
 
 from rigidimeter.analysis.reading import estimates_document
 from rigidimeter.analysis.study_anew.document import (
-    StudyResult,
     columns_of_rows,
     comparison_document,
     result_table,
@@ -29,6 +28,7 @@ from rigidimeter.analysis.study_anew.document import (
 )
 from rigidimeter.analysis.study_anew.from_folder import ANALYSIS, COMPARISON, Loaded
 from rigidimeter.analysis.study_anew.measures import RATING
+from rigidimeter.analysis.study_anew.results import StudyResult
 from rigidimeter.core.errors import UserError, refused
 from rigidimeter.core.files import (
     DICTIONARY,
