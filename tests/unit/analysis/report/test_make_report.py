@@ -25,9 +25,7 @@ def csv_file(epochs: list[Epoch], tmp_path_factory: pytest.TempPathFactory) -> P
     return path
 
 
-def test_estimates_give_a_page_without_figures_of_signals(
-    study: Shown, tmp_path: Path
-) -> None:
+def test_estimates_give_a_page_without_figures_of_signals(study: Shown, tmp_path: Path) -> None:
     page = report(study.analysis, tmp_path, "Estimates alone")
     text = page.read_text(encoding="utf-8")
     assert "<h1>Estimates alone</h1>" in text

@@ -163,9 +163,7 @@ def test_page_says_what_was_done(page: Page, study: Shown) -> None:
     assert "virtual subject" not in text.lower()
 
 
-def test_the_same_study_gives_the_same_bytes(
-    study: Shown, written: Path, tmp_path: Path
-) -> None:
+def test_the_same_study_gives_the_same_bytes(study: Shown, written: Path, tmp_path: Path) -> None:
     again = write_report(study, tmp_path / "deep" / "er")
     files = [path for path in written.parent.rglob("*") if path.is_file()]
     assert len(files) > 20
@@ -234,9 +232,7 @@ def test_a_method_asked_for_by_name_says_so(study: Shown, make_study) -> None:
 
 
 @pytest.mark.usefixtures("no_figures")
-def test_the_joint_over_frequency_is_on_the_page(
-    periodic_study: Shown, tmp_path: Path
-) -> None:
+def test_the_joint_over_frequency_is_on_the_page(periodic_study: Shown, tmp_path: Path) -> None:
     text = " ".join(page_of(periodic_study, tmp_path).text.split())
     assert "Torque over angle at the frequencies of the perturbation" in text
     assert (tmp_path / "figures" / "impedance.svg").exists()
