@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from tests.unit.analysis.report.cohorts import (
+from tests.study_anew.old_cohorts import (
     JOINT,
     PULL,
     day_tests,
@@ -24,7 +24,7 @@ from tests.unit.analysis.report.cohorts import (
     sensitivity_row,
     with_days,
 )
-from tests.unit.analysis.report.cohorts import Rating as OldRating
+from tests.study_anew.old_cohorts import Rating as OldRating
 
 from rigidimeter.analysis.statistics import fit_mixed, holm, two_groups
 from rigidimeter.analysis.study import (

@@ -10,7 +10,7 @@ from tests.study_anew.both import (
     old_answers,
 )
 from tests.study_anew.designs import random_study
-from tests.unit.analysis.report.cohorts import Design, made_study
+from tests.study_anew.old_cohorts import Design, made_study
 
 from rigidimeter.analysis.study import conclusion_rows
 

@@ -24,6 +24,7 @@ import scipy
 from rigidimeter.analysis.statistics import DayDifference, day_difference, ranksum
 from rigidimeter.analysis.study_anew.compared import By, Compared, Weights
 from rigidimeter.analysis.study_anew.measures import Measure
+from rigidimeter.analysis.study_anew.rows import grouped
 from rigidimeter.core.errors import UserError
 
 FEWEST_FOR_TEST = 3
@@ -246,7 +247,7 @@ def _weighed(rows: pd.DataFrame, of_days: Weights) -> pd.DataFrame:
     """Return the rows of days that have a weight, each with its own as `weight`."""
     keys = list(zip(rows["subject"], rows["day"], strict=True))
     weights = pd.Series([of_days.get(key, math.nan) for key in keys], rows.index, dtype=float)
-    counts = rows.groupby(["subject", "day"])["value"].transform("size")
+    counts = grouped(rows, "subject", "day")["value"].transform("size")
     return rows.assign(weight=weights / counts)[weights.notna()]
 
 

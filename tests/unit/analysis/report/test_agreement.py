@@ -13,7 +13,7 @@ import pytest
 from tests.unit.analysis.report.cohorts import Design, made_study
 from tests.unit.analysis.report.parsed_page import ParsedPage
 
-from rigidimeter.analysis.reading import estimates_document
+from rigidimeter.analysis.reading import Recording, estimates_document
 from rigidimeter.analysis.report import SECTIONS, shown_tables
 from rigidimeter.analysis.report import page as page_module
 from rigidimeter.analysis.report.page import render_page, write_report
@@ -355,7 +355,8 @@ def test_estimates_of_every_epoch(json, folder: Path, page: ParsedPage) -> None:
 
 def first_screen(study: StudyResult, column: str) -> list[Sequence[str]]:
     """Return the rows of the table of the first screen of `estimate` with this first heading."""
-    for _, table in tables_of(estimate_blocks(study)):
+    read = Recording(study.epochs, (), study.settings, ())
+    for _, table in tables_of(estimate_blocks(read, study.analysis)):
         if table.headings and table.headings[0] == column:
             return [row for row in table.rows if not isinstance(row, str)]
     raise AssertionError(column)
