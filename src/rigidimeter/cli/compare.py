@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -17,7 +17,7 @@ from rigidimeter.cli.terminal_tables import show
 from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.analysis.study import StudyResult
+    from rigidimeter.analysis.study_anew import StudyResult
 
 
 @reads_recordings
@@ -74,73 +74,66 @@ def compare(
       rigidimeter compare demo-study/analysis/estimates.json --reference DBS
       rigidimeter compare demo-study/ratings.csv --value score --by condition
     """
-    from rigidimeter.analysis import study as studies
+    from rigidimeter.analysis import study_anew as studies
+    from rigidimeter.analysis.report import Shown
     from rigidimeter.cli.comparison_text import comparison_blocks
-    from rigidimeter.cli.inputs import (
-        analyse_recordings,
-        analyse_study_folder,
-        study_files,
-        study_of,
-    )
+    from rigidimeter.cli.inputs import analyse_recordings, study_of
+    from rigidimeter.cli.study_inputs import analyse_study_folder, compare_recordings, study_files
 
-    outputs = (json_out, csv_out)
-    paths = recordings.paths
+    outputs, paths, pair = (json_out, csv_out), recordings.paths, (reference, other)
     is_json = any(path.suffix.lower() == ".json" for path in paths)
     if value and len(paths) != 1:
         raise UserError(f"--value takes one table, but {len(paths)} inputs were given")
     if not value and (folder := study_of(recordings, key)) is not None:
         keep_inputs(outputs, study_files(folder, key))
-        study = analyse_study_folder(
+        shown, analysed = analyse_study_folder(
             folder,
             recordings,
             key,
-            pair=(reference, other),
+            pair=pair,
             group=group,
             seed=seed,
             resamples=resamples,
         )
         try:
-            _write(study.result, *outputs, str(folder))
-            show(comparison_blocks(study.result, full=full))
-            _say_changes(study.result, folder, kept=group is None and not study.not_kept)
+            _write(shown.result, *outputs, str(folder))
+            show(comparison_blocks(shown, full=full))
+            _say_changes(shown.changes)
+            if group is None and not analysed.not_kept:
+                where = folder / "analysis"
+                echo(f"\nTables and JSON: {where}; most tables here: --full")
         finally:
-            status = study.say()
+            status = analysed.say()
         raise typer.Exit(status)
     keep_inputs(outputs, paths)
     if is_json and not value and len(paths) > 1:
         raise UserError("compare takes one JSON file of estimates, or recordings, not both")
-    analysed = None if value or is_json else analyse_recordings(recordings)[1]
+    of_files = None if value or is_json else analyse_recordings(recordings)
     status = 0
     try:
         with Meter("compare", 1.0) as meter:
-            found = studies.compare(
-                paths[0] if analysed is None else analysed.result.analysis,
-                other,
-                reference=reference,
-                value=value,
-                by=by,
-                session=session,
-                group=group,
-                seed=seed,
-                resamples=resamples,
-                progress=meter.advance,
-            )
-        if analysed is not None:
-            read = analysed.result
-            found = replace(found, epochs=read.epochs, settings=read.settings)
+            work: dict[str, Any] = {"seed": seed, "resamples": resamples}
+            work["progress"] = meter.advance
+            if of_files is not None:
+                read, analysed = of_files
+                found = compare_recordings(read, analysed.analysis, pair, group, **work)
+            else:
+                work |= {"value": value, "by": by, "session": session, "group": group}
+                found = studies.compare(paths[0], other, reference=reference, **work)
         _write(found, *outputs)
-        show(comparison_blocks(found, full=full))
+        epochs = () if of_files is None else of_files[0].epochs
+        show(comparison_blocks(Shown(found, epochs), full=full))
         say(found.notices)
     finally:
-        if analysed is not None:
-            status = analysed.say()
+        if of_files is not None:
+            status = of_files[1].say()
     raise typer.Exit(status)
 
 
 def _write(
     found: StudyResult, json_out: Path | None, csv_out: Path | None, place: str = ""
 ) -> None:
-    from rigidimeter.analysis.study import (
+    from rigidimeter.analysis.study_anew import (
         columns_of_rows,
         comparison_document,
         result_table,
@@ -156,12 +149,10 @@ def _write(
         write_dictionary_beside(csv_out, "comparisons", columns_of_rows(rows))
 
 
-def _say_changes(found: StudyResult, folder: Path, *, kept: bool) -> None:
-    from rigidimeter.analysis.study import UNCHANGED
+def _say_changes(changes: Sequence[str]) -> None:
+    from rigidimeter.analysis.study_anew import UNCHANGED
 
-    if found.changes and found.changes != (UNCHANGED,):
+    if changes and changes != (UNCHANGED,):
         echo("\nSince the last analysis:")
-        for change in found.changes:
+        for change in changes:
             echo(f"  {change}")
-    if kept:
-        echo(f"\nTables and JSON: {folder / 'analysis'}; most tables here: --full")

@@ -10,20 +10,22 @@ from rigidimeter.core.lazy_names import lazy_names
 if TYPE_CHECKING:
     from rigidimeter.analysis.report.contents import Figure, Section, paragraph
     from rigidimeter.analysis.report.make_report import report
-    from rigidimeter.analysis.report.page import shown_tables, source_names
-    from rigidimeter.analysis.report.plots import plot
+    from rigidimeter.analysis.report.page import data_uri, shown_tables, shown_text, source_names
     from rigidimeter.analysis.report.report_folder import inputs_seen_from, why_not_own
     from rigidimeter.analysis.report.sections import SECTIONS
+    from rigidimeter.analysis.report.shown import Shown
 
 __all__ = [
     "SECTIONS",
     "Figure",
     "Section",
+    "Shown",
+    "data_uri",
     "inputs_seen_from",
     "paragraph",
-    "plot",
     "report",
     "shown_tables",
+    "shown_text",
     "source_names",
     "why_not_own",
 ]
@@ -33,9 +35,9 @@ __getattr__ = lazy_names(
     {
         "contents": ("Figure", "Section", "paragraph"),
         "make_report": ("report",),
-        "page": ("shown_tables", "source_names"),
-        "plots": ("plot",),
+        "page": ("data_uri", "shown_tables", "shown_text", "source_names"),
         "report_folder": ("inputs_seen_from", "why_not_own"),
         "sections": ("SECTIONS",),
+        "shown": ("Shown",),
     },
 )

@@ -20,8 +20,8 @@ import numpy as np
 
 from rigidimeter.analysis.estimation import METHODS, Method
 from rigidimeter.analysis.report.references import Cited, Prose
-from rigidimeter.analysis.study import RATING, Condition, StudyResult
-from rigidimeter.analysis.study.drawing import channel_facts
+from rigidimeter.analysis.report.shown import Shown
+from rigidimeter.analysis.study_anew import RATING, Compared, Condition, StudyResult, result_table
 from rigidimeter.core.records import Epoch, Fit
 from rigidimeter.core.version import __version__
 from rigidimeter.core.words import condition_name, decimals, fixed, number, plural, series
@@ -47,10 +47,11 @@ _BY = {
 }
 
 
-def methods_prose(result: StudyResult) -> Prose:
+def methods_prose(shown: Shown) -> Prose:
     """Return the paragraphs of methods with their references."""
     cite = Cited()
-    text = _template().render(_facts(result), result=result, cite=cite)
+    about = {"study": shown.study, "result": shown.result, "epochs": shown.epochs}
+    text = _template().render(_facts(shown), shown=shown, cite=cite, **about)
     paragraphs = (re.sub(r" *\n *", " ", each).strip() for each in re.split(r"\n{2,}", text))
     return Prose(tuple(each for each in paragraphs if each), tuple(cite.found.values()))
 
@@ -83,34 +84,36 @@ def _word(count: int) -> str:
     return _WORDS[count] if count < len(_WORDS) else str(count)
 
 
-def _facts(result: StudyResult) -> dict[str, Any]:
-    """Return what the template names, besides the result."""
-    analysis, settings, found = result.analysis, result.settings, result.ratings
+def _facts(shown: Shown) -> dict[str, Any]:
+    """Return what the template names, besides the study, its result and its epochs."""
+    result, study, analysis = shown.result, shown.study, shown.analysis
+    settings, ratings = study.settings, study.ratings
     scored = {(score.source, score.epoch) for score in analysis.scores}
-    days = {(s.subject, s.day) for s in result.sessions}
-    tested = [c.days for c in result.comparisons if c.days and not math.isnan(c.days.p)]
-    day_tests = day_tests_in_words(result)
-    out = {(e.source, e.epoch): e.by for e in result.exclusions}
+    days = {(s.subject, s.day) for s in study.sessions}
+    by_days = _by_days(result)
+    tested = [one for one in by_days if one.tested]
+    out = {(e.source, e.epoch): e.by for e in study.exclusions}
     counts = Counter[str](out.values())
     held = ""
     if result.several_subjects:
         held = "of the same subject in all conditions"
     elif math.isfinite(analysis.inertia_kg_m2):
         held = f"of all conditions ({number(analysis.inertia_kg_m2)} kg·m²)"
-    fit = None if found is None else found.fit
+    fit = None if ratings is None else ratings.fit
     estimated = [name for name in fit.offsets if name not in fit.inseparable] if fit else []
-    methods = dict.fromkeys(row.method for row in result.sensitivity)
+    # That of the ratings is told with their model.
+    day_tests = [one.test for one in by_days if one.test and one.measure != RATING]
     return {
         **{name: getattr(settings, name) for name in ("controller", "guard", "prbs", "scores")},
         "sinusoid": settings.sinusoid,
         "analysis": analysis,
-        "subjects": len({s.subject for s in result.sessions}),
+        "subjects": len({s.subject for s in study.sessions}),
         "days": len(days),
-        "split": _split(result, len(days)),
-        "perturbed": [e for e in result.epochs if (e.source, e.label) not in scored],
-        "imposed": [e for e in result.epochs if (e.source, e.label) in scored],
-        "conditions": [text for c in result.conditions if (text := _stimulation(c))],
-        "rates": ", ".join(_rates(result)),
+        "split": _split(result),
+        "perturbed": [e for e in shown.epochs if (e.source, e.label) not in scored],
+        "imposed": [e for e in shown.epochs if (e.source, e.label) in scored],
+        "conditions": [text for c in study.conditions if (text := _stimulation(c))],
+        "rates": ", ".join(_rates(shown)),
         "method": method_of(analysis.method),
         "band": _band(analysis.fits),
         "corrected": sum(delay.corrected for delay in analysis.delays),
@@ -118,34 +121,35 @@ def _facts(result: StudyResult) -> dict[str, Any]:
         "cycles": sorted({s.n_cycles for s in analysis.scores if s.outcome.included}),
         "excluded": out,
         "excluded_by": [f"{counts[by]} {text}" for by, text in _BY.items() if counts[by]],
-        "ratings": found,
-        "examiners": 0 if found is None else len({row.examiner for row in found.rows}),
+        "ratings": ratings,
+        "examiners": 0 if ratings is None else ratings.rows["rater"].nunique(),
         "offsets": series([f"each {OFFSETS.get(name, name)}" for name in estimated]),
-        "by_epochs": any(c.test is not None for c in result.comparisons),
+        "by_epochs": any(one.tested for one in result.values if one.other == study.other),
         "by_days": tested,
-        "primary": _primary(result),
+        "primary": _primary(tested),
         "day_tests": day_tests,
         "all_paired": all(words.startswith("paired") for words in day_tests),
-        "day_medians": any(not math.isnan(one.p_days) for one in tested),
-        "effects": [c.effects.method for c in result.comparisons if c.effects is not None],
-        "other_methods": [f"{name}, {method_of(name).title}" for name in methods],
-        "both_inertias": len({row.inertia for row in result.sensitivity}) > 1,
-        "libraries": result.provenance.get("libraries", ""),
+        "day_medians": any(getattr(one.statistic, "p_days", math.nan) > 0 for one in tested),
+        "effects": [one.method for one in result.effects.values()],
+        "other_methods": [
+            f"{name}, {method_of(name).title}"
+            for name in dict.fromkeys(one.method for one in result.methods)
+        ],
+        "both_inertias": len({one.inertia for one in result.methods}) > 1,
+        "libraries": shown.provenance.get("libraries", ""),
     }
 
 
-def _split(result: StudyResult, n_days: int) -> str:
+def _split(result: StudyResult) -> str:
     """Return in brackets how many days each condition has, where there are several."""
-    by_condition = {
-        c.name: {(s.subject, s.day) for s in result.sessions if s.condition == c.name}
-        for c in result.conditions
-    }
+    rows = result_table(result, "conditions")
     each = [
-        f"{plural(len(own), 'day')} in {condition_name(name)}"
-        for name, own in by_condition.items()
-        if own
+        f"{plural(row['days'], 'day')} in {condition_name(row['name'])}"
+        for row in rows
+        if row["days"]
     ]
-    both = len({(s.subject, s.day, s.condition) for s in result.sessions}) - n_days
+    sessions = result.study.sessions
+    both = len({s[:3] for s in sessions}) - len({s[:2] for s in sessions})
     if len(each) > 1 and both > 0:
         each.append(f"{both} of them in more than one condition")
     return f" ({', '.join(each)})" if len(each) > 1 else ""
@@ -166,10 +170,10 @@ def _own(epochs: Sequence[Epoch]) -> bool:
     return bool(epochs) and all(e.excitation_hz is not None or e.motion is not None for e in epochs)
 
 
-def _rates(result: StudyResult) -> Iterator[str]:
+def _rates(shown: Shown) -> Iterator[str]:
     names = {"torque_nm": "torque", "angle_rad": "angle", "velocity_rad_s": "velocity"}
     rates: dict[str, list[str]] = {}
-    facts = [channel for channels in channel_facts(result) for channel in channels]
+    facts = [channel for channels in shown.channels for channel in channels]
     for key, name in names.items():
         found = [c.mean_rate_hz for c in facts if c.name == key and math.isfinite(c.mean_rate_hz)]
         if found:
@@ -177,15 +181,15 @@ def _rates(result: StudyResult) -> Iterator[str]:
     return (f"{series(group)} at {rate} samples/s" for rate, group in rates.items())
 
 
-def commanded(result: StudyResult) -> str:
+def commanded(shown: Shown) -> str:
     """Return the lowest and the highest commanded torque of the included epochs, as recorded.
 
     Both as a range where epochs differ; nothing where no included epoch has its perturbation.
     """
-    out = {(one.source, one.epoch) for one in result.exclusions}
+    out = {(one.source, one.epoch) for one in shown.study.exclusions}
     reached_nm = [
         (facts.lowest, facts.highest)
-        for epoch, each in zip(result.epochs, channel_facts(result), strict=True)
+        for epoch, each in zip(shown.epochs, shown.channels, strict=True)
         for facts in each
         if facts.name == "perturbation_nm" and facts.lowest < facts.highest
         if (epoch.source, epoch.label) not in out
@@ -207,21 +211,19 @@ def _band(fits: Iterable[Fit]) -> tuple[float, float] | None:
     return bands.pop() if len(bands) == 1 else None
 
 
-def day_tests_in_words(result: StudyResult) -> list[str]:
-    """Return the test by days of each measure; that of the ratings is told with their model."""
-    return [
-        c.days.test for c in result.comparisons if c.days and c.days.test and c.measure != RATING
-    ]
+def _by_days(result: StudyResult) -> list[Compared]:
+    """Return the tests of the main pair by days, in the order of the measures."""
+    main = [one for one in result.comparisons if one.other == result.study.other]
+    order = [one.measure for one in result.values]
+    return sorted((one for one in main if one.by == "days"), key=lambda o: order.index(o.measure))
 
 
-def _primary(result: StudyResult) -> str:
+def _primary(tests: Sequence[Compared]) -> str:
     """Return the primary measures, where others were compared beside them; else empty."""
-    names = [c.measure for c in result.comparisons if c.days and not math.isnan(c.days.p)]
-    primary = [one for one in names if result.primary.role(one) == "primary"]
-    declared: list[str] = [*result.primary.table.measures]
-    if result.primary.table.rule == "sequence":
-        primary.sort(key=lambda one: declared.index(one.name))
-    return series([one.short for one in primary]) if len(primary) < len(names) else ""
+    primary = [one for one in tests if one.role == "primary"]
+    if primary and primary[0].family.rule == "sequence":
+        primary.sort(key=lambda one: one.family.order.index(one.measure.name))
+    return series([one.measure.short for one in primary]) if len(primary) < len(tests) else ""
 
 
 def method_of(name: str) -> Method:

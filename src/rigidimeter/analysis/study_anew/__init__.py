@@ -5,7 +5,12 @@ It takes the place of `analysis.study` when it is complete.
 
 from rigidimeter.analysis.study_anew.any_table import Columns, table_study
 from rigidimeter.analysis.study_anew.caveats import groups_of
-from rigidimeter.analysis.study_anew.compare_input import analysis_study, compare, conditions
+from rigidimeter.analysis.study_anew.compare_input import (
+    analysis_study,
+    compare,
+    conditions,
+    estimates_study,
+)
 from rigidimeter.analysis.study_anew.compared import Compared
 from rigidimeter.analysis.study_anew.comparisons import (
     EffectPair,
@@ -28,6 +33,7 @@ from rigidimeter.analysis.study_anew.difference_rows import (
 from rigidimeter.analysis.study_anew.document import (
     TABLES,
     TEST,
+    Rows,
     columns_of_rows,
     comparison_document,
     comparison_rows,
@@ -42,7 +48,16 @@ from rigidimeter.analysis.study_anew.from_folder import (
     load_study,
     prepare_study,
 )
-from rigidimeter.analysis.study_anew.measures import MEASURES, RATING, SCORE, Measure, Primary
+from rigidimeter.analysis.study_anew.load import load as load_recordings
+from rigidimeter.analysis.study_anew.load import place_of, source_of, without_excluded
+from rigidimeter.analysis.study_anew.measures import (
+    LEVEL,
+    MEASURES,
+    RATING,
+    SCORE,
+    Measure,
+    Primary,
+)
 from rigidimeter.analysis.study_anew.rating_document import (
     Agreement,
     Relation,
@@ -54,7 +69,12 @@ from rigidimeter.analysis.study_anew.rating_document import (
     relations,
 )
 from rigidimeter.analysis.study_anew.rating_table import table_ratings
-from rigidimeter.analysis.study_anew.ratings import corrected, ratings_of
+from rigidimeter.analysis.study_anew.ratings import (
+    corrected,
+    fit_scores,
+    ratings_of,
+    study_ratings,
+)
 from rigidimeter.analysis.study_anew.results import TESTS_SHARE, StudyResult, conclude_study
 from rigidimeter.analysis.study_anew.rows import (
     FIELDS,
@@ -77,15 +97,18 @@ from rigidimeter.analysis.study_anew.sentences import (
     statement,
     statements,
 )
+from rigidimeter.analysis.study_anew.session_checks import Session
 from rigidimeter.analysis.study_anew.store import UNCHANGED, keep, kept_study
 from rigidimeter.analysis.study_anew.study import (
     Condition,
     Deviation,
     Exclusion,
     LeftOut,
+    Naming,
     Ratings,
     SessionEntry,
     Study,
+    naming,
 )
 from rigidimeter.analysis.study_anew.tests import by_units, by_values
 from rigidimeter.analysis.study_anew.verdicts import conclude, reasons, traffic_light

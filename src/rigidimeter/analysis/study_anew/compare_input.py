@@ -114,7 +114,7 @@ def compare(
         share = TESTS_SHARE
         study = analyse(loaded, progress=lambda done: progress((1.0 - share) * done))
     else:
-        study = _of_estimates(x if isinstance(x, Analysis) else Path(x), pair, group)
+        study = estimates_study(x if isinstance(x, Analysis) else Path(x), pair, group)
     return conclude_study(
         study, seed=seed, resamples=resamples, progress=lambda done: progress(share * done)
     )
@@ -127,9 +127,32 @@ def _names(value: str | Sequence[str] | None) -> list[str]:
     return listed
 
 
-def _of_estimates(
-    x: Analysis | Path, wanted: tuple[str | None, str | None], group: str | None
+def estimates_study(
+    x: Analysis | Path,
+    wanted: tuple[str | None, str | None] = (None, None),
+    group: str | None = None,
+    *,
+    epochs: Sequence[Epoch] = (),
+    settings: Settings | None = None,
 ) -> Study:
+    """Return the study of estimates, of the conditions that are wanted: at least two are needed.
+
+    Parameters
+    ----------
+    x : Analysis or path
+        Estimates, or the JSON file of them.
+    wanted : (str or None, str or None)
+        Reference and other. Without `other` each further condition is compared, too.
+    group : str, optional
+        Estimates name none: it is refused.
+    epochs, settings
+        As `analysis_study`.
+
+    Raises
+    ------
+    UserError
+        If there are not two conditions, or a name is unknown.
+    """
     if isinstance(x, Path) and (
         x.is_dir() or any(x.suffix.lower() in reader.suffixes for reader in READERS)
     ):
@@ -143,7 +166,7 @@ def _of_estimates(
     known = conditions(analysis)
     pair = chosen_pair(known, wanted)
     further = () if wanted[1] is not None else [name for name in known if name not in pair]
-    return analysis_study(analysis, pair, further)
+    return analysis_study(analysis, pair, further, epochs=epochs, settings=settings)
 
 
 def conditions(analysis: Analysis) -> tuple[str, ...]:

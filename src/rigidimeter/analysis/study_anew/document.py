@@ -177,8 +177,8 @@ def condition_names(study: Study) -> tuple[str, ...]:
     """Return all conditions in the order of the study or the protocol, then as recorded."""
     order = [each.name for each in study.conditions]
     order = order or [block.condition for block in study.settings.protocol.blocks]
-    recorded_ones = map(str, study.rows["condition"].drop_duplicates())
-    names = dict.fromkeys([*filter(None, study.pair), *recorded_ones])
+    of_epochs = study.rows[study.rows["scope"] != "all"]  # that of all epochs has no condition
+    names = dict.fromkeys([*filter(None, study.pair), *map(str, of_epochs["condition"])])
     return tuple(sorted(names, key=lambda n: order.index(n) if n in order else len(order)))
 
 
@@ -227,7 +227,7 @@ def _precision(result: StudyResult) -> Iterator[dict[str, Any]]:
     study = result.study
     if study.other and any(one.tested for one in result.comparisons if one.other == study.other):
         return
-    yield from precisions_of_each(study.rows, study.pair)
+    yield from precisions_of_each(study.rows, dict.fromkeys(study.pair))
 
 
 def _conditions(result: StudyResult) -> Iterator[dict[str, Any]]:

@@ -86,7 +86,7 @@ _WHO = (
 )
 _WHAT = ("value", "se", "low", "high", "bias")
 _EMPTY = {str: "", float: np.nan, bool: True}
-_DTYPE = {str: "category", float: "float64", bool: "bool"}
+_DTYPE: Mapping[type, str] = {float: "float64", bool: "bool"}
 
 
 def as_rows(records: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
@@ -112,7 +112,18 @@ def as_rows(records: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
 
 def typed(rows: pd.DataFrame) -> pd.DataFrame:
     """Return rows whose text is plain as the table has them: columns in order, each of its type."""
-    return rows[list(FIELDS)].astype({name: _DTYPE[field.kind] for name, field in FIELDS.items()})
+    found = rows[list(FIELDS)].astype(
+        {name: _DTYPE[field.kind] for name, field in FIELDS.items() if name not in TEXT}
+    )
+    return found.assign(**{name: _text(rows[name]) for name in TEXT})
+
+
+def _text(cells: pd.Series) -> pd.Series:
+    """Return text as categories; as it is where names of files are not UTF-8: pandas refuses it."""
+    try:
+        return cells.astype("category")
+    except UnicodeEncodeError:
+        return cells.astype(object)
 
 
 def together(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
@@ -125,11 +136,17 @@ def together(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
         return as_rows(())
     joined = {
         name: pd.Series(pd.api.types.union_categoricals([part[name] for part in parts]))
-        if name in TEXT
+        if all(isinstance(part[name].dtype, pd.CategoricalDtype) for part in parts)
         else pd.concat([part[name] for part in parts], ignore_index=True)
         for name in FIELDS
     }
     return pd.DataFrame(joined)
+
+
+def grouped(rows: pd.DataFrame, *columns: str) -> Any:
+    """Return rows by the labels in some columns: as `groupby`, which refuses names not in UTF-8."""
+    codes = [pd.factorize(rows[name].to_numpy(dtype=object))[0] for name in columns]
+    return rows.groupby(codes, sort=False)
 
 
 def recorded(rows: pd.DataFrame, measure: str) -> pd.DataFrame:

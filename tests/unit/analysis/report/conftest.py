@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from rigidimeter.analysis.study import StudyResult, compare_analysis, estimate
+from rigidimeter.analysis.recording import estimate
+from rigidimeter.analysis.report import Shown
+from rigidimeter.analysis.study_anew import analysis_study, conclude_study
 from rigidimeter.core.records import Analysis, Channel, Epoch, Fit, Motion, Notice, Outcome, Score
 from rigidimeter.core.settings import Settings
 from rigidimeter.model import JointDynamics
@@ -115,23 +117,25 @@ def scaled(joint: JointDynamics, by: float) -> JointDynamics:
     )
 
 
-MakeStudy = Callable[..., StudyResult]
+MakeStudy = Callable[..., Shown]
 
 
 @pytest.fixture(scope="session")
 def make_study() -> MakeStudy:
-    """Return a function that makes a study from epochs: all of it, or with parts replaced."""
+    """Return a function that makes what a page shows of epochs: all of it, or parts replaced."""
 
-    def make(epochs: list[Epoch], **parts: object) -> StudyResult:
+    def make(
+        epochs: list[Epoch],
+        analysis: Analysis | None = None,
+        notices: tuple[Notice, ...] = (),
+        **parts: object,
+    ) -> Shown:
         settings = Settings()
-        analysis = parts.pop("analysis", None) or estimate(epochs, settings=settings)
-        fields = {
-            "settings": settings,
-            "epochs": tuple(epochs),
-            "provenance": {"program": "rigidimeter 0"},
-        }
-        found = compare_analysis(analysis, title="A study", resamples=199)
-        return replace(found, **{**fields, **parts})
+        analysis = analysis or estimate(epochs, settings=settings)
+        study = analysis_study(analysis, epochs=epochs, settings=settings)
+        result = conclude_study(replace(study, notices=notices), resamples=199)
+        facts = {"title": "A study", "provenance": {"program": "rigidimeter 0"}}
+        return Shown(result, tuple(epochs), **{**facts, **parts})
 
     return make
 
@@ -162,7 +166,7 @@ def epochs() -> list[Epoch]:
 
 
 @pytest.fixture(scope="session")
-def periodic_study(make_study: MakeStudy) -> StudyResult:
+def periodic_study(make_study: MakeStudy) -> Shown:
     """Return two epochs of each condition, each begun elsewhere in the sequence."""
     rng = np.random.default_rng(11)
     return make_study(
@@ -175,7 +179,7 @@ def periodic_study(make_study: MakeStudy) -> StudyResult:
 
 
 @pytest.fixture(scope="session")
-def study(epochs: list[Epoch], make_study: MakeStudy) -> StudyResult:
+def study(epochs: list[Epoch], make_study: MakeStudy) -> Shown:
     return make_study(epochs, notices=(Notice("warning", "one column was empty"),))
 
 

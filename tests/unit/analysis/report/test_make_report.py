@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 from rigidimeter.analysis.reading import read
-from rigidimeter.analysis.report import report
-from rigidimeter.analysis.study import StudyResult, compare
+from rigidimeter.analysis.report import Shown, report
+from rigidimeter.analysis.study_anew import compare
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import Epoch
 
@@ -25,9 +25,7 @@ def csv_file(epochs: list[Epoch], tmp_path_factory: pytest.TempPathFactory) -> P
     return path
 
 
-def test_estimates_give_a_page_without_figures_of_signals(
-    study: StudyResult, tmp_path: Path
-) -> None:
+def test_estimates_give_a_page_without_figures_of_signals(study: Shown, tmp_path: Path) -> None:
     page = report(study.analysis, tmp_path, "Estimates alone")
     text = page.read_text(encoding="utf-8")
     assert "<h1>Estimates alone</h1>" in text
@@ -51,7 +49,7 @@ def test_a_path_and_what_is_read_from_it_give_the_same_page(csv_file: Path, tmp_
         assert [x for x in a if "made (UTC)" not in x] == [x for x in b if "made (UTC)" not in x]
 
 
-def test_a_folder_that_cannot_be_written_says_so(study: StudyResult, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_says_so(study: Shown, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match="the report cannot be written"):
         report(study.analysis, tmp_path / "file")

@@ -12,8 +12,9 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
+from rigidimeter.analysis.recording import estimate
+from rigidimeter.analysis.report import Shown
 from rigidimeter.analysis.report.page import contents, render_page, tables, write_report
-from rigidimeter.analysis.study import StudyResult, estimate
 from rigidimeter.core.findings import Finding, Level
 from rigidimeter.core.records import Epoch, Notice, Outcome
 from rigidimeter.core.words import interval, with_error
@@ -55,17 +56,17 @@ class Page(HTMLParser):
         return [value for _, key, value in self.attributes if key == name]
 
 
-def page_of(study: StudyResult, out: Path) -> Page:
+def page_of(study: Shown, out: Path) -> Page:
     return Page(write_report(study, out).read_text(encoding="utf-8"))
 
 
-def words_of(study: StudyResult) -> str:
+def words_of(study: Shown) -> str:
     """Return the words of the page, whose figures are not drawn."""
     return " ".join(Page(render_page(study, contents(study), {})).text.split())
 
 
 @pytest.fixture(scope="module")
-def written(study: StudyResult, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def written(study: Shown, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_report(study, tmp_path_factory.mktemp("report"))
 
 
@@ -97,7 +98,7 @@ def test_the_page_runs_its_own_script_alone(written: Path) -> None:
     assert "without restriction" in script
 
 
-def test_every_table_is_written_with_all_of_its_values(written: Path, study: StudyResult) -> None:
+def test_every_table_is_written_with_all_of_its_values(written: Path, study: Shown) -> None:
     made = tables(contents(study))
     names = {path.stem for path in (written.parent / "tables").iterdir()}
     assert names == {*made, "data-dictionary"}
@@ -151,7 +152,7 @@ def test_page_is_accessible(page: Page) -> None:
     assert page.tags.count("h1") == 1
 
 
-def test_page_says_what_was_done(page: Page, study: StudyResult) -> None:
+def test_page_says_what_was_done(page: Page, study: Shown) -> None:
     text = " ".join(page.text.split())
     assert "the arm touched the position limit" in text
     assert "one column was empty" in text
@@ -162,9 +163,7 @@ def test_page_says_what_was_done(page: Page, study: StudyResult) -> None:
     assert "virtual subject" not in text.lower()
 
 
-def test_the_same_study_gives_the_same_bytes(
-    study: StudyResult, written: Path, tmp_path: Path
-) -> None:
+def test_the_same_study_gives_the_same_bytes(study: Shown, written: Path, tmp_path: Path) -> None:
     again = write_report(study, tmp_path / "deep" / "er")
     files = [path for path in written.parent.rglob("*") if path.is_file()]
     assert len(files) > 20
@@ -173,7 +172,7 @@ def test_the_same_study_gives_the_same_bytes(
         assert other.read_bytes() == path.read_bytes()
 
 
-def test_virtual_epochs_are_declared(study: StudyResult, make_study) -> None:
+def test_virtual_epochs_are_declared(study: Shown, make_study) -> None:
     one = dataclasses.replace(study.epochs[1], virtual=True)
     mixed = make_study([one, study.epochs[2]])
     text = words_of(mixed)
@@ -181,7 +180,7 @@ def test_virtual_epochs_are_declared(study: StudyResult, make_study) -> None:
     assert "1 of 2 epochs were made by a simulation" in text
 
 
-def test_special_characters_are_escaped(study: StudyResult, make_study, tmp_path: Path) -> None:
+def test_special_characters_are_escaped(study: Shown, make_study, tmp_path: Path) -> None:
     """Also what is no text: a byte of a file's name that is not UTF-8."""
     odd = f"{NASTY}caf\udce9"
     epochs = [
@@ -204,7 +203,7 @@ def test_special_characters_are_escaped(study: StudyResult, make_study, tmp_path
         ET.fromstring(path.read_bytes())
 
 
-def test_page_tells_what_the_estimates_know(page: Page, study: StudyResult) -> None:
+def test_page_tells_what_the_estimates_know(page: Page, study: Shown) -> None:
     text = " ".join(page.text.split())
     analysis = study.analysis
     assert "Method: iv (instrumental variables" in text
@@ -219,9 +218,9 @@ def test_page_tells_what_the_estimates_know(page: Page, study: StudyResult) -> N
     assert "Torque over angle" not in text  # needs a perturbation that repeats
 
 
-def test_a_method_asked_for_by_name_says_so(study: StudyResult, make_study) -> None:
+def test_a_method_asked_for_by_name_says_so(study: Shown, make_study) -> None:
     epochs = [study.epochs[1]]
-    made = make_study(epochs, analysis=estimate(epochs, "published", settings=study.settings))
+    made = make_study(epochs, analysis=estimate(epochs, "published", settings=study.study.settings))
     text = words_of(made)
     assert (
         "Method: published (least squares as the paper prints it). It was requested by name."
@@ -233,9 +232,7 @@ def test_a_method_asked_for_by_name_says_so(study: StudyResult, make_study) -> N
 
 
 @pytest.mark.usefixtures("no_figures")
-def test_the_joint_over_frequency_is_on_the_page(
-    periodic_study: StudyResult, tmp_path: Path
-) -> None:
+def test_the_joint_over_frequency_is_on_the_page(periodic_study: Shown, tmp_path: Path) -> None:
     text = " ".join(page_of(periodic_study, tmp_path).text.split())
     assert "Torque over angle at the frequencies of the perturbation" in text
     assert (tmp_path / "figures" / "impedance.svg").exists()
@@ -280,7 +277,7 @@ def test_no_findings_say_so(make_study, make_analysis) -> None:
 
 
 @pytest.mark.usefixtures("no_figures")
-def test_one_condition_is_summarised(study: StudyResult, make_study, tmp_path: Path) -> None:
+def test_one_condition_is_summarised(study: Shown, make_study, tmp_path: Path) -> None:
     page = page_of(make_study([e for e in study.epochs if e.condition == "DBS"]), tmp_path)
     assert "No two conditions were compared." in page.text
     assert "Medians and quartiles by condition" in page.text
@@ -327,7 +324,7 @@ def test_degenerate_studies(
 
 def test_short_samples_say_what_their_interval_is(make_study, make_analysis) -> None:
     made = make_study([], analysis=make_analysis({"OFF": 3, "DBS": 3}))
-    assert any(comparison.test is not None for comparison in made.comparisons)
+    assert any(one.tested for one in made.result.values)
     text = words_of(made)
     assert "too few values for an interval at this confidence" in text
 
@@ -342,5 +339,5 @@ def test_a_recording_without_a_condition_is_not_compared_with_itself(
     make_study, make_analysis
 ) -> None:
     made = make_study([], analysis=make_analysis({"": 4}))
-    assert not any(comparison.paired for comparison in made.comparisons)
+    assert not made.result.comparisons
     assert "(no condition) against" not in words_of(made)

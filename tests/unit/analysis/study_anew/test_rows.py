@@ -10,7 +10,6 @@ from tests.unit.analysis.report.cohorts import made_study
 from rigidimeter.analysis.study_anew import (
     FIELDS,
     Condition,
-    SessionEntry,
     as_rows,
     blocks,
     counting,
@@ -39,10 +38,10 @@ def analysis(*fits: Fit, **parts) -> Analysis:
 
 @pytest.fixture(scope="module")
 def study_rows() -> pd.DataFrame:
-    result = made_study()
-    sessions = {s.source: SessionEntry(**vars(s)) for s in result.sessions}
+    made = made_study()
+    sessions = {one.source: one for one in made.study.sessions}
     conditions = [Condition("DBS", "on", 130.0, 0.32, "mA", 60.0)]
-    return estimate_rows({"iv": result.analysis}, sessions, result.epochs, conditions)
+    return estimate_rows({"iv": made.analysis}, sessions, made.epochs, conditions)
 
 
 def test_columns_and_their_types(study_rows: pd.DataFrame) -> None:

@@ -12,8 +12,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MultipleLocator
 
-from rigidimeter.analysis.report.curves import frequency_axis
-from rigidimeter.analysis.report.style import (
+from rigidimeter.analysis.figures.curves import frequency_axis
+from rigidimeter.analysis.figures.style import (
     GREY,
     condition_colours,
     drawable,

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.report.design_folder import draw_bode
-from rigidimeter.analysis.report.style import drawn as figure_of
-from rigidimeter.analysis.report.style import svg_text
+from rigidimeter.analysis.figures import draw_bode
+from rigidimeter.analysis.figures import drawn as figure_of
 from rigidimeter.core.settings import Settings, parse_settings
 from rigidimeter.model import Loop, loop_stability
 
@@ -56,7 +55,3 @@ def test_an_unstable_loop_says_so_and_a_loop_that_never_crosses_is_drawn() -> No
     assert figure.axes[0].get_legend().get_texts()[0].get_text() == "OFF: unstable"
     _, figure = drawn(parse_settings({"subject": {"OFF": {"stiffness_nm_rad": 0.0}}}))
     assert "no crossing" in figure.axes[0].get_legend().get_texts()[0].get_text()
-
-
-def test_the_same_loop_gives_the_same_text() -> None:
-    assert svg_text(drawn(Settings())[1]) == svg_text(drawn(Settings())[1])

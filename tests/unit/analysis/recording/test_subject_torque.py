@@ -7,8 +7,7 @@ import pytest
 from tests.known_joint import angle_rad, torque_nm
 
 from rigidimeter.analysis.reading import read
-from rigidimeter.analysis.study import estimate
-from rigidimeter.analysis.study.subject_torque_table import subject_torque, write_subject_torque
+from rigidimeter.analysis.recording import estimate, subject_torque, write_subject_torque
 from rigidimeter.core.errors import UserError
 
 RATE_HZ = 200.0

@@ -15,8 +15,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from rigidimeter.analysis.estimation import aligned, epoch_signals, longest_part
-from rigidimeter.analysis.reading import Recording
-from rigidimeter.analysis.report.curves import (
+from rigidimeter.analysis.figures.curves import (
     EXCITATION_HEIGHTS,
     EXCITATION_SIZE,
     TORQUE_HEIGHTS,
@@ -29,11 +28,23 @@ from rigidimeter.analysis.report.curves import (
     shown_channels,
     torque_limit_nm,
 )
-from rigidimeter.analysis.report.estimate_points import draw_epochs, draw_pairs, quantities
-from rigidimeter.analysis.report.interval_rows import draw_effects, effects_label, effects_size
-from rigidimeter.analysis.report.points import draw_comparisons, draw_days
-from rigidimeter.analysis.report.style import condition_colours, drawable, plain_ticks, styled
-from rigidimeter.analysis.study import Comparison, StudyResult
+from rigidimeter.analysis.figures.estimate_points import draw_epochs, draw_pairs, quantities
+from rigidimeter.analysis.figures.interval_rows import (
+    draw_effects,
+    effect_rows,
+    effects_label,
+    effects_size,
+)
+from rigidimeter.analysis.figures.points import (
+    Values,
+    draw_days,
+    draw_measures,
+    drawn_values,
+    values_of,
+)
+from rigidimeter.analysis.figures.style import condition_colours, drawable, plain_ticks, styled
+from rigidimeter.analysis.reading import Recording
+from rigidimeter.analysis.study_anew import StudyResult, measures_of
 from rigidimeter.core.records import Analysis, Channel, Epoch, Fit
 from rigidimeter.core.words import condition_name, epoch_name, short_names
 from rigidimeter.planning import Design, tick_times_s
@@ -158,31 +169,29 @@ def plot_result(
     result: StudyResult, measures: Sequence[str] | None = None, axes: Any = None
 ) -> Panels:
     """Draw every value of each measure by condition."""
-    compared = [_compared(result, name) for name in measures or ()] or [
-        c for c in result.comparisons if c.measure.origin != "ratings" and c.observations
-    ]
-    if not compared:
+    found = [_values(result, name) for name in measures or ()] or drawn_values(result)
+    if not found:
         raise ValueError("the comparison has no values to plot")
-    size = 7.4, 0.2 + 2.6 * -(-len(compared) // 3)
-    shown = compared, condition_colours(result.condition_names)
-    return _plotted(axes, len(compared), size, draw_comparisons, *shown, columns=3)
+    size = 7.4, 0.2 + 2.6 * -(-len(found) // 3)
+    shown = found, condition_colours(result.condition_names)
+    return _plotted(axes, len(found), size, draw_measures, *shown, columns=3)
 
 
 def plot_days(result: StudyResult, measure: str = "stiffness_nm_rad", axes: Any = None) -> Axes:
     """Draw a measure day by day."""
-    c = _compared(result, measure)
-    if not c.day_medians:
+    v = _values(result, measure)
+    if v.measure.origin == "ratings" or not any(v.rows["day"]):
         raise ValueError(f"{measure} has no days: they are known of a study folder alone")
     order = [condition_name(name) for name in result.condition_names]
-    drawn: Axes = _plotted(axes, 1, (7.4, 2.9), draw_days, c, order)[0]
+    drawn: Axes = _plotted(axes, 1, (7.4, 2.9), draw_days, v, order)[0]
     return drawn
 
 
 def plot_effects(result: StudyResult, axes: Any = None) -> Axes:
     """Draw the effect size of each measure with its interval."""
-    found = [(c, c.effects) for c in result.comparisons if c.effects is not None]
+    found = effect_rows(result)
     if not found:
-        why = next((c.remark for c in result.comparisons if c.remark), "nothing was compared")
+        why = next((one.remark for one in result.values if one.remark), "nothing was compared")
         raise ValueError(f"no measure has an effect size: {why}")
     drawing = draw_effects, found, effects_label(result)
     drawn: Axes = _plotted(axes, 1, effects_size(len(found)), *drawing)[0]
@@ -267,12 +276,12 @@ def _need_numbers(fit: Fit) -> None:
         raise ValueError(f"epoch {fit.epoch} of {fit.source} has no J, B and K: {reason}")
 
 
-def _compared(result: StudyResult, measure: str) -> Comparison:
-    found = result.comparison(measure)
-    if found is None or not found.observations:
-        known = ", ".join(c.measure.name for c in result.comparisons if c.observations)
-        raise ValueError(f"{measure!r} was not compared; compared were {known}")
-    return found
+def _values(result: StudyResult, measure: str) -> Values:
+    found = {one.name: values_of(result, one) for one in measures_of(result.study.rows)}
+    known = [name for name, one in found.items() if len(one.rows)]
+    if measure not in known:
+        raise ValueError(f"{measure!r} was not compared; compared were {', '.join(known)}")
+    return found[measure]
 
 
 def _title(recording: Recording, source: str, epoch: str, condition: str) -> str:

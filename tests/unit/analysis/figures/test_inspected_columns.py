@@ -3,10 +3,10 @@
 import numpy as np
 from tests.known_joint import angle_rad, torque_nm
 
+from rigidimeter.analysis.figures import columns_figure
 from rigidimeter.analysis.reading.channels.inspection import inspect_table
 from rigidimeter.analysis.reading.formats.read_options import ReadOptions
 from rigidimeter.analysis.reading.formats.table import Table
-from rigidimeter.analysis.report.inspected_columns import columns_figure
 
 TIME_S = np.arange(1200) / 100.0
 

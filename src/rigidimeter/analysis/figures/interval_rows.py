@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,23 +11,26 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from rigidimeter.analysis.report.style import (
+from rigidimeter.analysis.figures.style import (
     GREY,
     INK,
     Look,
     condition_colours,
     condition_markers,
     drawable,
+    labelled,
     legend_outside,
     listed,
     with_intervals,
     wrapped,
     write_at,
 )
-from rigidimeter.analysis.statistics import Effects, largest_r
-from rigidimeter.analysis.study import Comparison, Measure, SensitivityRow, StudyResult
+from rigidimeter.analysis.statistics import largest_r
+from rigidimeter.analysis.study_anew import StudyResult, result_table
 from rigidimeter.core.records import PARAMETERS, BandEstimate
 from rigidimeter.core.words import axis_unit, condition_name, interval, number
+
+Row = Mapping[str, Any]
 
 COHEN = (0.1, 0.3, 0.5)
 """What is called a small, a medium and a large r."""
@@ -47,20 +50,25 @@ def _rows(axes: Axes, labels: Sequence[str]) -> None:
     axes.grid(visible=False, axis="y")
 
 
-def effect_words(found: Effects) -> str:
+def effect_rows(result: StudyResult) -> list[Row]:
+    """Return the rows of the table of comparisons that have an effect size with its interval."""
+    return [row for row in result_table(result, "comparisons") if row["interval_method"]]
+
+
+def effect_words(row: Row) -> str:
     """Return r of other − reference with its interval."""
-    r, low, high = _turned(found)
+    r, low, high = _turned(row)
     return f"{number(r, 2)} {interval(low, high, 2)}"
 
 
-def _turned(found: Effects) -> tuple[float, float, float]:
-    """Return r and its interval of other − reference; those of a test are reference − other."""
-    return -found.r, -found.r_high, -found.r_low
+def _turned(row: Row, name: str = "r") -> tuple[float, float, float]:
+    """Return a number and its interval of other − reference; tables have reference − other."""
+    return -row[name], -row[f"{name}_high"], -row[f"{name}_low"]
 
 
 def effects_label(result: StudyResult) -> str:
     """Return what the horizontal axis of effect sizes shows."""
-    reference, other = condition_name(result.reference), condition_name(result.other)
+    reference, other = map(condition_name, result.study.pair)
     return f"Effect size r; above zero: {other} larger than {reference}"
 
 
@@ -69,37 +77,36 @@ def effects_size(rows: int) -> tuple[float, float]:
     return 7.4, 0.9 + 0.42 * rows
 
 
-def draw_effects(
-    panels: Sequence[Axes], found: Sequence[tuple[Comparison, Effects]], label: str
-) -> None:
+def draw_effects(panels: Sequence[Axes], found: Sequence[Row], label: str) -> None:
     """Draw the effect size of each measure with its interval; the numbers are at the right.
 
     Parameters
     ----------
     panels : sequence of Axes
         One.
-    found : sequence of (Comparison, Effects)
-        At least one. A thin grey tick on either side is the largest r that the group sizes allow.
+    found : sequence of mappings
+        At least one, as `effect_rows` gives them. A thin grey tick on either side is the largest r
+        that the group sizes allow.
     label : str
         Of the horizontal axis.
     """
     (axes,) = panels
-    tests = [effects.test for _, effects in found]
-    names = [wrapped(c.measure.title, 28, 2) for c, _ in found]
-    _rows(axes, [f"{n}\nn = {t.n_x} and {t.n_y}" for n, t in zip(names, tests, strict=True)])
+    sizes = [(row["n_x"], row["n_y"]) for row in found]
+    names = [wrapped(row["title"], 28, 2) for row in found]
+    _rows(axes, [f"{n}\nn = {x} and {y}" for n, (x, y) in zip(names, sizes, strict=True)])
     for size in COHEN:
         for x in (-size, size):
             axes.axvline(x, color=GREY, linewidth=0.6, dashes=(1, 3), zorder=0)
-    most = [largest_r(test.n_x, test.n_y) for test in tests]
-    for place, (_, effects) in enumerate(found):
-        r, *ends = _turned(effects)
+    most = [largest_r(*both) for both in sizes]
+    for place, row in enumerate(found):
+        r, *ends = _turned(row)
         with_intervals(axes, place, (r, *ends), INK, "s", across=True, width=1.6, ms=6)
         if np.all(np.isfinite(ends)):
             axes.plot(ends, [place] * 2, "|", color=INK, ms=7)
         bounds = (-most[place], most[place])
         axes.plot(bounds, [place] * 2, "|", color=GREY, ms=13, mew=0.7, alpha=0.7)
-        write_at(axes, 1.02, place, effect_words(effects), share="x", va="center")
-    values = [_turned(effects) for _, effects in found]
+        write_at(axes, 1.02, place, effect_words(row), share="x", va="center")
+    values = [*map(_turned, found)]
     least, largest = np.nanmin(values), np.nanmax(values)
     reach = 1.05 * max(0.5, *most, abs(least), abs(largest))
     axes.set_xlim(
@@ -110,43 +117,50 @@ def draw_effects(
     axes.set_xlabel(label)
 
 
-def by_measure(found: Sequence[SensitivityRow]) -> dict[Measure, list[SensitivityRow]]:
+def by_measure(found: Sequence[Row]) -> dict[str, list[Row]]:
     """Return the rows of each measure: a panel of the figure."""
-    return {row.measure: [one for one in found if one.measure == row.measure] for row in found}
+    names = dict.fromkeys(row["measure"] for row in found)
+    return {name: [row for row in found if row["measure"] == name] for name in names}
 
 
-def methods_in(found: Sequence[SensitivityRow]) -> list[tuple[str, str]]:
+def methods_in(found: Sequence[Row]) -> list[tuple[str, str]]:
     """Return methods with how J was treated, a row of each panel: what is concluded from first."""
-    every = sorted(found, key=lambda row: (not row.chosen, row.inertia == "fixed"))
-    return list(dict.fromkeys((row.method, row.inertia) for row in every))
+    every = sorted(found, key=lambda row: (not row["chosen"], row["inertia"] == "fixed"))
+    return list(dict.fromkeys((row["method"], row["inertia"]) for row in every))
 
 
-def draw_methods(panels: Sequence[Axes], found: Sequence[SensitivityRow], label: str) -> None:
+def shift(row: Row) -> tuple[float, float, float]:
+    """Return the shift of a method with its interval, other − reference."""
+    return _turned(row, "shift")
+
+
+def draw_methods(panels: Sequence[Axes], found: Sequence[Row], label: str) -> None:
     """Draw a panel for each measure with one row for each method.
 
     Parameters
     ----------
     panels : sequence of Axes
         At least one for each of `by_measure`; the others are hidden.
-    found : sequence of SensitivityRow
-        At least one.
+    found : sequence of mappings
+        The rows of the table of methods, at least one.
     label : str
         Of the horizontal axes, without a unit.
     """
     methods = methods_in(found)
     for axes in panels[len(by_measure(found)) :]:
         axes.set_visible(False)
-    for axes, (measure, own) in zip(panels, by_measure(found).items(), strict=False):
-        shifts = -np.array([(row.shift, row.shift_high, row.shift_low) for row in own])
-        factor, unit = axis_unit(shifts.ravel(), measure.unit)
+    for axes, own in zip(panels, by_measure(found).values(), strict=False):
+        shifts = np.array([*map(shift, own)])
+        factor, unit = axis_unit(shifts.ravel(), own[0]["unit"])
         _rows(axes, [f"{drawable(method)}, J {inertia}" for method, inertia in methods])
-        for row, shift in zip(own, factor * shifts, strict=True):
-            place, colour = methods.index((row.method, row.inertia)), INK if row.chosen else _OTHER
-            marker, face = ("s", colour) if row.inertia == "fixed" else ("o", "white")
-            width, size = (2.2, 6.5) if row.chosen else (1.2, 5.0)
+        for row, ends in zip(own, factor * shifts, strict=True):
+            place = methods.index((row["method"], row["inertia"]))
+            colour = INK if row["chosen"] else _OTHER
+            marker, face = ("s", colour) if row["inertia"] == "fixed" else ("o", "white")
+            width, size = (2.2, 6.5) if row["chosen"] else (1.2, 5.0)
             look: Look = {"width": width, "ms": size, "mfc": face, "mew": 1.2}
-            with_intervals(axes, place, shift, colour, marker, across=True, **look)
-        axes.set_title(wrapped(replace(measure, unit=unit).label, 30), fontsize=8.5)
+            with_intervals(axes, place, ends, colour, marker, across=True, **look)
+        axes.set_title(wrapped(labelled(own[0]["title"], unit), 30), fontsize=8.5)
         axes.set_xlabel(drawable(label))
         axes.xaxis.set_major_locator(MaxNLocator(3))
         axes.margins(x=0.08)

@@ -17,7 +17,8 @@ from tests.unit.analysis.report.cohorts import Design, made_study
 
 import rigidimeter as rm
 from rigidimeter.analysis.reading import Recording
-from rigidimeter.analysis.study import StudyResult
+from rigidimeter.analysis.report import Shown
+from rigidimeter.analysis.study_anew import StudyResult
 from rigidimeter.core.records import Analysis, Epoch, Fit, Outcome
 from rigidimeter.core.settings import Settings
 from rigidimeter.planning import design
@@ -40,8 +41,13 @@ def recording(epochs: list[Epoch]) -> Recording:
 
 
 @pytest.fixture(scope="module")
+def result(study: Shown) -> StudyResult:
+    return study.result
+
+
+@pytest.fixture(scope="module")
 def cohort() -> StudyResult:
-    return made_study(Design(days=(3, 2), epochs=(4, 4), scores=(3, 3)))
+    return made_study(Design(days=(3, 2), epochs=(4, 4), scores=(3, 3))).result
 
 
 def marked(axes: Axes, markers: str = "osD^v") -> list[tuple[float, float]]:
@@ -51,16 +57,16 @@ def marked(axes: Axes, markers: str = "osD^v") -> list[tuple[float, float]]:
 
 
 def plots(
-    recording: Recording, study: StudyResult, cohort: StudyResult
+    recording: Recording, result: StudyResult, cohort: StudyResult
 ) -> dict[str, Callable[[Any], Any]]:
-    analysis = study.analysis
+    analysis = result.study.analysis
     planned = design(prbs={"duration_s": 8.0})
     return {
         "recording": lambda axes: recording.plot(axes=axes),
         "estimates": lambda axes: analysis.plot(axes=axes),
         "torque": lambda axes: analysis.plot_torque(recording, 1, axes=axes),
         "fit": lambda axes: analysis.fits[1].plot(axes=axes),
-        "result": lambda axes: study.plot(axes=axes),
+        "result": lambda axes: result.plot(axes=axes),
         "days": lambda axes: cohort.plot_days(axes=axes),
         "effects": lambda axes: cohort.plot_effects(axes=axes),
         "design": lambda axes: planned.plot(axes=axes),
@@ -68,9 +74,9 @@ def plots(
 
 
 def test_all_draw_on_a_figure_of_pyplot_or_on_the_axes_that_they_are_given(
-    recording: Recording, study: StudyResult, cohort: StudyResult
+    recording: Recording, result: StudyResult, cohort: StudyResult
 ) -> None:
-    for name, plot in plots(recording, study, cohort).items():
+    for name, plot in plots(recording, result, cohort).items():
         own = np.ravel(plot(None))
         assert all(isinstance(axes, Axes) for axes in own), name
         assert plt.get_fignums() == [own[0].figure.number], name
@@ -89,34 +95,34 @@ def test_all_draw_on_a_figure_of_pyplot_or_on_the_axes_that_they_are_given(
 
 
 def test_the_front_door_draws_what_the_methods_draw(
-    study: StudyResult, cohort: StudyResult
+    result: StudyResult, cohort: StudyResult
 ) -> None:
-    labels = [ax.get_ylabel() for ax in rm.plot(study)]
-    assert labels == [ax.get_ylabel() for ax in study.plot()]
+    labels = [ax.get_ylabel() for ax in rm.plot(result)]
+    assert labels == [ax.get_ylabel() for ax in result.plot()]
     days = rm.plot(cohort, "days", measure="damping_nm_s_rad")
     assert marked(days) == marked(cohort.plot_days("damping_nm_s_rad"))
     with pytest.raises(TypeError, match="plot draws Recording, Fit, Analysis"):
         rm.plot(3)
     with pytest.raises(ValueError, match="what = 'hours': of StudyResult there are '', 'days'"):
-        rm.plot(study, "hours")
+        rm.plot(result, "hours")
 
 
 def test_each_axis_says_what_it_shows_and_in_what_unit(
-    recording: Recording, study: StudyResult, cohort: StudyResult
+    recording: Recording, result: StudyResult, cohort: StudyResult
 ) -> None:
     without = {"Effect size r; above zero: DBS larger than OFF"}  # a share
     without |= {"Epoch, in the order of recording", "Day, in the order of recording", ""}
-    for name, plot in plots(recording, study, cohort).items():
+    for name, plot in plots(recording, result, cohort).items():
         panels = np.ravel(plot(None))
         labels = {axes.get_ylabel() for axes in panels} | {axes.get_xlabel() for axes in panels}
         assert labels != {""}, name
         assert all(label in without or label.endswith(")") for label in labels), labels
 
 
-def test_every_epoch_is_a_point_with_its_interval(study: StudyResult) -> None:
-    fits = study.analysis.fits
+def test_every_epoch_is_a_point_with_its_interval(result: StudyResult) -> None:
+    fits = result.study.analysis.fits
     assert len(fits) == 10
-    panels = study.analysis.plot()
+    panels = result.study.analysis.plot()
     for i, (symbol, axes) in enumerate(zip("JBK", panels, strict=True)):
         factor = 1e3 if symbol == "J" else 1.0
         expected = [(n + 1, factor * fit.value[i]) for n, fit in enumerate(fits)]
@@ -142,8 +148,8 @@ def test_an_epoch_without_an_estimate_is_a_cross(make_analysis) -> None:
     assert panels[-1].get_xticklabels()[-1].get_text() == "long name"
 
 
-def test_of_sinusoids_alone_impulse_and_work_are_drawn(study: StudyResult) -> None:
-    alone = replace(study.analysis, fits=(), fixed_inertia=(), pooled=())
+def test_of_sinusoids_alone_impulse_and_work_are_drawn(result: StudyResult) -> None:
+    alone = replace(result.study.analysis, fits=(), fixed_inertia=(), pooled=())
     impulse, work = alone.plot()
     assert len(marked(impulse)) == len(marked(work)) == len(alone.scores) == 8
     assert impulse.get_ylabel() == "Angular impulse\n(N·m·s)"
@@ -158,8 +164,8 @@ def test_hundreds_of_epochs_have_numbers_on_the_axis(make_analysis) -> None:
     assert len(panels[2].get_xticks()) < 15
 
 
-def test_a_fit_is_drawn_in_pairs_and_another_one_over_it(study: StudyResult) -> None:
-    fit, other = study.analysis.fits[1], study.analysis.fits[2]
+def test_a_fit_is_drawn_in_pairs_and_another_one_over_it(result: StudyResult) -> None:
+    fit, other = result.study.analysis.fits[1], result.study.analysis.fits[2]
     panels = fit.plot()
     pairs = ((0, 1), (0, 2), (1, 2))
     scale = (1e3, 1.0, 1.0)
@@ -176,7 +182,7 @@ def test_a_fit_is_drawn_in_pairs_and_another_one_over_it(study: StudyResult) -> 
     names = [text.get_text() for text in panels[-1].get_legend().get_texts()]
     assert names == [f"epoch {one.epoch} OFF" for one in (fit, other)]
     assert panels[0].lines[0].get_color() != panels[0].lines[2].get_color()
-    held = study.analysis.fixed_inertia[1].plot()  # J without an error: no ellipse with it
+    held = result.study.analysis.fixed_inertia[1].plot()  # J without an error: no ellipse with it
     assert [len(axes.lines) for axes in held] == [1, 1, 2]
     with pytest.raises(ValueError, match="epoch 2 of x has no J, B and K: too short"):
         Fit("x", "2", "OFF", "iv", Outcome("failed", "too short")).plot()
@@ -195,9 +201,9 @@ def test_the_recording_is_drawn_as_recorded(recording: Recording) -> None:
 
 
 def test_measured_and_modelled_torque_need_the_recording(
-    recording: Recording, study: StudyResult
+    recording: Recording, result: StudyResult
 ) -> None:
-    top, left, *terms = study.analysis.plot_torque(recording, 7)
+    top, left, *terms = result.study.analysis.plot_torque(recording, 7)
     measured, model = (line.get_ydata() for line in top.lines)
     np.testing.assert_allclose(left.lines[0].get_ydata(), measured - model)
     np.testing.assert_allclose(sum(axes.lines[1].get_ydata() for axes in terms), model)
@@ -205,30 +211,30 @@ def test_measured_and_modelled_torque_need_the_recording(
     assert top.get_title(loc="left") == "Torque of epoch p2 of dbs.csv, DBS"
     other = replace(recording, epochs=recording.epochs[:1])
     with pytest.raises(ValueError, match="the recording has no epoch p1 of /data"):
-        study.analysis.plot_torque(other, 1)
+        result.study.analysis.plot_torque(other, 1)
     with pytest.raises(ValueError, match=r"must be what rigidimeter.read returned, not 'a.csv'"):
-        study.analysis.plot_torque("a.csv")
+        result.study.analysis.plot_torque("a.csv")
 
 
-def test_every_value_of_a_comparison_is_a_point(study: StudyResult, cohort: StudyResult) -> None:
-    for axes, c in zip(study.plot(), study.comparisons, strict=True):
+def test_every_value_of_a_comparison_is_a_point(result: StudyResult, cohort: StudyResult) -> None:
+    for axes, one in zip(result.plot(), result.values, strict=True):
         drawn = sum(line.get_xydata().shape[0] for line in axes.lines if line.get_gid())
-        assert drawn == len(c.observations)
-        assert c.measure.title in axes.get_ylabel()
-    (axes,) = study.plot(["stiffness_nm_rad"])
+        assert drawn == sum(one.n)
+        assert one.measure.title in axes.get_ylabel()
+    (axes,) = result.plot(["stiffness_nm_rad"])
     assert axes.get_ylabel() == "Stiffness K (N·m/rad)"
     with pytest.raises(ValueError, match="'stiffness' was not compared; compared were inertia"):
-        study.plot(["stiffness"])
+        result.plot(["stiffness"])
     days = cohort.plot_days("work_j")
     drawn = sum(line.get_xydata().shape[0] for line in days.lines if line.get_gid())
-    assert drawn == len(cohort.comparison("work_j").observations)
+    assert drawn == sum(cohort.value_test("work_j").n)
     with pytest.raises(ValueError, match="days: they are known of a study folder alone"):
-        study.plot_days()
+        result.plot_days()
     effects = cohort.plot_effects()
-    assert len(marked(effects, "s")) == sum(c.effects is not None for c in cohort.comparisons)
-    without = tuple(replace(c, effects=None, remark="too few") for c in cohort.comparisons)
+    assert len(marked(effects, "s")) == len(cohort.effects)
+    without = tuple(replace(one, remark="too few") for one in cohort.values)
     with pytest.raises(ValueError, match="no measure has an effect size: too few"):
-        replace(cohort, comparisons=without).plot_effects()
+        replace(cohort, values=without, effects={}).plot_effects()
 
 
 def test_a_condition_in_dollars_is_no_formula(make_analysis) -> None:

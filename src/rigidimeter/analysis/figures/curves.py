@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from rigidimeter.analysis.estimation import Cycles, Signals
-from rigidimeter.analysis.report.style import (
+from rigidimeter.analysis.figures.style import (
     GREY,
     INK,
     Look,
@@ -20,7 +20,7 @@ from rigidimeter.analysis.report.style import (
     note,
     write_at,
 )
-from rigidimeter.analysis.study.drawn_signals import Response, Spectrum
+from rigidimeter.analysis.traces import Response, Spectrum
 from rigidimeter.core.records import Channel, Epoch, Fit
 from rigidimeter.core.spectrum import SEGMENT_S
 from rigidimeter.core.words import amount, number

@@ -159,6 +159,17 @@ def listed(text: str) -> str:
     return drawable(f" {text}" if text.startswith("_") else text)
 
 
+def labelled(title: str, unit: str) -> str:
+    """Return title and unit, for axes and headings.
+
+    Examples
+    --------
+    >>> labelled("Stiffness K", "N·m/rad")
+    'Stiffness K (N·m/rad)'
+    """
+    return f"{title} ({unit})" if unit else title
+
+
 def wrapped(text: str, width: int, lines: int = 3) -> str:
     """Return the text on a few short lines, shortened where it does not fit."""
     return "\n".join(

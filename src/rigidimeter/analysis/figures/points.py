@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import product
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike, NDArray
 
-from rigidimeter.analysis.report.style import (
+from rigidimeter.analysis.figures.style import (
     GREY,
     MARKERS,
     Look,
     condition_colours,
     condition_markers,
+    labelled,
     legend_above,
     legend_outside,
     listed,
@@ -26,17 +29,21 @@ from rigidimeter.analysis.report.style import (
     wrapped,
     write_at,
 )
-from rigidimeter.analysis.statistics import summarise
-from rigidimeter.analysis.study import Comparison, RatingsFound, Relation
-from rigidimeter.core.words import (
-    axis_unit,
-    condition_name,
-    interval,
-    number,
-    p_and_r,
+from rigidimeter.analysis.statistics import RankSum, summarise
+from rigidimeter.analysis.study_anew import (
+    Measure,
+    Ratings,
+    Relation,
+    StudyResult,
+    counting,
+    measures_of,
+    pooled,
 )
+from rigidimeter.core.words import axis_unit, condition_name, interval, number, p_and_r
 
 Array = NDArray[np.float64]
+
+_ENDS = ["value", "low", "high"]
 
 MOST_IN_A_ROW = 26
 """More days than this continue in another row of the same figure."""
@@ -46,6 +53,73 @@ _SPREAD, _ASIDE, _BESIDE, _POOLED = 0.24, -0.12, 0.28, 0.41
 from all of them stand."""
 _LANES, _STEP, _MEAN = 0.66, 0.9, 0.43
 """Width of the lanes of examiners, share of a lane for equal scores, and place of the mean."""
+
+
+@dataclass(frozen=True)
+class Values:
+    """The values of a measure that count, as figures show them.
+
+    Attributes
+    ----------
+    measure : Measure
+    pair : (str, str)
+        The conditions that are compared; the second is empty where there is one.
+    rows : pandas.DataFrame
+        As `counting` returns them.
+    names : tuple of str
+        The conditions in which the measure was recorded, the compared ones first.
+    pooled : mapping of str to array, shape (3,)
+        By condition: the estimate from all its epochs together, with the ends of its interval.
+    remark : str
+        p and r of the rank-sum test; empty without one.
+    """
+
+    measure: Measure
+    pair: tuple[str, str]
+    rows: pd.DataFrame
+    names: tuple[str, ...] = ()
+    pooled: Mapping[str, Array] = field(default_factory=dict)
+    remark: str = ""
+
+    def of(self, condition: str) -> pd.DataFrame:
+        """Return the rows of one condition."""
+        return self.rows[self.rows["condition"] == condition]
+
+    @cached_property
+    def days(self) -> dict[tuple[str, str, str], pd.DataFrame]:
+        """The rows of each subject, day and condition, in the order of recording."""
+        of_days = self.rows.groupby(["subject", "day", "condition"], sort=False)
+        return {(s, d, c): own for (s, d, c), own in of_days}
+
+
+def values_of(result: StudyResult, measure: Measure) -> Values:
+    """Return the values of a measure of a result, all its conditions together."""
+    rows = result.study.rows
+    tested = result.value_test(measure.name)
+    test = None if tested is None else tested.statistic
+    return Values(
+        measure,
+        result.study.pair,
+        counting(rows, measure.name),
+        tuple(result.summaries(measure.name)),
+        {
+            one.condition: np.array([one.value, one.low, one.high])
+            for one in pooled(rows, measure.name).itertuples()
+        },
+        f"by epochs: {p_and_r(test.p, -test.r)}" if isinstance(test, RankSum) else "",
+    )
+
+
+def drawn_values(result: StudyResult) -> list[Values]:
+    """Return the values of each measure that has some, but for the ratings."""
+    measures = [one for one in measures_of(result.study.rows) if one.origin != "ratings"]
+    found = [values_of(result, one) for one in measures]
+    return [one for one in found if len(one.rows)]
+
+
+def epoch_keys(rows: pd.DataFrame) -> list[tuple[str, str]]:
+    """Return source and label of the epoch of each row."""
+    return list(zip(rows["session"], rows["epoch"], strict=True))
 
 
 def _strip(
@@ -113,40 +187,32 @@ def distribution_size(conditions: int, *, pooled: bool = False) -> tuple[float, 
     return max(2.9, 0.9 + (0.95 + 0.2 * pooled) * conditions), 3.0
 
 
-def draw_comparison(panels: Sequence[Axes], c: Comparison, colours: Mapping[str, str]) -> None:
+def draw_values(panels: Sequence[Axes], v: Values, colours: Mapping[str, str]) -> None:
     """Draw every value of a measure, with the colours of the conditions."""
-    factor, unit = axis_unit((o.value for o in c.observations), c.measure.unit)
+    factor, unit = axis_unit(v.rows["value"], v.measure.unit)
     draw_distribution(
         panels,
-        replace(c.measure, unit=unit).label,
-        {
-            condition_name(key): [
-                (factor * o.value, factor * o.low, factor * o.high) for o in c.of(key)
-            ]
-            for key in c.summaries
-        },
-        {condition_name(key): colours[key] for key in c.summaries},
-        "" if c.test is None else f"by epochs: {p_and_r(c.test.p, -c.test.r)}",
-        {
-            condition_name(key): factor * np.array([o.value, o.low, o.high])
-            for key, o in c.pooled.items()
-        },
+        labelled(v.measure.title, unit),
+        {condition_name(key): factor * v.of(key)[_ENDS].to_numpy() for key in v.names},
+        {condition_name(key): colours[key] for key in v.names},
+        v.remark,
+        {condition_name(key): factor * ends for key, ends in v.pooled.items()},
     )
 
 
-def draw_comparisons(
-    panels: Sequence[Axes], compared: Sequence[Comparison], colours: Mapping[str, str]
+def draw_measures(
+    panels: Sequence[Axes], shown: Sequence[Values], colours: Mapping[str, str]
 ) -> None:
     """Draw each measure on a panel of its own."""
-    for axes, c in zip(panels, compared, strict=True):
-        draw_comparison([axes], c, colours)
+    for axes, v in zip(panels, shown, strict=True):
+        draw_values([axes], v, colours)
 
 
-def day_rows(c: Comparison) -> list[list[tuple[str, str]]]:
+def day_rows(v: Values) -> list[list[tuple[str, str]]]:
     """Return subjects and days as rows; a subject that does not fit begins a new one."""
     rows: list[list[tuple[str, str]]] = [[]]
-    for subject in dict.fromkeys(m.subject for m in c.day_medians):
-        own = dict.fromkeys(m.day for m in c.day_medians if m.subject == subject)
+    for subject in dict.fromkeys(who for who, _, _ in v.days):
+        own = dict.fromkeys(day for who, day, _ in v.days if who == subject)
         if rows[-1] and len(rows[-1]) + len(own) > MOST_IN_A_ROW:
             rows.append([])
         for day in own:
@@ -156,36 +222,29 @@ def day_rows(c: Comparison) -> list[list[tuple[str, str]]]:
     return rows
 
 
-def day_groups(c: Comparison) -> dict[str, list[tuple[str, str]]]:
+def day_groups(v: Values) -> dict[str, list[tuple[str, str]]]:
     """Return source and label of the epochs of each day and condition, by their line of points."""
-    return {
-        f"epochs-{place}": [
-            (o.source, o.epoch)
-            for o in c.observations
-            if (o.subject, o.day, o.condition) == (m.subject, m.day, m.condition)
-        ]
-        for place, m in enumerate(c.day_medians)
-    }
+    return {f"epochs-{place}": epoch_keys(own) for place, own in enumerate(v.days.values())}
 
 
-def draw_days(panels: Sequence[Axes], c: Comparison, order: Sequence[str]) -> None:
+def draw_days(panels: Sequence[Axes], v: Values, order: Sequence[str]) -> None:
     """Draw a measure day by day, in the order of recording, with a gap between subjects.
 
     Parameters
     ----------
     panels : sequence of Axes
         One for each of `day_rows`, or one for all days.
-    c : Comparison
-        With at least one day.
+    v : Values
+        At least one.
     order : sequence of str
         All conditions of the report as people read them, for their colours and markers.
     """
-    rows = day_rows(c)
+    rows = day_rows(v)
     if len(panels) == 1:
         rows = [[slot for row in rows for slot in row]]
-    factor, unit = axis_unit((o.value for o in c.observations), c.measure.unit)
+    factor, unit = axis_unit(v.rows["value"], v.measure.unit)
     colours, markers = condition_colours(order), condition_markers(order)
-    several = len({m.subject for m in c.day_medians}) > 1
+    several = len({subject for subject, _, _ in v.days}) > 1
     for axes, row in zip(panels, rows, strict=True):
         places: list[float] = []
         for (subject, day), (before, _) in zip(row, [("", ""), *row], strict=False):
@@ -195,75 +254,85 @@ def draw_days(panels: Sequence[Axes], c: Comparison, order: Sequence[str]) -> No
             if several and (not places or subject != before):
                 look: Look = {"va": "top", "color": GREY, "fontweight": "bold"}
                 write_at(axes, place - 0.45, 1.0, subject[:24], share="y", **look)
-            _day(axes, place, c, (subject, day), factor, colours, markers)
+            _day(axes, place, v, (subject, day), factor, colours, markers)
             places.append(place)
         axes.set_xlim(-0.6, max(places[-1] + 0.6, 1.6))
         axes.set_xticks(places, [wrapped(day, 12, 1) for _, day in row])
-        axes.tick_params(axis="x", length=0, rotation=45 * (longest_day(c) > 3))
+        axes.tick_params(axis="x", length=0, rotation=45 * (longest_day(v) > 3))
         axes.grid(visible=False, axis="x")
         low, high = axes.get_ylim()
         axes.set_ylim(low, high + 0.12 * (high - low) * several)
-        axes.set_ylabel(f"{c.measure.title}\n({unit})")
+        axes.set_ylabel(f"{v.measure.title}\n({unit})")
     panels[-1].set_xlabel("Day, in the order of recording")
-    shown = sorted({m.condition for m in c.day_medians}, key=lambda name: _side(c, name))
+    shown = sorted({condition for _, _, condition in v.days}, key=lambda name: _side(v, name))
     for name in map(condition_name, shown):
         panels[0].plot([], [], markers[name], color=colours[name], ms=6, label=listed(name))
     legend_above(panels[0])
 
 
-def longest_day(c: Comparison) -> int:
+def longest_day(v: Values) -> int:
     """Return the length of the longest name of a day."""
-    return max(len(m.day) for m in c.day_medians)
+    return max(len(day) for _, day, _ in v.days)
 
 
-def _side(c: Comparison, condition: str) -> tuple[int, str]:
+def _side(v: Values, condition: str) -> tuple[int, str]:
     """Return where a condition stands: the reference left of the other, whichever came first."""
-    return (c.pair.index(condition) if condition in c.pair else len(c.pair), condition)
+    return (v.pair.index(condition) if condition in v.pair else 2, condition)
 
 
 def _day(
     axes: Axes,
     place: float,
-    c: Comparison,
+    v: Values,
     slot: tuple[str, str],
     factor: float,
     colours: Mapping[str, str],
     markers: Mapping[str, str],
 ) -> None:
     """Draw the conditions of one day side by side, the reference left, their medians joined."""
-    own = [(k, m) for k, m in enumerate(c.day_medians) if (m.subject, m.day) == slot]
-    own.sort(key=lambda each: _side(c, each[1].condition))
+    own = [
+        (k, condition, rows)
+        for k, ((*who, condition), rows) in enumerate(v.days.items())
+        if (*who,) == slot
+    ]
+    own.sort(key=lambda each: _side(v, each[1]))
     width = 1.0 / len(own)
     centres = place + 0.9 * width * (np.arange(len(own)) - (len(own) - 1) / 2)
-    for centre, (k, m) in zip(centres, own, strict=True):
-        values = np.array([o.value for o in c.of(m.condition) if (o.subject, o.day) == slot])
-        rows = factor * np.column_stack([values, np.full((values.size, 2), np.nan)])
-        name = condition_name(m.condition)
-        _strip(axes, centre, width, rows, colours[name], 2 * markers[name], f"epochs-{k}")
+    for centre, (k, condition, rows) in zip(centres, own, strict=True):
+        name = condition_name(condition)
+        points = factor * rows[_ENDS].assign(low=np.nan, high=np.nan).to_numpy()
+        _strip(axes, centre, width, points, colours[name], 2 * markers[name], f"epochs-{k}")
     if len(own) > 1:
-        medians = [factor * m.median for _, m in own]
+        medians = [factor * summarise(rows["value"]).median for _, _, rows in own]
         axes.plot(centres + _BESIDE * width, medians, color=GREY, zorder=1.9)
 
 
-def draw_ratings(panels: Sequence[Axes], found: RatingsFound, order: Sequence[str]) -> None:
+def draw_ratings(
+    panels: Sequence[Axes],
+    found: Ratings,
+    means: Mapping[str, tuple[float, float, float]],
+    order: Sequence[str],
+) -> None:
     """Draw raw scores at the left; at the right corrected ones with the means of the model.
 
     Parameters
     ----------
     panels : sequence of Axes
         Two.
-    found : RatingsFound
-        At least one rating.
+    found : Ratings
+        At least one.
+    means : mapping of str to (float, float, float)
+        By condition as people read it: the mean and the ends of its interval.
     order : sequence of str
         All conditions of the report, which gives them their colours.
     """
     colours = condition_colours(order)
-    means = {condition_name(mean.condition): mean for mean in found.means}
-    examiners = list(dict.fromkeys(row.examiner for row in found.rows))
-    named = [(condition_name(row.condition), row.examiner) for row in found.rows]
+    raters = [*found.rows["rater"]]
+    examiners = list(dict.fromkeys(raters))
+    named = list(zip(map(condition_name, found.rows["condition"]), raters, strict=True))
     width = _LANES / len(examiners)
     raw, corrected = panels
-    scores = np.array([row.score for row in found.rows])
+    scores = found.rows["value"].to_numpy()
     for axes, values in ((raw, scores), (corrected, np.asarray(found.fit.corrected))):
         each = product(enumerate(means), enumerate(examiners))
         for (place, condition), (lane, examiner) in each:
@@ -278,10 +347,9 @@ def draw_ratings(panels: Sequence[Axes], found: RatingsFound, order: Sequence[st
             axes.plot(at, own, marker, color=colours[condition], ms=3.8, alpha=0.75, mew=0)
         counts = {name: sum(who == name for who, _ in named) for name in means}
         named_places(axes, [f"{wrapped(name, 16)}\nn = {n}" for name, n in counts.items()])
-    for place, (condition, m) in enumerate(means.items()):
-        colour = colours[condition]
+    for place, (condition, mean) in enumerate(means.items()):
         bar: Look = {"width": 2.0, "ms": 11, "mew": 2.2}
-        with_intervals(corrected, place + _MEAN, (m.mean, m.low, m.high), colour, "_", **bar)
+        with_intervals(corrected, place + _MEAN, mean, colours[condition], "_", **bar)
     for lane, examiner in enumerate(examiners):
         marker, label = MARKERS[lane % len(MARKERS)], listed(f"examiner {examiner}")
         raw.plot([], [], marker, color=GREY, ms=5, label=label)
@@ -316,7 +384,7 @@ def draw_relations(panels: Sequence[Axes], found: Sequence[Relation], order: Seq
             own = conditions == name
             look: Look = {"color": colours[name], "ms": 5, "mew": 0, "alpha": 0.85}
             axes.plot(values[own], ratings[own], markers[name], label=listed(name), **look)
-        axes.set_xlabel(replace(one.measure, unit=unit).label)
+        axes.set_xlabel(labelled(one.measure.title, unit))
         note(axes, relation_words(one))
     panels[0].set_ylabel("Rating less offsets")
     legend_outside(panels[0])

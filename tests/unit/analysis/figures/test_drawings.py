@@ -12,20 +12,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rigidimeter.analysis.estimation import epoch_signals, scoring_cycles
-from rigidimeter.analysis.report.curves import (
-    changes,
+from rigidimeter.analysis.figures import (
+    condition_colours,
+    draw_bands,
+    draw_distribution,
     draw_loops,
     draw_perturbation,
     draw_recorded,
     draw_spectrum,
     draw_torque,
+    drawn,
     loop_limits,
+    svg_text,
     torque_limit_nm,
 )
-from rigidimeter.analysis.report.interval_rows import draw_bands
-from rigidimeter.analysis.report.points import draw_distribution
-from rigidimeter.analysis.report.style import condition_colours, drawn, svg_text
-from rigidimeter.analysis.study import StudyResult
+from rigidimeter.analysis.report import Shown
 from rigidimeter.core.records import BandEstimate, Channel
 
 STAMPS = np.arange(5000) / 250
@@ -110,13 +111,6 @@ def test_other_bands_stand_at_their_change_in_percent_with_its_error() -> None:
     assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == ["0.1 to 15 Hz"]
 
 
-def test_changes_keep_the_course_of_a_held_signal() -> None:
-    time_s, values = changes(PRBS)
-    assert len(time_s) < len(PRBS) / 10
-    held = values[np.searchsorted(time_s, PRBS.time_s, side="right") - 1]
-    assert np.array_equal(held, PRBS.values)
-
-
 def test_perturbation_shows_its_beginning_and_the_whole() -> None:
     above, below = drawn(SIZE, draw_perturbation, PRBS, -1.0, rows=2).axes
     assert above.get_xlim() == (1.0, 8.0)
@@ -134,10 +128,10 @@ def test_spectrum_of_a_line_peaks_at_the_line() -> None:
     assert axes.get_ylabel().endswith("((N·m)²/Hz)")
 
 
-def test_parts_of_the_model_add_up_to_it(study: StudyResult) -> None:
+def test_parts_of_the_model_add_up_to_it(study: Shown) -> None:
     fit = study.analysis.fixed_inertia[1]
     epoch = study.epochs[1]
-    signals = epoch_signals(epoch, study.settings, fit.method)
+    signals = epoch_signals(epoch, study.study.settings, fit.method)
     limit_nm = torque_limit_nm(signals, fit)
     figure = drawn(SIZE, draw_torque, signals, fit, "black", 100.0, limit_nm, rows=5)
     torque, left, *parts = figure.axes
@@ -167,23 +161,16 @@ def test_what_was_recorded_is_drawn_as_it_was() -> None:
     assert [axes.get_ylabel() for axes in (held, turned)] == ["Perturbation\n(N·m)", "Angle\n(deg)"]
 
 
-def test_loops_of_the_conditions_share_a_panel(study: StudyResult) -> None:
+def test_loops_of_the_conditions_share_a_panel_in_degrees(study: Shown) -> None:
     epoch = next(epoch for epoch in study.epochs if epoch.task == "sinusoid")
-    cycles = scoring_cycles(epoch, study.settings.scores)
+    cycles = scoring_cycles(epoch, study.study.settings.scores)
     shown = [("OFF: 1 J", cycles, "black"), ("_DBS: 1 J", cycles, "red")]
     figure = drawn(SIZE, draw_loops, shown)
     (axes,) = figure.axes
     assert [line.get_color() for line in axes.lines] == ["black", "red"]
     assert len(figure.legends[0].get_texts()) == 2
-
-
-def test_loop_is_in_degrees(study: StudyResult) -> None:
-    epoch = next(epoch for epoch in study.epochs if epoch.task == "sinusoid")
-    cycles = scoring_cycles(epoch, study.settings.scores)
-    limits = loop_limits([cycles])
-    (axes,) = drawn(SIZE, draw_loops, [("", cycles, "black")]).axes
     assert np.max(np.asarray(axes.lines[0].get_xdata())) == pytest.approx(20.0, rel=0.05)
-    assert axes.get_xlim() == (-limits[0], limits[0])
+    assert axes.get_xlim()[1] == loop_limits([cycles])[0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("Angle (deg)", "Torque (N·m)")
 
 

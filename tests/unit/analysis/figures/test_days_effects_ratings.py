@@ -1,47 +1,50 @@
 """The figures of a study folder: every point is drawn, and grey print separates conditions."""
 
-import dataclasses
+from typing import Any
 from xml.etree import ElementTree as ET
 
-import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from tests.unit.analysis.report.cohorts import Design, made_study, ratings_found
+from tests.unit.analysis.report.cohorts import Design, bare, made_ratings, made_study
 
-from rigidimeter.analysis.report import SECTIONS
-from rigidimeter.analysis.report import Figure as PageFigure
-from rigidimeter.analysis.report.interval_rows import draw_effects, draw_methods
-from rigidimeter.analysis.report.points import day_rows, draw_days, draw_ratings
-from rigidimeter.analysis.report.style import condition_colours, condition_markers, drawn, svg_text
-from rigidimeter.analysis.study import (
-    Comparison,
-    DayMedian,
-    Measure,
-    Observation,
-    SensitivityRow,
-    StudyResult,
+from rigidimeter.analysis.figures import (
+    Values,
+    condition_colours,
+    condition_markers,
+    day_rows,
+    draw_days,
+    draw_effects,
+    draw_methods,
+    draw_ratings,
+    drawn,
+    effect_rows,
+    svg_text,
 )
+from rigidimeter.analysis.report import SECTIONS, Shown
+from rigidimeter.analysis.report import Figure as PageFigure
+from rigidimeter.analysis.study_anew import Measure, as_rows, counting
 
 NAMES = ("OFF", "DBS")
 COLOURS, MARKERS = condition_colours(NAMES), condition_markers(NAMES)
+MEASURE = Measure("b", "B", "N·m·s/rad", "fits")
 SMALL = Design(days=(3, 2), epochs=(4, 4), scores=(3, 3))
 
 
 SHOWN = ("effects", "days", "ratings", "sensitivity")
 
 
-def figures(result: StudyResult) -> list[PageFigure]:
+def figures(shown: Shown) -> list[PageFigure]:
     return [
         block
         for section in SECTIONS
         if section.name in SHOWN
-        for block in section.blocks(result)
+        for block in section.blocks(shown)
         if isinstance(block, PageFigure)
     ]
 
 
 @pytest.fixture(scope="module")
-def study() -> StudyResult:
+def study() -> Shown:
     return made_study(SMALL)
 
 
@@ -55,21 +58,16 @@ def test_conditions_differ_in_colour_and_in_shape() -> None:
     assert len(set(COLOURS.values())) == len(set(MARKERS.values())) == 2
 
 
-def strip(day: str, condition: str, *values: float, subject: str = "M") -> list[Observation]:
-    return [Observation(value, condition, subject, day) for value in values]
+def strip(day: str, condition: str, *values: float, subject: str = "M") -> list[dict[str, Any]]:
+    about = {"condition": condition, "subject": subject, "day": day, "measure": MEASURE.name}
+    return [about | {"method": "iv", "value": value} for value in values]
 
 
-def days(*strips: list[Observation]) -> Figure:
+def days(*strips: list[dict[str, Any]]) -> Figure:
     """Draw what was measured on these days."""
-    medians = [
-        DayMedian(own[0].subject, own[0].day, own[0].condition, len(own), q2, q1, q3)
-        for own in strips
-        for q1, q2, q3 in [np.quantile([o.value for o in own], [0.25, 0.5, 0.75])]
-    ]
-    every = tuple(o for own in strips for o in own)
-    measure = Measure("b", "B", "N·m·s/rad", "fits")
-    c = Comparison(measure, *NAMES, every, {}, {}, day_medians=tuple(medians))
-    return drawn((7.4, 2.5), draw_days, c, NAMES, rows=len(day_rows(c)))
+    rows = as_rows(row for own in strips for row in own)
+    v = Values(MEASURE, NAMES, counting(rows, MEASURE.name))
+    return drawn((7.4, 2.5), draw_days, v, NAMES, rows=len(day_rows(v)))
 
 
 def test_every_epoch_and_every_median_of_a_day_is_drawn() -> None:
@@ -83,11 +81,6 @@ def test_every_epoch_and_every_median_of_a_day_is_drawn() -> None:
     low, high = axes.get_ylim()
     assert low < 1.0
     assert high > 6.0
-
-
-def test_the_same_days_give_the_same_text() -> None:
-    one, two = (svg_text(days(strip("1", "OFF", 1.0, 2.0))) for _ in range(2))
-    assert one == two
 
 
 def test_both_conditions_of_one_day_share_its_place_side_by_side() -> None:
@@ -124,22 +117,20 @@ def test_subjects_stand_apart_and_many_days_go_on_in_another_row() -> None:
     assert sum(len(axes.get_xticks()) for axes in long.axes) == 60
 
 
-def test_a_forest_has_a_row_for_each_effect_in_their_order(study: StudyResult) -> None:
-    found = [(c, c.effects) for c in study.comparisons[:2] if c.effects is not None]
-    turned = dataclasses.replace(found[1][1], r=0.9, r_low=float("nan"), r_high=0.95)
-    shown = [found[0], (found[1][0], turned)]
+def test_a_forest_has_a_row_for_each_effect_in_their_order(study: Shown) -> None:
+    one, two = effect_rows(study.result)[:2]
+    shown = [one, {**two, "r": 0.9, "r_low": float("nan"), "r_high": 0.95}]
     (axes,) = drawn((7.4, 2.0), draw_effects, shown, "r").axes
     assert points(axes, "s") == [0, 1]
     labels = [text.get_text() for text in axes.get_yticklabels()]
-    test = found[0][1].test
-    assert labels[0] == f"Inertia J\nn = {test.n_x} and {test.n_y}"
+    assert labels[0] == f"Inertia J\nn = {one['n_reference']} and {one['n_other']}"
     assert axes.get_ylim()[0] > axes.get_ylim()[1]  # the first at the top
     assert axes.get_xlim()[0] < -0.95
     # The interval with one end unknown is not drawn.
     assert sum(len(lines.get_segments()) for lines in axes.collections) == 1
 
 
-def test_equal_ratings_are_drawn_side_by_side_and_the_means_are_those_of_the_model() -> None:
+def test_equal_ratings_are_drawn_side_by_side_and_the_means_beside_them() -> None:
     rows = tuple(
         (condition, examiner, "M", day, score)
         for condition, examiner, day, score in (
@@ -151,8 +142,9 @@ def test_equal_ratings_are_drawn_side_by_side_and_the_means_are_those_of_the_mod
             ("DBS", "B", "4", 1.0),
         )
     )
-    found = ratings_found(rows, NAMES)
-    raw, corrected = drawn((7.4, 3.3), draw_ratings, found, NAMES, columns=2).axes
+    means = {"OFF": (1.9, 1.5, 2.3), "DBS": (1.0, 0.6, 1.4)}
+    shown = made_ratings(rows), means, NAMES
+    raw, corrected = drawn((7.4, 3.3), draw_ratings, *shown, columns=2).axes
     equal = [
         x
         for line in raw.lines
@@ -160,14 +152,14 @@ def test_equal_ratings_are_drawn_side_by_side_and_the_means_are_those_of_the_mod
         if y == 2.0 and len(line.get_xdata()) == 3
     ]
     assert len(set(equal)) == 3
-    assert points(corrected, "_") == [mean.mean for mean in found.means]
+    assert points(corrected, "_") == [1.9, 1.0]
 
 
 def test_what_is_concluded_from_is_above_other_methods_and_those_with_j_held() -> None:
-    measure = Measure("b", "B", "N", "fixed_inertia")
+    names = ("method", "inertia", "shift", "shift_low", "shift_high", "chosen")
     rows = [
-        SensitivityRow(measure, method, inertia, 9, 9, shift, low, high, 0.1, 0.2, 0.1, chosen)
-        for method, inertia, shift, low, high, chosen in (
+        {"measure": "b", "title": "B", "unit": "N"} | dict(zip(names, row, strict=True))
+        for row in (
             ("published", "free", 0.2, 0.1, 0.3, False),
             ("iv", "fixed", 0.0, -0.1, 0.1, True),
             ("published", "fixed", 0.25, 0.1, 0.4, False),
@@ -184,7 +176,7 @@ def test_what_is_concluded_from_is_above_other_methods_and_those_with_j_held() -
     assert high > 0.1
 
 
-def test_figures_of_a_study(study: StudyResult) -> None:
+def test_figures_of_a_study(study: Shown) -> None:
     shown = figures(study)
     assert [figure.name for figure in shown] == [
         "days_stiffness_nm_rad",
@@ -203,10 +195,5 @@ def test_figures_of_a_study(study: StudyResult) -> None:
     assert "17 included epochs of 5 days" in shown[0].caption
 
 
-def test_nothing_is_drawn_of_what_is_not_there(study: StudyResult) -> None:
-    assert (
-        figures(
-            dataclasses.replace(study, comparisons=(), differences=(), ratings=None, sensitivity=())
-        )
-        == []
-    )
+def test_nothing_is_drawn_of_what_is_not_there(study: Shown) -> None:
+    assert not {"sensitivity", "effects", "ratings"} & {one.name for one in figures(bare(study))}

@@ -1,0 +1,151 @@
+"""What commands do with studies: read and analyse them, keep what was concluded.
+
+Loads the analysis of studies; a command imports it when it is called.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from rigidimeter.analysis.reading import Recording
+from rigidimeter.analysis.recording import provenance
+from rigidimeter.analysis.report import Shown
+from rigidimeter.analysis.study_anew import (
+    TESTS_SHARE,
+    Loaded,
+    StudyResult,
+    analyse,
+    conclude_study,
+    estimate_study,
+    estimates_study,
+    keep,
+    load_study,
+    prepare_study,
+)
+from rigidimeter.cli.inputs import Analysed, command_line
+from rigidimeter.cli.progress import Meter
+from rigidimeter.cli.reading_options import Recordings
+from rigidimeter.core.errors import UserError
+from rigidimeter.core.records import Analysis, Notice
+from rigidimeter.core.settings import load_settings
+from rigidimeter.core.study_files import read_study_folder
+
+Pair = tuple[str | None, str | None]
+
+_PREPARED_SHARE = 0.2
+"""Of the work on a study: what its epochs take before they are estimated."""
+
+
+def compare_recordings(
+    read: Recording,
+    analysis: Analysis,
+    pair: Pair,
+    group: str | None,
+    *,
+    seed: int,
+    resamples: int,
+    progress: Callable[[float], None],
+) -> StudyResult:
+    """Compare the conditions of recordings.
+
+    Raises
+    ------
+    UserError
+        If there are not two, a name is unknown, or a group is asked for.
+    """
+    study = estimates_study(analysis, pair, group, epochs=read.epochs, settings=read.settings)
+    return conclude_study(study, seed=seed, resamples=resamples, progress=progress)
+
+
+def study_files(folder: Path, key: Path | None) -> tuple[Path, ...]:
+    """Return the study's own files, which no other output may be written over."""
+    tables = read_study_folder(folder, key).files.values()
+    return folder, *tables, *(folder / "analysis").glob("*")
+
+
+def read_study_inputs(
+    folder: Path,
+    recordings: Recordings,
+    key: Path | None = None,
+    pair: Pair = (None, None),
+    group: str | None = None,
+) -> Loaded:
+    """Read a study folder with progress, as the options say."""
+    chosen = load_settings(recordings.settings) if recordings.settings is not None else None
+    with Meter("read", 1.0) as meter:
+        loaded = load_study(
+            folder,
+            key=key,
+            settings=chosen,
+            method=recordings.method,
+            pair=pair,
+            group=group,
+            progress=meter.advance,
+        )
+    return replace(loaded, settings=recordings.adjust(loaded.settings))
+
+
+def estimate_study_inputs(loaded: Loaded) -> tuple[Analysis, list[Notice]]:
+    """Estimate the epochs of a study with progress, and nothing else; with all notices on it."""
+    with Meter("estimate", 1.0) as meter:
+        analysis, found = estimate_study(loaded, meter.advance)
+    return analysis, [*loaded.notices, *found]
+
+
+def analyse_study_folder(
+    folder: Path,
+    recordings: Recordings,
+    key: Path | None = None,
+    *,
+    pair: Pair = (None, None),
+    group: str | None = None,
+    seed: int = 1,
+    resamples: int = 9999,
+) -> tuple[Shown, Analysed]:
+    """Read and analyse a study folder, and keep the analysis in it.
+
+    That of one group is not kept: what changed since the last one would be the other groups.
+
+    Raises
+    ------
+    UserError
+        If there is nothing to analyse.
+    """
+    loaded = read_study_inputs(folder, recordings, key, pair, group)
+    with Meter("study", 1.0) as meter:
+        work, shares = partial(_part, meter.advance), (_PREPARED_SHARE, TESTS_SHARE)
+        prepared = prepare_study(loaded, work(shares[0]))
+        study = analyse(loaded, prepared, progress=work(1.0 - sum(shares)))
+        result = conclude_study(study, seed=seed, resamples=resamples, progress=work(shares[1]))
+    changes, not_kept = [], ""
+    try:
+        changes = keep(loaded, result) if group is None else []
+    except UserError as error:
+        not_kept = str(error)
+    shown = replace(
+        Shown.of_study(result, loaded, prepared),
+        changes=tuple(changes),
+        provenance=_provenance(loaded, result),
+    )
+    bad = any(notice.level == "error" for notice in result.notices)
+    # The screen says what could not be tested.
+    main = [one for one in result.values if one.other and one.other == study.other]
+    bad |= any(one.remark and not one.tested for one in main)
+    return shown, Analysed(study.analysis, result.notices, bad, not_kept)
+
+
+def _part(progress: Callable[[float], None], share: float) -> Callable[[float], None]:
+    return lambda done: progress(share * done)
+
+
+def _provenance(loaded: Loaded, result: StudyResult) -> dict[str, str]:
+    """Return where a result comes from: the tables, and the sessions that count."""
+    folder, read = loaded.folder.folder, loaded.folder
+    tables = [path for name, path in read.files.items() if name != "key"]
+    sessions = [folder / session.path for session in result.study.sessions]
+    known = {path: read.digests[name] for name, path in read.files.items()}
+    known |= {folder / name: digest for name, digest in loaded.recordings.digests.items()}
+    return provenance((*tables, *sessions), known, result.study.settings, command_line())
