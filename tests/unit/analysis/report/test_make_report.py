@@ -1,5 +1,6 @@
 """`report` takes a result, estimates, a recording or its path, and gives one page."""
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,21 @@ def test_a_path_and_what_is_read_from_it_give_the_same_page(csv_file: Path, tmp_
         )
         # Only the time of the analysis may differ.
         assert [x for x in a if "made (UTC)" not in x] == [x for x in b if "made (UTC)" not in x]
+
+
+@pytest.mark.usefixtures("no_figures")
+def test_the_recordings_of_a_compared_study_are_read_again(
+    scored_study: Path, tmp_path: Path
+) -> None:
+    folder = Path(shutil.copytree(scored_study, tmp_path / "study"))
+    result = compare(folder, resamples=0)
+    page = report(result, tmp_path / "report")
+    assert (page.parent / "figures" / "loops.svg").exists()
+    assert "<h1>Small study</h1>" in page.read_text(encoding="utf-8")
+    with (folder / "sessions.csv").open("a") as file:
+        file.write("# seen again\n")
+    with pytest.raises(UserError, match=r"sessions\.csv has changed since the study was compared"):
+        report(result, tmp_path / "report")
 
 
 def test_a_folder_that_cannot_be_written_says_so(study: Shown, tmp_path: Path) -> None:
