@@ -18,11 +18,7 @@ from rigidimeter.analysis.report import SECTIONS, Shown, shown_tables
 from rigidimeter.analysis.report import page as page_module
 from rigidimeter.analysis.report.page import render_page, write_report
 from rigidimeter.analysis.study_anew import comparison_document, difference_rows
-from rigidimeter.cli.comparison_text import (
-    difference_blocks,
-    full_blocks,
-    statement_blocks,
-)
+from rigidimeter.cli.comparison_text import difference_blocks, full_blocks, statement_blocks
 from rigidimeter.cli.estimate_text import estimate_blocks
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
 from rigidimeter.core.files import read_json, write_json

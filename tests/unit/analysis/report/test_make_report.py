@@ -71,11 +71,6 @@ def test_a_folder_that_cannot_be_written_says_so(study: Shown, tmp_path: Path) -
         report(study.analysis, tmp_path / "file")
 
 
-def test_a_path_that_does_not_exist_says_so(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match=r"nothing\.csv"):
-        report(tmp_path / "nothing.csv", tmp_path / "out")
-
-
 def test_what_cannot_be_reported_is_refused(tmp_path: Path) -> None:
     table: Any = pd.DataFrame({"damping": [1.0]})
     with pytest.raises(UserError, match="report takes what compare, estimate or read returned"):
