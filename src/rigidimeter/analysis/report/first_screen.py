@@ -63,7 +63,7 @@ def strips(result: StudyResult) -> list[Strip]:
         each = [one for one in result.comparisons if one.other == other]
         to = reach((size for one in each for size in one.percent(one.of_test)), MOST_PERCENT)
         rows = tuple((row, _plot(row, to)) for row in difference_rows(each))
-        names = map(condition_name, each[0].pair)
+        names = condition_name(result.study.reference), condition_name(other)
         found.append(Strip(*names, said, p_name(each), rows))
     return found
 

@@ -90,7 +90,8 @@ def _facts(shown: Shown) -> dict[str, Any]:
     settings, ratings = study.settings, study.ratings
     scored = {(score.source, score.epoch) for score in analysis.scores}
     days = {(s.subject, s.day) for s in study.sessions}
-    tested = [one for one in day_tests_of(result) if one.tested]
+    by_days = _by_days(result)
+    tested = [one for one in by_days if one.tested]
     out = {(e.source, e.epoch): e.by for e in study.exclusions}
     counts = Counter[str](out.values())
     held = ""
@@ -100,7 +101,8 @@ def _facts(shown: Shown) -> dict[str, Any]:
         held = f"of all conditions ({number(analysis.inertia_kg_m2)} kg·m²)"
     fit = None if ratings is None else ratings.fit
     estimated = [name for name in fit.offsets if name not in fit.inseparable] if fit else []
-    day_tests = day_tests_in_words(shown)
+    # That of the ratings is told with their model.
+    day_tests = [one.test for one in by_days if one.test and one.measure != RATING]
     return {
         **{name: getattr(settings, name) for name in ("controller", "guard", "prbs", "scores")},
         "sinusoid": settings.sinusoid,
@@ -124,7 +126,7 @@ def _facts(shown: Shown) -> dict[str, Any]:
         "offsets": series([f"each {OFFSETS.get(name, name)}" for name in estimated]),
         "by_epochs": any(one.tested for one in result.values if one.other == study.other),
         "by_days": tested,
-        "primary": _primary(result),
+        "primary": _primary(tested),
         "day_tests": day_tests,
         "all_paired": all(words.startswith("paired") for words in day_tests),
         "day_medians": any(getattr(one.statistic, "p_days", math.nan) > 0 for one in tested),
@@ -209,21 +211,15 @@ def _band(fits: Iterable[Fit]) -> tuple[float, float] | None:
     return bands.pop() if len(bands) == 1 else None
 
 
-def day_tests_of(result: StudyResult) -> list[Compared]:
+def _by_days(result: StudyResult) -> list[Compared]:
     """Return the tests of the main pair by days, in the order of the measures."""
     main = [one for one in result.comparisons if one.other == result.study.other]
     order = [one.measure for one in result.values]
     return sorted((one for one in main if one.by == "days"), key=lambda o: order.index(o.measure))
 
 
-def day_tests_in_words(shown: Shown) -> list[str]:
-    """Return the test by days of each measure; that of the ratings is told with their model."""
-    return [one.test for one in day_tests_of(shown.result) if one.test and one.measure != RATING]
-
-
-def _primary(result: StudyResult) -> str:
+def _primary(tests: Sequence[Compared]) -> str:
     """Return the primary measures, where others were compared beside them; else empty."""
-    tests = [one for one in day_tests_of(result) if one.tested]
     primary = [one for one in tests if one.role == "primary"]
     if primary and primary[0].family.rule == "sequence":
         primary.sort(key=lambda one: one.family.order.index(one.measure.name))

@@ -228,7 +228,7 @@ def _precision(result: StudyResult) -> Iterator[dict[str, Any]]:
     study = result.study
     if study.other and any(one.tested for one in result.comparisons if one.other == study.other):
         return
-    yield from precisions_of_each(study.rows, study.pair)
+    yield from precisions_of_each(study.rows, dict.fromkeys(study.pair))
 
 
 def _conditions(result: StudyResult) -> Iterator[dict[str, Any]]:

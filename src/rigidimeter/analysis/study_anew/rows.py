@@ -86,7 +86,7 @@ _WHO = (
 )
 _WHAT = ("value", "se", "low", "high", "bias")
 _EMPTY = {str: "", float: np.nan, bool: True}
-_DTYPE = {float: "float64", bool: "bool"}
+_DTYPE: Mapping[type, str] = {float: "float64", bool: "bool"}
 
 
 def as_rows(records: Iterable[Mapping[str, Any]]) -> pd.DataFrame:

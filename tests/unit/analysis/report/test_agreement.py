@@ -10,22 +10,14 @@ from statistics import fmean, stdev
 from typing import Any
 
 import pytest
-from tests.unit.analysis.report.cohorts import Design, made_study
+from tests.unit.analysis.report.cohorts import Design, made_study, of_study
 from tests.unit.analysis.report.parsed_page import ParsedPage
 
 from rigidimeter.analysis.reading import Recording, estimates_document
-from rigidimeter.analysis.report import SECTIONS, shown_tables
+from rigidimeter.analysis.report import SECTIONS, Shown, shown_tables
 from rigidimeter.analysis.report import page as page_module
 from rigidimeter.analysis.report.page import render_page, write_report
-from rigidimeter.analysis.study import (
-    StudyResult,
-    compare_analysis,
-    comparison_document,
-    conclude,
-    difference_rows,
-    precisions,
-    statements,
-)
+from rigidimeter.analysis.study_anew import comparison_document, difference_rows
 from rigidimeter.cli.comparison_text import (
     difference_blocks,
     full_blocks,
@@ -60,27 +52,27 @@ def assert_shows(text: str, values: Sequence[float | None], digits: int) -> None
 
 
 @pytest.fixture(scope="module")
-def study() -> StudyResult:
+def study() -> Shown:
     made = made_study(Design(days=(4, 3), epochs=(4, 4), scores=(3, 3)))
     first = next(fit for fit in made.analysis.fits if fit.outcome.included)
     pooled = tuple(
         replace(first, source="pooled", epoch="pooled", condition=name, value=share * first.value)
         for name, share in (("OFF", 1.01), ("DBS", 0.87), ("", 0.93))
     )
-    return replace(made, analysis=replace(made.analysis, pooled=pooled))
+    return of_study(made, analysis=replace(made.analysis, pooled=pooled))
 
 
 @pytest.fixture(scope="module")
-def json(study: StudyResult, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def json(study: Shown, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Return both documents as they are read back from their files."""
     folder = tmp_path_factory.mktemp("json")
-    write_json(folder / "comparison.json", comparison_document(study))
+    write_json(folder / "comparison.json", comparison_document(study.result))
     write_json(folder / "estimates.json", estimates_document(study.analysis))
     return {name: read_json(folder / f"{name}.json") for name in ("comparison", "estimates")}
 
 
 @pytest.fixture(scope="module")
-def folder(study: StudyResult, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(study: Shown, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the written report, without the figures of the recordings, which take long."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(page_module, "SECTIONS", [s for s in SECTIONS if s.name not in DRAWN])
@@ -157,8 +149,8 @@ def test_the_terminal_has_the_tables_of_the_page_cell_for_cell(study, page, by_e
 
 def test_the_table_of_differences_is_one_on_page_and_terminal(study, json, page) -> None:
     """Each cell is that of `difference_rows`, and rounds the number of the document."""
-    rows = difference_rows(conclude(study))
-    (terminal,) = difference_blocks(study)
+    rows = difference_rows(study.result.comparisons)
+    (terminal,) = difference_blocks(study.result, "DBS")
     strip = page.table("DBS against OFF")
     assert [plain(heading) for heading in strip[0]][:4] == ["Measure", "OFF", "DBS", "DBS − OFF"]
     assert [*terminal.headings[1:4]] == ["OFF", "DBS", "DBS − OFF"]
@@ -201,26 +193,25 @@ def assert_rounds(text: str, values: Sequence[float]) -> None:
 def test_simulated_differences_stand_beside_those_found(study) -> None:
     """Of a virtual study, on terminal, page and in the document."""
     simulated = {"OFF": {"stiffness_nm_rad": 1.75}, "DBS": {"stiffness_nm_rad": 1.4}}
-    virtual = replace(
-        study,
-        conditions=tuple(replace(c, simulated=simulated[c.name]) for c in study.conditions),
-    )
-    rows = difference_rows(conclude(virtual))
+    conditions = (replace(c, simulated=simulated[c.name]) for c in study.study.conditions)
+    design = Design(days=(4, 3), epochs=(4, 4), scores=(3, 3))
+    virtual = made_study(design, conditions=tuple(conditions))
+    rows = difference_rows(virtual.result.comparisons)
     assert [row.simulated for row in rows] == ["−20 %", *[""] * 5]
-    (terminal,) = difference_blocks(virtual)
+    (terminal,) = difference_blocks(virtual.result, "DBS")
     assert terminal.headings[4] == "simulated"
     assert [line[4] for line in terminal.rows] == [row.simulated for row in rows]
     strip = ParsedPage(render_page(virtual, (), {})).table("DBS against OFF")
     assert strip[0][4] == "Simulated"
     assert [cells[4] for cells in strip[1:]] == ["−20 %", *["–"] * 5]
-    document = comparison_document(virtual)["conclusion"]
+    document = comparison_document(virtual.result)["conclusion"]
     assert document[0]["simulated_difference_percent"] == pytest.approx(-20.0)
     assert "simulated_difference" not in document[1]
 
 
 def test_statements_are_the_same_on_page_terminal_and_in_python(study, page) -> None:
-    said = statements(study)
-    (terminal,) = statement_blocks(study)
+    said = study.result.statements
+    (terminal,) = statement_blocks(study.result, "DBS")
     assert [*terminal.rows] == [
         ("measured", said.measured),
         ("tested", said.tested),
@@ -353,9 +344,9 @@ def test_estimates_of_every_epoch(json, folder: Path, page: ParsedPage) -> None:
                 assert_shows(table[1 + place][heading], ends, 4)
 
 
-def first_screen(study: StudyResult, column: str) -> list[Sequence[str]]:
+def first_screen(study: Shown, column: str) -> list[Sequence[str]]:
     """Return the rows of the table of the first screen of `estimate` with this first heading."""
-    read = Recording(study.epochs, (), study.settings, ())
+    read = Recording(study.epochs, (), study.study.settings, ())
     for _, table in tables_of(estimate_blocks(read, study.analysis)):
         if table.headings and table.headings[0] == column:
             return [row for row in table.rows if not isinstance(row, str)]
@@ -368,8 +359,7 @@ def test_the_first_screen_of_estimates_has_the_numbers_of_the_document(study, js
     assert len(epochs) > 8
     fits = tuple(replace(fit, source="x.csv") for fit in study.analysis.fits)
     analysis = replace(study.analysis, fits=fits, fixed_inertia=fits, scores=())
-    one_file = replace(study, analysis=analysis)
-    shown = first_screen(one_file, "epoch")[:6]
+    shown = first_screen(of_study(study, analysis=analysis), "epoch")[:6]
     assert first_screen(study, "epoch")[0][0] == "together"  # of several recordings
     assert shown[4][0] == "…"
     for row, one in zip([*shown[:4], shown[5]], [*epochs[:4], epochs[-1]], strict=True):
@@ -410,27 +400,6 @@ def test_the_first_screen_has_all_epochs_together(study, json) -> None:
                 assert abs(one - size) <= 0.501 * 10.0**-places
             each = [one[parameter] for one in own]
             assert_shows(sd[k], [100 * stdev(each) / fmean(each)], 2)
-
-
-def test_the_first_screen_has_the_precision_of_one_condition(make_analysis) -> None:
-    """Without a fit to all epochs together: means over epochs, of one epoch without an interval."""
-    result = compare_analysis(make_analysis({"DBS": 3}), resamples=0)
-    found = {one.measure.name: one for one in precisions(result)}
-    value, ends, sd = first_screen(result, "epoch")[-3:]
-    for k, name in enumerate(PARAMETERS, start=2):
-        one = found[name]
-        factor = 1e3 if name == "inertia_kg_m2" else 1.0
-        shown = numbers(f"{value[k]} {ends[k]}")
-        places = len(value[k].partition(".")[2])
-        for number, size in zip(shown, (one.value, one.low, one.high), strict=True):
-            assert abs(number - factor * size) <= 0.501 * 10.0**-places
-        assert_shows(sd[k], [one.sd_percent], 2)
-    (scores,) = first_screen(result, "sinusoids")
-    assert scores[1] == "3"
-    for cell, name in zip(scores[2:], ("impulse_nm_s", "work_j"), strict=True):
-        assert_shows(cell, [found[name].value, found[name].sd_percent], 2)
-    (scores,) = first_screen(compare_analysis(make_analysis({"DBS": 1}), resamples=0), "sinusoids")
-    assert "SD" not in " ".join(scores)
 
 
 def test_scores_of_every_epoch(json, folder: Path, page: ParsedPage) -> None:
