@@ -1,6 +1,13 @@
-"""A report's page as text and tables."""
+"""A report's page as text and tables, and the numbers of a text."""
 
+import math
+import re
+from collections.abc import Sequence
 from html.parser import HTMLParser
+
+NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:·10[⁻⁰-⁹¹²³]+)?")
+SHARED = re.compile(r"\[([^]]*)\](·10[⁻⁰-⁹¹²³]+)")
+LOWERED = str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789")
 
 
 class ParsedPage(HTMLParser):
@@ -59,3 +66,18 @@ class ParsedPage(HTMLParser):
     def words(self, section: str = "") -> str:
         """Return the text of the page, or of one section, with single spaces."""
         return " ".join((self.sections[section] if section else self.text).split())
+
+
+def numbers(text: str) -> list[float]:
+    text = SHARED.sub(lambda all_: NUMBER.sub(rf"\g<0>{all_[2]}", all_[1]), text)
+    return [float(found.replace("·10", "e").translate(LOWERED)) for found in NUMBER.findall(text)]
+
+
+def assert_shows(text: str, values: Sequence[float | None], digits: int) -> None:
+    """Assert that the text has these numbers in this order, rounded to so many digits or more."""
+    expected = [value for value in values if value is not None]
+    found = numbers(text)
+    assert len(found) == len(expected), (text, expected)
+    for one, value in zip(found, expected, strict=True):
+        size = math.floor(math.log10(abs(value))) if value else 0
+        assert abs(one - value) <= 0.501 * 10.0 ** (size - digits + 1), (text, expected)
