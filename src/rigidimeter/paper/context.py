@@ -12,9 +12,18 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rigidimeter.analysis.study import StudyResult, compare_measures, estimate, read_study
-from rigidimeter.analysis.study.comparison import day_tests, gathered
-from rigidimeter.analysis.study.ratings_model import rated
+from rigidimeter.analysis.recording import estimate
+from rigidimeter.analysis.study_anew import (
+    Loaded,
+    Study,
+    StudyResult,
+    compare_values,
+    day_tests,
+    estimate_rows,
+    load_study,
+    study_ratings,
+)
+from rigidimeter.analysis.traces import Prepared, prepared_epochs
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import read_json, write_json
 from rigidimeter.core.settings import Settings
@@ -98,17 +107,43 @@ class Context:
     def study(self) -> StudyResult:
         """The virtual study: estimates, rank-sum tests, tests by days, and ratings.
 
+        Its estimates are those of all epochs together, by one method; nothing is concluded.
+
         Raises
         ------
         UserError
             If the folder holds another seed, design or version, or an unfinished study.
         """
-        if self._folder is not None:
-            return self._study_in(self._folder)
-        with tempfile.TemporaryDirectory() as place:
-            return self._study_in(Path(place) / "virtual-study")
+        loaded = self._loaded
+        analysis = estimate(loaded.epochs, settings=loaded.settings)
+        sessions = loaded.recordings.entries
+        ratings, _ = study_ratings(loaded.folder, loaded.names, {})
+        study = Study(
+            estimate_rows({analysis.method: analysis}, sessions, loaded.epochs),
+            *loaded.names.pair,
+            title=loaded.folder.about.title,
+            settings=loaded.settings,
+            sessions=tuple(session.entry for session in loaded.recordings.sessions),
+            ratings=ratings,
+            virtual=True,
+            analysis=analysis,
+        )
+        return StudyResult(study, day_tests(study), compare_values(study), resamples=0)
 
-    def _study_in(self, folder: Path) -> StudyResult:
+    @cached_property
+    def prepared(self) -> Prepared:
+        """The epochs of the virtual study as they were analysed."""
+        study = self.study.study
+        return prepared_epochs(self._loaded.epochs, study.analysis, study.settings)
+
+    @cached_property
+    def _loaded(self) -> Loaded:
+        if self._folder is not None:
+            return self._loaded_from(self._folder)
+        with tempfile.TemporaryDirectory() as place:
+            return self._loaded_from(Path(place) / "virtual-study")
+
+    def _loaded_from(self, folder: Path) -> Loaded:
         wanted = {"design": self.design.name, "seed": self.seed, "rigidimeter": __version__}
         made = folder / MADE
         if made.is_file():
@@ -128,25 +163,7 @@ class Context:
                 progress=lambda time_s: self._progress(time_s / length_s),
             )
             write_json(made, wanted)
-        read = read_study(folder)
-        analysis = estimate(read.epochs, settings=read.settings)
-        sessions = read.gathered.entries
-        pair = read.names.pair
-        comparisons, _ = compare_measures(gathered(analysis, pair, sessions), resamples=0)
-        ratings, _ = rated(read.folder, read.names)
-        return StudyResult(
-            title=read.folder.about.title,
-            reference=pair[0],
-            other=pair[1],
-            comparisons=day_tests(comparisons),
-            resamples=0,
-            analysis=analysis,
-            epochs=read.epochs,
-            settings=read.settings,
-            sessions=tuple(session.entry for session in read.gathered.sessions),
-            virtual=True,
-            ratings=ratings,
-        )
+        return load_study(folder)
 
 
 def _named(made: Mapping[str, object]) -> str:

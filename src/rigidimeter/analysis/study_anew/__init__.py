@@ -50,7 +50,14 @@ from rigidimeter.analysis.study_anew.from_folder import (
 )
 from rigidimeter.analysis.study_anew.load import load as load_recordings
 from rigidimeter.analysis.study_anew.load import place_of, source_of, without_excluded
-from rigidimeter.analysis.study_anew.measures import MEASURES, RATING, SCORE, Measure, Primary
+from rigidimeter.analysis.study_anew.measures import (
+    LEVEL,
+    MEASURES,
+    RATING,
+    SCORE,
+    Measure,
+    Primary,
+)
 from rigidimeter.analysis.study_anew.rating_document import (
     Agreement,
     Relation,
@@ -62,7 +69,12 @@ from rigidimeter.analysis.study_anew.rating_document import (
     relations,
 )
 from rigidimeter.analysis.study_anew.rating_table import table_ratings
-from rigidimeter.analysis.study_anew.ratings import corrected, ratings_of
+from rigidimeter.analysis.study_anew.ratings import (
+    corrected,
+    fit_scores,
+    ratings_of,
+    study_ratings,
+)
 from rigidimeter.analysis.study_anew.results import TESTS_SHARE, StudyResult, conclude_study
 from rigidimeter.analysis.study_anew.rows import (
     FIELDS,

@@ -76,6 +76,7 @@ def day_scatter(loaded: Loaded, analysis: Analysis) -> tuple[DayScatter, ...]:
         measured = float(np.mean(np.square([e for e in errors if math.isfinite(e)] or [0.0])))
         percent = 100.0 / abs(float(np.mean([fit.value[k] for fit in of])))
         variances = max(parts.within - measured, 0.0), parts.between_days, parts.condition_in_day
-        sds = [percent * math.sqrt(variance) for variance in variances]
-        found.append(DayScatter(parameter.name, *sds, days_both=parts.days_both, epochs=len(fits)))
+        within, between, in_day = (percent * math.sqrt(variance) for variance in variances)
+        scatter = within, between, in_day, parts.days_both, len(fits)
+        found.append(DayScatter(parameter.name, *scatter))
     return tuple(found)

@@ -177,9 +177,8 @@ def condition_names(study: Study) -> tuple[str, ...]:
     """Return all conditions in the order of the study or the protocol, then as recorded."""
     order = [each.name for each in study.conditions]
     order = order or [block.condition for block in study.settings.protocol.blocks]
-    epochs = study.rows[study.rows["scope"] == "epoch"]  # that of all epochs has no condition
-    recorded_ones = map(str, epochs["condition"].drop_duplicates())
-    names = dict.fromkeys([*filter(None, study.pair), *recorded_ones])
+    of_epochs = study.rows[study.rows["scope"] != "all"]  # that of all epochs has no condition
+    names = dict.fromkeys([*filter(None, study.pair), *map(str, of_epochs["condition"])])
     return tuple(sorted(names, key=lambda n: order.index(n) if n in order else len(order)))
 
 

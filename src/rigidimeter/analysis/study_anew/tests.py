@@ -162,7 +162,7 @@ def of_difference(
     first, second = found.mean_x, found.mean_y
     if not known:
         first, second = (
-            float(each["weight"] @ each["value"]) if len(each) else math.nan for each in weighed
+            math.fsum(each["weight"] * each["value"]) if len(each) else math.nan for each in weighed
         )
     counts = [_units(of_days, found.unit) for of_days in found.weights]
     return Compared(
@@ -257,5 +257,5 @@ def _measured_half(weighed: pd.DataFrame, measure: Measure) -> float:
     weight, value, low, high = (
         weighed[name].to_numpy() for name in ("weight", "value", "low", "high")
     )
-    half = math.sqrt(float(np.sum((weight * (high - low) / 2) ** 2)))
-    return max(half, ACCURACY * float(weight @ np.abs(value)) / 2)
+    half = math.sqrt(math.fsum((weight * (high - low) / 2) ** 2))
+    return max(half, ACCURACY * math.fsum(weight * np.abs(value)) / 2)

@@ -162,6 +162,11 @@ def score_rows(records: Sequence[tuple[str, str, str, str, float]]):
     )
 
 
+def first(one: Any) -> Any:
+    """Return what is of the first recording of each condition."""
+    return one if one.source in ("sessions/M1-day-01", "sessions/M1-day-02") else None
+
+
 def in_dbs(one: Fit | Score) -> bool:
     return one.condition == "DBS"
 

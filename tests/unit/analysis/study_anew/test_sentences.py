@@ -17,6 +17,7 @@ from tests.unit.analysis.study_anew.made import (
     Design,
     alike,
     doubted,
+    first,
     in_dbs,
     made,
     nothing,
@@ -36,13 +37,6 @@ from rigidimeter.analysis.study_anew import (
 )
 from rigidimeter.core.records import Analysis, Fit, Outcome
 from rigidimeter.core.study_files import PrimaryTable
-
-FIRST = ("sessions/M1-day-01", "sessions/M1-day-02")
-
-
-def first(one: Any) -> Any:
-    """Return what is of the first recording of each condition."""
-    return one if one.source in FIRST else None
 
 
 def once(stiffness: float, percent: float = 0.2) -> dict[str, Any]:
@@ -214,6 +208,19 @@ def grouped(patients: float, controls: float) -> pd.DataFrame:
     )  # fmt: skip
 
 
+def two_days() -> pd.DataFrame:
+    """Return epochs that scatter by 2 %, and nothing between days; b does not differ at all."""
+    rng = np.random.default_rng(3)
+    return pd.DataFrame(
+        {"subject": "S1", "day": day, "condition": name, "k": level * (1 + 0.02 * x),
+         "b": 1 + 0.1 * rng.standard_normal()}
+        for day in (1, 2)
+        for name, level in (("OFF", 1.75), ("DBS", 1.435))
+        for x in rng.standard_normal(8)
+    )  # fmt: skip
+
+
+ALIKE = np.random.default_rng(1).normal(5.0, 1.0, (2, 80))
 TEN = values(range(10), range(20, 30))
 AROUND_ZERO = rows([-0.2, 0.1, 0.15, -0.05, 0.01], [0.1, -0.1, 0.2, -0.3, 0.05])
 BOTH = grouped(-0.18, -0.18)
@@ -227,6 +234,10 @@ TABLES: dict[str, tuple[pd.DataFrame, dict[str, Any]]] = {
     "table: ten against ten, turned": (TEN, {"pair": ("DBS", "OFF")}),
     "table: four conditions": (stepped(), {}),
     "table: two of four conditions": (stepped(), {"pair": ("OFF", "2 mA")}),
+    # Two days conclude no absence: there is still one degree of freedom.
+    "table: two days": (two_days(), {"columns": Columns(["k", "b"])}),
+    "table: many values that do not differ": (values(*ALIKE), {}),
+    "table: few values that do not differ": (values(*ALIKE[:, :6]), {}),
     # A difference of one group alone is claimed of no group; opposite ones are not none.
     "groups: one differs": (grouped(-0.18, 0.0), {}),
     "groups: they differ in sign": (grouped(-0.18, 0.18), {}),
