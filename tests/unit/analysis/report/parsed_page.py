@@ -5,10 +5,10 @@ import re
 from collections.abc import Sequence
 from html.parser import HTMLParser
 
+VOID = {"meta", "img", "br", "link", "input", "hr"}
 NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:·10[⁻⁰-⁹¹²³]+)?")
 SHARED = re.compile(r"\[([^]]*)\](·10[⁻⁰-⁹¹²³]+)")
 LOWERED = str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789")
-VOID = {"meta", "img", "br", "link", "input", "hr"}
 
 
 class ParsedPage(HTMLParser):
