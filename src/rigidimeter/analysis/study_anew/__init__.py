@@ -98,7 +98,7 @@ from rigidimeter.analysis.study_anew.sentences import (
     statements,
 )
 from rigidimeter.analysis.study_anew.session_checks import Session
-from rigidimeter.analysis.study_anew.store import UNCHANGED, keep
+from rigidimeter.analysis.study_anew.store import UNCHANGED, keep, kept_study
 from rigidimeter.analysis.study_anew.study import (
     Condition,
     Deviation,

@@ -70,8 +70,8 @@ class Loaded:
     further : tuple of str
         Conditions with epochs that are compared with the reference beside those of `names.pair`.
     primary : Primary
-    again : callable
-        Reads it again, in the same way.
+    again : partial
+        Reads it again, in the same way: by the folder, and what was asked as keywords.
     """
 
     folder: StudyFolder
@@ -84,7 +84,7 @@ class Loaded:
     notices: tuple[Notice, ...]
     further: tuple[str, ...]
     primary: Primary
-    again: Callable[[], Loaded] = field(repr=False, compare=False)
+    again: partial[Loaded] = field(repr=False, compare=False)
 
 
 def load_study(

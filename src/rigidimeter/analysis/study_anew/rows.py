@@ -21,7 +21,7 @@ import scipy
 from rigidimeter.analysis.study_anew.measures import MEASURES, Measure, measure_of
 from rigidimeter.analysis.study_anew.study import Condition, SessionEntry
 from rigidimeter.core.errors import UserError, refused
-from rigidimeter.core.files import TextTable, csv_text, in_place, read_text_table, write_text
+from rigidimeter.core.files import TextTable, csv_text, read_text_table, replace_file, write_text
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import PARAMETERS, Analysis, Epoch, Fit, Score
 
@@ -196,14 +196,21 @@ def write_rows(path: Path, rows: pd.DataFrame) -> None:
     """
     if _ending(path) == ".csv":
         write_text(path, csv_text(list(FIELDS), rows[list(FIELDS)].astype(object).to_numpy()))
-        return
+    else:
+        with refused(path, "cannot be written"):
+            replace_file(path, parquet_bytes(rows))
+
+
+def parquet_bytes(rows: pd.DataFrame, beside: str = "") -> bytes:
+    """Return the table as a Parquet file has it, with a text that `read_with_beside` gives back."""
     import pyarrow as pa
     from pyarrow import parquet
 
     table = pa.Table.from_pandas(rows[list(FIELDS)], preserve_index=False)
-    table = table.replace_schema_metadata((table.schema.metadata or {}) | {"schema": ROWS_SCHEMA})
-    with refused(path, "cannot be written"), in_place(path) as beside:
-        parquet.write_table(table, beside)
+    about = {"schema": ROWS_SCHEMA} | ({"beside": beside} if beside else {})
+    sink = pa.BufferOutputStream()
+    parquet.write_table(table.replace_schema_metadata((table.schema.metadata or {}) | about), sink)
+    return bytes(sink.getvalue())
 
 
 def read_rows(path: Path) -> pd.DataFrame:
@@ -216,6 +223,17 @@ def read_rows(path: Path) -> pd.DataFrame:
     """
     if _ending(path) == ".csv":
         return _from_text(read_text_table(path))
+    return read_with_beside(path)[0]
+
+
+def read_with_beside(path: Path) -> tuple[pd.DataFrame, str]:
+    """Return the table of a Parquet file, and the text that was stored with it.
+
+    Raises
+    ------
+    UserError
+        If it is another file.
+    """
     from pyarrow import ArrowInvalid, parquet
 
     with refused(path, "cannot be read"):
@@ -223,10 +241,11 @@ def read_rows(path: Path) -> pd.DataFrame:
             table = parquet.read_table(path)
         except ArrowInvalid as error:
             raise UserError(f"{path}: is no Parquet file ({error})") from None
-    found = (table.schema.metadata or {}).get(b"schema", b"nothing").decode()
+    about = table.schema.metadata or {}
+    found = about.get(b"schema", b"nothing").decode()
     if found != ROWS_SCHEMA:
         raise UserError(f"{path}: its schema is {found}, where {ROWS_SCHEMA} is expected")
-    return pd.DataFrame(table.to_pandas()[list(FIELDS)])
+    return pd.DataFrame(table.to_pandas()[list(FIELDS)]), about.get(b"beside", b"").decode()
 
 
 def _ending(path: Path) -> str:

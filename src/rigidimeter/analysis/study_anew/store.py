@@ -29,14 +29,22 @@ from rigidimeter.analysis.study_anew.document import (
 from rigidimeter.analysis.study_anew.from_folder import ANALYSIS, COMPARISON, Loaded
 from rigidimeter.analysis.study_anew.measures import RATING
 from rigidimeter.analysis.study_anew.results import StudyResult
+from rigidimeter.analysis.study_anew.reuse import (
+    ESTIMATES,
+    ROWS,
+    file_digest,
+    rows_file,
+    stored_study,
+)
+from rigidimeter.analysis.study_anew.study import Study
 from rigidimeter.core.errors import UserError, refused
 from rigidimeter.core.files import (
     DICTIONARY,
     dictionary_text,
     json_text,
     read_json,
+    replace_file,
     text_bytes,
-    write_text,
 )
 from rigidimeter.core.settings import dump_settings, with_new_names
 from rigidimeter.core.version import __version__
@@ -81,13 +89,16 @@ def keep(loaded: Loaded, result: StudyResult) -> list[str]:
     made = {f"{name}.csv": result_table(result, name) for name in _TABLES}
     tables = {name: rows for name, rows in made.items() if rows}
     texts = {
-        "estimates.json": json_text(estimates_document(result.study.analysis)),
+        ESTIMATES: json_text(estimates_document(result.study.analysis)),
         **{name: table_csv(rows) for name, rows in tables.items()},
         DICTIONARY: dictionary_text({name: columns_of_rows(rows) for name, rows in tables.items()}),
         COMPARISON: json_text(document),
     }
+    stored = rows_file(loaded, result.study)
+    contents = {} if stored is None else {ROWS: stored}
+    contents |= {name: text_bytes(text) for name, text in texts.items()}
     inputs = _inputs(loaded, result)
-    results = {name: hashlib.sha256(text_bytes(text)).hexdigest() for name, text in texts.items()}
+    results = {name: hashlib.sha256(content).hexdigest() for name, content in contents.items()}
     before = _object(folder / INPUTS)
     if before is not None and not _is_inputs(before):
         before = None
@@ -100,14 +111,34 @@ def keep(loaded: Loaded, result: StudyResult) -> list[str]:
             said += _moved(old, document)
     elif (folder / INPUTS).exists():
         said.append(f"{ANALYSIS}/{INPUTS} is damaged, so what has changed since is unknown")
-    _write(folder, texts, edited)
+    _write(folder, contents, edited)
     with refused(folder, "cannot be written"):
-        for name in sorted({*_results(before)} - {*texts} - {*edited}):
+        for name in sorted({*_results(before)} - {*contents} - {*edited}):
             (folder / name).unlink(missing_ok=True)  # ours, unedited, and no longer a result
-    _write_new(folder / INPUTS, json_text({**inputs, "results": results}))
+    _write_new(folder / INPUTS, text_bytes(json_text({**inputs, "results": results})))
     if before is not None and not said:
         said.append(UNCHANGED)
     return said
+
+
+def kept_study(folder: Path, **asked: Any) -> tuple[Loaded, Study] | None:
+    """Return a study as it was analysed before, if nothing that it was made of has changed.
+
+    Parameters
+    ----------
+    folder : Path
+    asked
+        `key`, `settings`, `method` and `pair`, as `load_study`.
+
+    Returns
+    -------
+    (Loaded, Study) or None
+        What is loaded has no recordings; `keep` takes it.
+    """
+    before = _object(folder / ANALYSIS / INPUTS)
+    if before is None or not _is_inputs(before):
+        return None
+    return stored_study(folder, **asked, results=_results(before))
 
 
 def _inputs(loaded: Loaded, result: StudyResult) -> dict[str, Any]:
@@ -124,11 +155,6 @@ def _inputs(loaded: Loaded, result: StudyResult) -> dict[str, Any]:
     }
 
 
-def _file_digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
 def _edited(
     folder: Path, before: Mapping[str, Any] | None, results: Mapping[str, str], said: list[str]
 ) -> dict[str, str]:
@@ -143,7 +169,7 @@ def _edited(
             if not path.is_file():
                 if digest and name in results:
                     said.append(f"{ANALYSIS}/{name} was taken away; it is written again")
-            elif _file_digest(path) not in (digest, results.get(name)):
+            elif file_digest(path) not in (digest, results.get(name)):
                 edited[name] = _free(folder, f"{name}.edited")
                 how = "was changed by hand after it was written" if digest else "was there already"
                 said.append(
@@ -251,23 +277,24 @@ def _leaves(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, 
             yield prefix + name, value
 
 
-def _write(folder: Path, texts: Mapping[str, str], edited: Mapping[str, str]) -> None:
+def _write(folder: Path, contents: Mapping[str, bytes], edited: Mapping[str, str]) -> None:
     with refused(folder, "cannot be written"):
         folder.mkdir(exist_ok=True)
         for name, aside in edited.items():
             (folder / name).replace(folder / aside)
-    for name, text in texts.items():
-        _write_new(folder / name, text)
+    for name, content in contents.items():
+        _write_new(folder / name, content)
 
 
-def _write_new(path: Path, text: str) -> None:
+def _write_new(path: Path, content: bytes) -> None:
     """Write a file unless it holds these bytes already."""
     try:
-        if path.is_file() and path.read_bytes() == text_bytes(text):
+        if path.is_file() and path.read_bytes() == content:
             return
     except OSError:
         pass  # writing says what is wrong
-    write_text(path, text)
+    with refused(path, "cannot be written"):
+        replace_file(path, content)
 
 
 def _results(before: Mapping[str, Any] | None) -> dict[str, str]:

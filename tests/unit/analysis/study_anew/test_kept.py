@@ -10,11 +10,15 @@ import pytest
 
 import rigidimeter.analysis.study_anew.store
 from rigidimeter.analysis.study_anew import (
+    TABLES,
     UNCHANGED,
     analyse,
+    comparison_document,
     conclude_study,
     keep,
+    kept_study,
     load_study,
+    result_table,
 )
 from rigidimeter.core.settings import dump_settings, parse_settings
 
@@ -192,3 +196,58 @@ DAMAGED = '{"schema": "rigidimeter.study-inputs/1", "settings": [2], "files": {}
 def test_damaged_inputs_are_said(study: Path, text: str) -> None:
     (study / "analysis/inputs.json").write_text(text)
     assert kept(study) == ["analysis/inputs.json is damaged, so what has changed since is unknown"]
+
+
+class TestTwice:
+    """Nothing is computed twice, and nothing that could be another is taken for the same."""
+
+    def test_a_kept_study_says_the_same(self, study: Path) -> None:
+        (study / "exclusions.csv").write_text("path,epoch,reason,by\nsessions/2-OFF,1,coughed,\n")
+        loaded = load_study(study)
+        found = conclude_study(analyse(loaded), resamples=100)
+        keep(loaded, found)
+        before = state(study)
+        shutil.copytree(study / "sessions", study.parent / "away")
+        again, kept_one = kept_study(study)
+        shutil.rmtree(study / "sessions")  # no recording is read again
+        result = conclude_study(kept_one, resamples=100)
+        place = str(study)
+        assert comparison_document(result, place) == comparison_document(found, place)
+        for name in TABLES:
+            assert [*map(str, result_table(result, name))] == [*map(str, result_table(found, name))]
+        assert keep(again, result) == [UNCHANGED]
+        assert state(study) == before
+        shutil.move(study.parent / "away", study / "sessions")
+        assert len(kept_one.folder_read().epochs) == len(loaded.epochs)
+
+    @pytest.mark.parametrize(
+        "path",
+        ["sessions/2-OFF/samples.arrows", "sessions/2-OFF/manifest.json", "ratings.csv",
+         "study.toml", "analysis/rows.parquet", "analysis/estimates.json", "new.csv",
+         "analysis/inputs.json"],
+    )  # fmt: skip
+    def test_any_other_byte_and_any_new_file_ends_it(self, study: Path, path: str) -> None:
+        assert kept_study(study) is not None
+        file = study / path
+        content = file.read_bytes() if file.exists() else b"x"
+        if path.endswith("inputs.json"):
+            file.write_text("{}")
+        else:  # of the same size
+            file.write_bytes(content[:-9] + bytes([content[-9:][0] ^ 1]) + content[-8:][:8])
+        assert kept_study(study) is None
+
+    @pytest.mark.parametrize(
+        "asked", [{"method": "published"}, {"pair": ("DBS", "OFF")}, other_band]
+    )
+    def test_what_was_asked_otherwise_is_another_study(self, study: Path, asked) -> None:
+        assert kept_study(study, **(asked(study) if callable(asked) else asked)) is None
+
+    def test_other_software_computes_anew(self, study: Path, monkeypatch) -> None:
+        monkeypatch.setattr("rigidimeter.analysis.study_anew.reuse.__version__", "0")
+        assert kept_study(study) is None
+
+    def test_nothing_is_kept_of_a_group_nor_with_a_linked_folder(self, study: Path) -> None:
+        (study / "linked").symlink_to(study / "sessions")
+        kept(study)
+        assert kept_study(study) is None
+        assert not (study / "analysis/rows.parquet").exists()
