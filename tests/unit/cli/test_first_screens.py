@@ -25,7 +25,7 @@ def assert_one_screen(lines: list[str]) -> None:
 
 @pytest.fixture(scope="module")
 def study() -> Shown:
-    return made_study(Design(days=(5, 5), epochs=(5, 5), scores=(3, 3), both_on_a_day=True))
+    return made_study(Design(days=(6, 6), epochs=(5, 5), scores=(3, 3), both_on_a_day=True))
 
 
 def of_sources(study: Shown, *sources: str) -> tuple[Recording, Analysis]:

@@ -26,7 +26,6 @@ from rigidimeter.analysis.figures.curves import (
     torque_limit_nm,
 )
 from rigidimeter.analysis.figures.design_folder import draw_bode, write_design_folder
-from rigidimeter.analysis.figures.inline_svg import inline_svg
 from rigidimeter.analysis.figures.inspected_columns import columns_figure, draw_columns
 from rigidimeter.analysis.figures.interval_rows import (
     band_label,
@@ -69,3 +68,4 @@ from rigidimeter.analysis.figures.style import (
     styled,
     svg_text,
 )
+from rigidimeter.analysis.figures.svg_element import inline_svg

@@ -25,6 +25,12 @@ def channels(time_s: np.ndarray, **values: np.ndarray) -> dict[str, Channel]:
     return {name: Channel(name, time_s, samples) for name, samples in values.items()}
 
 
+def driven(joint: JointDynamics) -> signal.StateSpace:
+    """Return the joint in the admittance loop, from the perturbation to the angle."""
+    inertia, damping = joint.inertia_kg_m2 + INERTIA_C, joint.damping_nm_s_rad + DAMPING_C
+    return signal.lti([1.0], [inertia, damping, joint.stiffness_nm_rad]).to_ss()
+
+
 def prbs_epoch(
     joint: JointDynamics, label: str, condition: str, source: str, rng: np.random.Generator
 ) -> Epoch:
@@ -32,14 +38,7 @@ def prbs_epoch(
     time_s = 100.0 + np.arange(int(20 * RATE_HZ)) / RATE_HZ
     levels = np.random.default_rng(0).choice([-1.0, 1.0], size=400)
     perturbation = levels[np.minimum((20 * (time_s - 100)).astype(int), 399)]
-    loop = signal.lti(
-        [1.0],
-        [
-            joint.inertia_kg_m2 + INERTIA_C,
-            joint.damping_nm_s_rad + DAMPING_C,
-            joint.stiffness_nm_rad,
-        ],
-    ).to_ss()
+    loop = driven(joint)
     _, _, states = signal.lsim(loop, perturbation, time_s - 100)
     velocity, angle = states[:, 0], states[:, 1] * loop.C[0, 1]
     velocity = velocity * loop.C[0, 1]
@@ -73,14 +72,7 @@ def periodic_epoch(
     levels, per_chip, periods = prbs_levels(6), 25, 3
     held = np.repeat(np.roll(np.tile(levels, periods + 1), -first_chip), per_chip)
     time_s = np.arange(held.size) / RATE_HZ
-    loop = signal.lti(
-        [1.0],
-        [
-            joint.inertia_kg_m2 + INERTIA_C,
-            joint.damping_nm_s_rad + DAMPING_C,
-            joint.stiffness_nm_rad,
-        ],
-    ).to_ss()
+    loop = driven(joint)
     _, angle, states = signal.lsim(loop, held, time_s, interp=False)
     velocity = states[:, 0] * loop.C[0, 1]
     acceleration = (states @ loop.A[0] + loop.B[0, 0] * held) * loop.C[0, 1]
@@ -153,16 +145,8 @@ def epochs() -> list[Epoch]:
         for i in range(4):
             by = float(rng.lognormal(0, 0.08))
             made.append(sinusoid_epoch(scaled(joint, by), f"s{i}", condition, source))
-    first = made[0]
-    made[0] = Epoch(
-        first.source,
-        first.label,
-        first.channels,
-        first.condition,
-        first.task,
-        closed=Outcome("excluded", "the arm touched the position limit"),
-    )
-    return made
+    touched = Outcome("excluded", "the arm touched the position limit")
+    return [replace(made[0], excitation_hz=None, closed=touched), *made[1:]]
 
 
 @pytest.fixture(scope="session")

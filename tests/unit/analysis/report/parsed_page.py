@@ -5,17 +5,24 @@ import re
 from collections.abc import Sequence
 from html.parser import HTMLParser
 
+VOID = {"meta", "img", "br", "link", "input", "hr"}
 NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:·10[⁻⁰-⁹¹²³]+)?")
 SHARED = re.compile(r"\[([^]]*)\](·10[⁻⁰-⁹¹²³]+)")
 LOWERED = str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789")
 
 
 class ParsedPage(HTMLParser):
-    """The text of a page, and the cells of every table by its caption."""
+    """The text of a page, its elements, and the cells of every table by its caption.
+
+    Complains when tags do not nest.
+    """
 
     def __init__(self, html: str) -> None:
         super().__init__(convert_charrefs=True)
-        self.tags: set[str] = set()
+        self.tags: list[str] = []
+        self.elements: list[dict[str, str]] = []
+        self.parts: list[str] = []
+        self._open: list[str] = []
         self.text = ""
         self.rows: dict[str, list[list[str]]] = {}
         self.scripts: list[str] = []
@@ -25,9 +32,13 @@ class ParsedPage(HTMLParser):
         self.sections: dict[str, str] = {}
         self.feed(html)
         self.close()
+        assert self._open == []
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.add(tag)
+        self.tags.append(tag)
+        self.elements.append({name: value or "" for name, value in attrs})
+        if tag not in VOID:
+            self._open.append(tag)
         if tag == "section":
             self._sections.append(dict(attrs)["id"] or "")
         if tag == "caption":
@@ -41,6 +52,7 @@ class ParsedPage(HTMLParser):
             self.rows[self._caption.strip()][-1][-1] += " "
 
     def handle_endtag(self, tag: str) -> None:
+        assert self._open.pop() == tag
         if tag in ("caption", "td", "th"):
             self._inside = ""
         if tag == "section":
@@ -51,6 +63,7 @@ class ParsedPage(HTMLParser):
             self.scripts.append(data)
             return
         self.text += data
+        self.parts.append(data)
         if self._sections:
             place = self._sections[-1]
             self.sections[place] = self.sections.get(place, "") + data
@@ -58,6 +71,10 @@ class ParsedPage(HTMLParser):
             self._caption += data
         elif self._inside == "cell":
             self.rows[self._caption.strip()][-1][-1] += data
+
+    def of(self, name: str) -> list[str]:
+        """Return the values of an attribute."""
+        return [one[name] for one in self.elements if name in one]
 
     def table(self, caption: str) -> list[list[str]]:
         (found,) = (rows for name, rows in self.rows.items() if name.startswith(caption))

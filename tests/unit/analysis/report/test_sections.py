@@ -70,34 +70,6 @@ def test_a_section_that_is_not_shown_is_absent(study: Shown) -> None:
     assert len(names) == len(set(names))
 
 
-def test_stored_names_carry_units(study: Shown) -> None:
-    tables = (b for _, blocks in contents(study) for b in blocks if isinstance(b, Table))
-    names = {name for table in tables for row in table.rows for name in row}
-    assert {
-        "inertia_kg_m2",
-        "inertia_kg_m2_se",
-        "damping_nm_s_rad",
-        "stiffness_nm_rad",
-        "fixed_inertia_stiffness_nm_rad_low",
-        "residual_sd_nm",
-        "impulse_nm_s",
-        "work_j",
-        "duration_s",
-    } <= names
-
-
-def test_estimates_hold_what_the_analysis_holds(study: Shown) -> None:
-    rows = rows_of(study, "estimates")
-    for row, fit in zip(rows, study.analysis.fits, strict=True):
-        assert row["epoch"] == fit.epoch
-        assert row["outcome"] == fit.outcome.kind
-        assert row["n_samples"] == fit.n_samples
-        assert (row["band_low_hz"], row["band_high_hz"]) == fit.band_hz
-        assert row["findings"] == ", ".join(finding.name for finding in fit.findings)
-        assert row["n_findings"] == len(fit.findings)
-        assert row["cautions"] == ", ".join(fit.cautions)
-
-
 def test_the_band_is_a_column_where_it_differs(make_study, make_analysis) -> None:
     analysis = make_analysis({"OFF": 3})
     one = dataclasses.replace(analysis.fits[0], band_hz=(0.15, 20.0))
