@@ -94,6 +94,7 @@ def compare(
             group=group,
             seed=seed,
             resamples=resamples,
+            recordings_shown=full,
         )
         try:
             _write(shown.result, *outputs, str(folder))

@@ -16,12 +16,14 @@ from rigidimeter.analysis.report import Shown
 from rigidimeter.analysis.study_anew import (
     TESTS_SHARE,
     Loaded,
+    Study,
     StudyResult,
     analyse,
     conclude_study,
     estimate_study,
     estimates_study,
     keep,
+    kept_study,
     load_study,
     prepare_study,
 )
@@ -104,21 +106,26 @@ def analyse_study_folder(
     group: str | None = None,
     seed: int = 1,
     resamples: int = 9999,
+    recordings_shown: bool = True,
 ) -> tuple[Shown, Analysed]:
     """Read and analyse a study folder, and keep the analysis in it.
 
-    That of one group is not kept: what changed since the last one would be the other groups.
+    That of one group is not kept: what changed since the last one would be the other groups. Where
+    no recording is shown, a study in which nothing has changed is not analysed again.
 
     Raises
     ------
     UserError
         If there is nothing to analyse.
     """
-    loaded = read_study_inputs(folder, recordings, key, pair, group)
+    before = None
+    if group is None and not recordings_shown:
+        before = _kept(folder, recordings, key, pair)
+    loaded = before[0] if before else read_study_inputs(folder, recordings, key, pair, group)
     with Meter("study", 1.0) as meter:
         work, shares = partial(_part, meter.advance), (_PREPARED_SHARE, TESTS_SHARE)
-        prepared = prepare_study(loaded, work(shares[0]))
-        study = analyse(loaded, prepared, progress=work(1.0 - sum(shares)))
+        prepared = {} if before else prepare_study(loaded, work(shares[0]))
+        study = before[1] if before else analyse(loaded, prepared, progress=work(1.0 - sum(shares)))
         result = conclude_study(study, seed=seed, resamples=resamples, progress=work(shares[1]))
     changes, not_kept = [], ""
     try:
@@ -135,6 +142,14 @@ def analyse_study_folder(
     main = [one for one in result.values if one.other and one.other == study.other]
     bad |= any(one.remark and not one.tested for one in main)
     return shown, Analysed(study.analysis, result.notices, bad, not_kept)
+
+
+def _kept(
+    folder: Path, recordings: Recordings, key: Path | None, pair: Pair
+) -> tuple[Loaded, Study] | None:
+    chosen = load_settings(recordings.settings) if recordings.settings is not None else None
+    asked = {"key": key, "settings": chosen, "method": recordings.method, "pair": pair}
+    return kept_study(folder, adjust=recordings.adjust, **asked)
 
 
 def _part(progress: Callable[[float], None], share: float) -> Callable[[float], None]:

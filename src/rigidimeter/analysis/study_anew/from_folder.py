@@ -72,6 +72,8 @@ class Loaded:
     primary : Primary
     again : partial
         Reads it again, in the same way: by the folder, and what was asked as keywords.
+    as_read : Settings
+        Those that the folder was read with, whatever `settings` were made of them.
     """
 
     folder: StudyFolder
@@ -85,6 +87,7 @@ class Loaded:
     further: tuple[str, ...]
     primary: Primary
     again: partial[Loaded] = field(repr=False, compare=False)
+    as_read: Settings = field(default_factory=Settings, repr=False)
 
 
 def load_study(
@@ -154,6 +157,7 @@ def load_study(
         tuple(name for name in names.known if name in there) if pair[1] is None else (),
         primary,
         again,
+        settings,
     )
 
 

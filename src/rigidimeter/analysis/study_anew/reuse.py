@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -57,6 +57,7 @@ def stored_study(
     settings: Settings | None = None,
     method: str = "auto",
     pair: tuple[str | None, str | None] = (None, None),
+    adjust: Callable[[Settings], Settings],
     results: Mapping[str, str],
 ) -> tuple[Loaded, Study] | None:
     """Return a study as it was analysed before, without its recordings; None if that is not known.
@@ -66,6 +67,8 @@ def stored_study(
     folder : Path
     key, settings, method, pair
         As `load_study`.
+    adjust : callable
+        Changes the settings of the folder before it is analysed.
     results : mapping of str to str
         SHA-256 of the files of the analysis as they were written, by name.
     """
@@ -86,6 +89,10 @@ def stored_study(
         if any(file_digest(folder / name) != each for name, each in found["recordings"].items()):
             return None
         estimates = read_estimates(analysis / ESTIMATES)
+        as_read = parse_settings(found["as_read"])
+        options = adjust(as_read)
+        if found["settings"] != dump_settings(options):
+            return None
     except (UserError, OSError, ValueError, KeyError):
         return None
     records: dict[str, Any] = {
@@ -99,11 +106,12 @@ def stored_study(
         return None
     groups = {one.subject: one.group for one in sessions}
     again = partial(load_study, folder, key=key, settings=settings, method=method, pair=pair)
-    options = parse_settings(found["settings"])
     further = tuple(found["further"])
     recordings = Recordings((), records["left_out"], found["recordings"], ())
     loaded = Loaded(
-        read, names, recordings, (), {}, options, found["method"], (), further, primary, again
+        *(read, names, recordings, (), {}, options, found["method"], (), further, primary),
+        again,
+        as_read,
     )
     study = Study(
         rows,
@@ -142,6 +150,7 @@ def rows_file(loaded: Loaded, study: Study) -> bytes | None:
         "recordings": loaded.recordings.digests,
         "there": there,
         "method": loaded.method,
+        "as_read": dump_settings(loaded.as_read),
         "settings": dump_settings(study.settings),
         "of_primary": [one.text for one in loaded.primary.notices],
         **{name: getattr(study, name) for name in _AS_THEY_ARE},

@@ -15,7 +15,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +46,7 @@ from rigidimeter.core.files import (
     replace_file,
     text_bytes,
 )
-from rigidimeter.core.settings import dump_settings, with_new_names
+from rigidimeter.core.settings import Settings, dump_settings, with_new_names
 from rigidimeter.core.version import __version__
 
 INPUTS_SCHEMA = "rigidimeter.study-inputs/1"
@@ -121,12 +121,19 @@ def keep(loaded: Loaded, result: StudyResult) -> list[str]:
     return said
 
 
-def kept_study(folder: Path, **asked: Any) -> tuple[Loaded, Study] | None:
+def kept_study(
+    folder: Path,
+    *,
+    adjust: Callable[[Settings], Settings] = lambda settings: settings,
+    **asked: Any,
+) -> tuple[Loaded, Study] | None:
     """Return a study as it was analysed before, if nothing that it was made of has changed.
 
     Parameters
     ----------
     folder : Path
+    adjust : callable
+        Changes the settings of the folder before it is analysed.
     asked
         `key`, `settings`, `method` and `pair`, as `load_study`.
 
@@ -138,7 +145,7 @@ def kept_study(folder: Path, **asked: Any) -> tuple[Loaded, Study] | None:
     before = _object(folder / ANALYSIS / INPUTS)
     if before is None or not _is_inputs(before):
         return None
-    return stored_study(folder, **asked, results=_results(before))
+    return stored_study(folder, **asked, adjust=adjust, results=_results(before))
 
 
 def _inputs(loaded: Loaded, result: StudyResult) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from rigidimeter.analysis.study_anew import (
     load_study,
     result_table,
 )
-from rigidimeter.core.settings import dump_settings, parse_settings
+from rigidimeter.core.settings import changed_settings, dump_settings, parse_settings
 
 
 def kept(folder: Path, *, seed: int = 1, between: Callable[[Path], object] = str, **options):
@@ -101,6 +101,10 @@ def other_band(folder: Path) -> dict:
     values = dump_settings(load_study(folder).settings)
     values["scores"]["band_high_hz"] = 6.0
     return {"settings": parse_settings(values)}
+
+
+def adjusted(_: Path) -> dict:
+    return {"adjust": lambda settings: changed_settings(settings, {"seed": 9}, "")}
 
 
 def without_ratings(folder: Path) -> None:
@@ -237,10 +241,22 @@ class TestTwice:
         assert kept_study(study) is None
 
     @pytest.mark.parametrize(
-        "asked", [{"method": "published"}, {"pair": ("DBS", "OFF")}, other_band]
+        "asked", [{"method": "published"}, {"pair": ("DBS", "OFF")}, other_band, adjusted]
     )
     def test_what_was_asked_otherwise_is_another_study(self, study: Path, asked) -> None:
         assert kept_study(study, **(asked(study) if callable(asked) else asked)) is None
+
+    def test_the_command_reads_no_recording_again(
+        self, study: Path, rigidimeter, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        command = ("compare", study, "--resamples", "100")
+        first = rigidimeter(*command)
+        with monkeypatch.context() as patched:
+            patched.delattr("rigidimeter.cli.study_inputs.load_study")
+            assert rigidimeter(*command) == first
+            with pytest.raises(NameError):
+                rigidimeter(*command, "--band-hz", "0.3", "20")
+        assert "setting estimation.band_low" in rigidimeter(*command, "--band-hz", "0.3", "20").out
 
     def test_other_software_computes_anew(self, study: Path, monkeypatch) -> None:
         monkeypatch.setattr("rigidimeter.analysis.study_anew.reuse.__version__", "0")
