@@ -12,17 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rigidimeter.analysis.recording import estimate
-from rigidimeter.analysis.study_anew import (
-    Loaded,
-    Study,
-    StudyResult,
-    compare_values,
-    day_tests,
-    estimate_rows,
-    load_study,
-    study_ratings,
-)
+from rigidimeter.analysis.study_anew import StudyResult, analyse, conclude_study, load_study
 from rigidimeter.analysis.traces import Prepared, prepared_epochs
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import read_json, write_json
@@ -103,47 +93,30 @@ class Context:
                 counted[task][plan.condition] = counted[task].get(plan.condition, 0) + count
         return counted
 
-    @cached_property
+    @property
     def study(self) -> StudyResult:
-        """The virtual study: estimates, rank-sum tests, tests by days, and ratings.
-
-        Its estimates are those of all epochs together, by one method; nothing is concluded.
+        """The virtual study, compared and concluded: rank-sum tests, tests by days, and ratings.
 
         Raises
         ------
         UserError
             If the folder holds another seed, design or version, or an unfinished study.
         """
-        loaded = self._loaded
-        analysis = estimate(loaded.epochs, settings=loaded.settings)
-        sessions = loaded.recordings.entries
-        ratings, _ = study_ratings(loaded.folder, loaded.names, {})
-        study = Study(
-            estimate_rows({analysis.method: analysis}, sessions, loaded.epochs),
-            *loaded.names.pair,
-            title=loaded.folder.about.title,
-            settings=loaded.settings,
-            sessions=tuple(session.entry for session in loaded.recordings.sessions),
-            ratings=ratings,
-            virtual=True,
-            analysis=analysis,
-        )
-        return StudyResult(study, day_tests(study), compare_values(study), resamples=0)
+        return self._read[0]
 
-    @cached_property
+    @property
     def prepared(self) -> Prepared:
         """The epochs of the virtual study as they were analysed."""
-        study = self.study.study
-        return prepared_epochs(self._loaded.epochs, study.analysis, study.settings)
+        return self._read[1]
 
     @cached_property
-    def _loaded(self) -> Loaded:
+    def _read(self) -> tuple[StudyResult, Prepared]:
         if self._folder is not None:
-            return self._loaded_from(self._folder)
+            return self._read_from(self._folder)
         with tempfile.TemporaryDirectory() as place:
-            return self._loaded_from(Path(place) / "virtual-study")
+            return self._read_from(Path(place) / "virtual-study")
 
-    def _loaded_from(self, folder: Path) -> Loaded:
+    def _read_from(self, folder: Path) -> tuple[StudyResult, Prepared]:
         wanted = {"design": self.design.name, "seed": self.seed, "rigidimeter": __version__}
         made = folder / MADE
         if made.is_file():
@@ -163,7 +136,10 @@ class Context:
                 progress=lambda time_s: self._progress(time_s / length_s),
             )
             write_json(made, wanted)
-        return load_study(folder)
+        loaded = load_study(folder)
+        study = analyse(loaded)
+        prepared = prepared_epochs(loaded.epochs, study.analysis, study.settings)
+        return conclude_study(study, resamples=0), prepared
 
 
 def _named(made: Mapping[str, object]) -> str:

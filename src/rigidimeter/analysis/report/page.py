@@ -18,7 +18,7 @@ from rigidimeter.analysis.figures import inline_svg, svg_text
 from rigidimeter.analysis.report import first_screen
 from rigidimeter.analysis.report.contents import Block, Figure, Section, deviations_in_words
 from rigidimeter.analysis.report.epoch_traces import page_traces, traces_json
-from rigidimeter.analysis.report.methods_prose import methods_prose
+from rigidimeter.analysis.report.methods import methods_prose
 from rigidimeter.analysis.report.sections import SECTIONS
 from rigidimeter.analysis.report.shown import Shown
 from rigidimeter.analysis.study_anew import lead, traffic_light
@@ -36,7 +36,7 @@ Contents = Sequence[tuple[Section, Sequence[Block]]]
 """The sections of a page, each with its text, tables and figures."""
 
 
-def contents(shown: Shown, progress: Callable[[float], None] = lambda _: None) -> Contents:
+def sections_of(shown: Shown, progress: Callable[[float], None] = lambda _: None) -> Contents:
     """Return the sections in the order of the page, also those with nothing to show."""
     sections = [section for section in SECTIONS if section.shown_if(shown)]
     made = []
@@ -106,7 +106,7 @@ def write_report(
     Path
         Of the page.
     """
-    made = contents(shown, lambda share: progress(share / 2))
+    made = sections_of(shown, lambda share: progress(share / 2))
     figures = [block for _, blocks in made for block in blocks if isinstance(block, Figure)]
     mark = _mark(shown)
     svg: dict[str, str] = {}
@@ -159,8 +159,13 @@ def _mark(shown: Shown) -> str:
 
 def shown_tables(shown: Shown) -> list[Table]:
     """Return the tables that the page shows, in its order."""
-    blocks = itertools.chain.from_iterable(blocks for _, blocks in contents(shown))
+    blocks = itertools.chain.from_iterable(blocks for _, blocks in sections_of(shown))
     return [block for block in blocks if isinstance(block, Table) and _is_shown(block)]
+
+
+def page_text(shown: Shown) -> str:
+    """Return the page without its figures, whose drawing takes long."""
+    return render_page(shown, sections_of(shown), {})
 
 
 def source_names(shown: Shown) -> dict[str, str]:

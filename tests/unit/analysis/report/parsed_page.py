@@ -2,8 +2,11 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from html.parser import HTMLParser
+
+from rigidimeter.analysis.report import SECTIONS
 
 VOID = {"meta", "img", "br", "link", "input", "hr"}
 NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?:·10[⁻⁰-⁹¹²³]+)?")
@@ -98,3 +101,14 @@ def assert_shows(text: str, values: Sequence[float | None], digits: int) -> None
     for one, value in zip(found, expected, strict=True):
         size = math.floor(math.log10(abs(value))) if value else 0
         assert abs(one - value) <= 0.501 * 10.0 ** (size - digits + 1), (text, expected)
+
+
+@contextmanager
+def sections_without(names: Collection[str]) -> Iterator[None]:
+    """Leave sections out of a page: their figures take long and have their own tests."""
+    every = [*SECTIONS]
+    SECTIONS[:] = [section for section in every if section.name not in names]
+    try:
+        yield
+    finally:
+        SECTIONS[:] = every

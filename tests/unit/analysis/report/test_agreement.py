@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 from tests.unit.analysis.report.cohorts import Design, made_study, of_study
-from tests.unit.analysis.report.parsed_page import ParsedPage, assert_shows
+from tests.unit.analysis.report.parsed_page import ParsedPage, assert_shows, sections_without
 
 from rigidimeter.analysis.reading import estimates_document
-from rigidimeter.analysis.report import SECTIONS, Shown, report, shown_tables
+from rigidimeter.analysis.report import Shown, page_text, report, shown_tables
 from rigidimeter.analysis.study_anew import comparison_document, difference_rows, statements
 from rigidimeter.cli.comparison_text import difference_blocks, full_blocks, statement_blocks
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
@@ -48,12 +48,8 @@ def json(study: Shown, tmp_path_factory: pytest.TempPathFactory) -> dict[str, An
 @pytest.fixture(scope="module")
 def folder(study: Shown, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the written report, without the figures of the recordings, which take long."""
-    every = [*SECTIONS]
-    SECTIONS[:] = [section for section in every if section.name not in DRAWN]
-    try:
+    with sections_without(DRAWN):
         return report(study, tmp_path_factory.mktemp("report")).parent
-    finally:
-        SECTIONS[:] = every
 
 
 @pytest.fixture(scope="module")
@@ -169,7 +165,7 @@ def assert_rounds(text: str, values: Sequence[float]) -> None:
         assert one[0] in "+−" or not float(one)
 
 
-def test_simulated_differences_stand_beside_those_found(study, tmp_path: Path, no_figures) -> None:
+def test_simulated_differences_stand_beside_those_found(study) -> None:
     """Of a virtual study, on terminal, page and in the document."""
     simulated = {"OFF": {"stiffness_nm_rad": 1.75}, "DBS": {"stiffness_nm_rad": 1.4}}
     named = [replace(one, simulated=simulated[one.name]) for one in study.study.conditions]
@@ -181,7 +177,7 @@ def test_simulated_differences_stand_beside_those_found(study, tmp_path: Path, n
     (terminal,) = difference_blocks(virtual.result, "DBS")
     assert terminal.headings[4] == "simulated"
     assert [line[4] for line in terminal.rows] == [row.simulated for row in rows]
-    strip = ParsedPage(report(virtual, tmp_path).read_text("utf-8")).table("DBS against OFF")
+    strip = ParsedPage(page_text(virtual)).table("DBS against OFF")
     assert strip[0][4] == "Simulated"
     assert [cells[4] for cells in strip[1:]] == ["−20 %", *["–"] * 5]
     document = comparison_document(virtual.result)["conclusion"]

@@ -8,15 +8,7 @@ import pytest
 from tests.unit.analysis.report.cohorts import Design, bare, made_study, of_result
 from tests.unit.analysis.report.parsed_page import ParsedPage
 
-from rigidimeter.analysis.report import Shown
-from rigidimeter.analysis.report.first_screen import (
-    interval_plot,
-    light_words,
-    main_finding,
-    strips,
-)
-from rigidimeter.analysis.report.methods_prose import methods_prose
-from rigidimeter.analysis.report.page import contents, parts, render_page
+from rigidimeter.analysis.report import Shown, methods_prose, page_text
 from rigidimeter.analysis.study_anew import Primary, traffic_light
 from rigidimeter.core.study_files import PrimaryTable
 
@@ -42,48 +34,54 @@ def test_it_is_said_which_p_the_conclusion_follows(study: Shown) -> None:
 
 
 def heading_of_p(shown: Shown) -> str:
-    return ParsedPage(render_page(shown, (), {})).table("DBS against OFF")[0][6]
+    return ParsedPage(page_text(shown)).table("DBS against OFF")[0][6]
 
 
-def test_the_light_is_words(study: Shown) -> None:
+def test_the_light_is_words(study: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
     light = traffic_light(study.study, study.result.comparisons)
     assert light is not None
-    assert light_words(light) == "46 of 49 epochs without a caution (3 excluded)."
-    assert main_finding(light) == ""
-    worse = light | {"doubt": "voluntary_torque", "doubt_epochs": 7, "doubted": 7, "sound": 39}
-    assert light_words(worse) == (
-        "39 of 49 epochs without a caution (7 with a caution, 3 excluded)."
-    )
-    assert main_finding(worse) == "Main finding: voluntary torque, in 7 of them."
-    assert main_finding(light | {"text": "all days came later"}) == "All days came later."
+    doubted = light | {"doubt": "voluntary_torque", "doubt_epochs": 7, "doubted": 7, "sound": 39}
+    for shown, words in (
+        (light, "46 of 49 epochs without a caution (3 excluded)."),
+        (
+            doubted,
+            "39 of 49 epochs without a caution (7 with a caution, 3 excluded). "
+            "Main finding: voluntary torque, in 7 of them.",
+        ),
+        (light | {"text": "all days came later"}, "All days came later."),
+    ):
+        patched = "rigidimeter.analysis.report.page.traffic_light"
+        monkeypatch.setattr(patched, lambda *_, shown=shown: shown)
+        assert words in ParsedPage(page_text(study)).words()
 
 
-def drawn(study: Shown) -> list[str]:
-    ((*_, rows),) = strips(study.result)
-    return [str(plot) for _, plot in rows]
+def plots(shown: Shown) -> list[str]:
+    return re.findall(r'<svg class="interval.*?</svg>', page_text(shown), re.DOTALL)
 
 
 def test_a_difference_that_is_unknown_has_no_picture(study: Shown) -> None:
-    assert [plot.count("<svg") for plot in drawn(study)] == [1] * 6
+    assert len(plots(study)) == 6
     unknown = replace(study.result.comparisons[0], difference=math.nan)
-    assert drawn(of_result(study, comparisons=(unknown,))) == [""]
+    assert plots(of_result(study, comparisons=(unknown,))) == []
 
 
-def test_the_plot_has_its_text_as_text_and_arrows_beyond_its_axis() -> None:
-    svg = interval_plot((-15.0, -40.0, 10.0), 50.0, " %", middle="none")
-    assert re.findall(r">([^<>]+)</text>", svg) == ["−50 %", "none", "+50 %"]
+def test_the_plot_has_its_text_as_text_and_arrows_beyond_its_axis(study: Shown) -> None:
+    one = next(c for c in study.result.comparisons if c.measure.name == "stiffness_nm_rad")
+    inside = replace(one, value_reference=1.0, difference=-0.15, low=-0.4, high=0.1)
+    (svg,) = plots(of_result(study, comparisons=(inside,)))
+    assert re.findall(r">([^<>]+)</text>", svg) == ["−50 %", "0", "+50 %"]
     assert "arrow" not in svg
-    beyond = interval_plot((-15.0, -400.0, 10.0), 100.0, " %")
+    (beyond,) = plots(of_result(study, comparisons=(replace(inside, low=-4.0),)))
     assert beyond.count("arrow") == 1
-    unknown = interval_plot((math.nan,) * 3, 100.0, " %")
+    untested = replace(inside, low=math.nan, high=math.nan)
+    (unknown,) = plots(of_result(study, comparisons=(untested,)))
     assert "range" not in unknown
     assert "nan" not in unknown
-    assert "<script>" not in interval_plot((0.0, 0.0, 0.0), 1.0, "<script>", words="<script>")
 
 
 def test_one_condition_has_its_own_first_screen(make_study, make_analysis) -> None:
     made = make_study([], analysis=make_analysis({"": 3}))
-    page = ParsedPage(render_page(made, contents(made), {}))
+    page = ParsedPage(page_text(made))
     rows = page.table("All epochs together")[1:]
     assert [row[0].split()[0] for row in rows] == [
         "Stiffness",
@@ -96,8 +94,14 @@ def test_one_condition_has_its_own_first_screen(make_study, make_analysis) -> No
     assert "Repeat epochs like these" in page.words()
 
 
+def titles_of(shown: Shown) -> list[str]:
+    """Return the parts that the bar of the page names."""
+    (bar,) = re.findall(r"<nav.*?</nav>", page_text(shown), re.DOTALL)
+    return re.findall(r'<a href="#[^>]*>([^<]+)</a>', bar)
+
+
 def test_what_has_nothing_to_show_is_neither_on_the_page_nor_in_its_contents(study) -> None:
-    titles = [part.title for part in parts(contents(bare(study)))]
+    titles = titles_of(bare(study))
     assert titles == [
         "Summary",
         "What was done",
@@ -108,5 +112,5 @@ def test_what_has_nothing_to_show_is_neither_on_the_page_nor_in_its_contents(stu
         "Provenance",
         "Tables",
     ]
-    assert "Sensitivity" in [p.title for p in parts(contents(study))]
+    assert "Sensitivity" in titles_of(study)
     assert titles == list(dict.fromkeys(titles))

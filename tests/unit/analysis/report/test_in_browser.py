@@ -7,10 +7,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page
 from tests.unit.analysis.report.cohorts import Design, made_study
+from tests.unit.analysis.report.parsed_page import sections_without
 
-from rigidimeter.analysis.report import SECTIONS, Shown
-from rigidimeter.analysis.report import page as page_module
-from rigidimeter.analysis.report.page import write_report
+from rigidimeter.analysis.report import Shown, report
 from rigidimeter.analysis.study_anew import analysis_study, conclude_study
 
 DESKTOP, PHONE = (1280, 800), (390, 844)
@@ -27,11 +26,9 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     study = made_study(Design(days=(9, 4), epochs=(3, 3), scores=(2, 2)))
     one = conclude_study(analysis_study(study.analysis, ("OFF", "")), resamples=0)
     results = {"study": study, "one": Shown(one, study.epochs, title="One recording")}
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(page_module, "SECTIONS", [s for s in SECTIONS if s.name not in LONG])
+    with sections_without(LONG):
         return {
-            name: write_report(result, tmp_path_factory.mktemp(name))
-            for name, result in results.items()
+            name: report(result, tmp_path_factory.mktemp(name)) for name, result in results.items()
         }
 
 

@@ -6,8 +6,7 @@ import pytest
 from tests.unit.analysis.report.cohorts import Design, bare, made_study, of_result, of_study
 
 from rigidimeter.analysis.estimation import METHODS, Method
-from rigidimeter.analysis.report import Shown
-from rigidimeter.analysis.report.methods_prose import methods_prose
+from rigidimeter.analysis.report import Shown, methods_prose
 
 
 @pytest.fixture(scope="module")

@@ -11,15 +11,22 @@ from xml.etree import ElementTree as ET
 import pytest
 from matplotlib.figure import Figure as Drawing
 
-from rigidimeter.analysis.report import SECTIONS, Figure, Section, Shown, paragraph, report
-from rigidimeter.analysis.report.contents import Block
-from rigidimeter.analysis.report.page import contents
+from rigidimeter.analysis.report import (
+    SECTIONS,
+    Block,
+    Figure,
+    Section,
+    Shown,
+    paragraph,
+    report,
+    sections_of,
+)
 from rigidimeter.core.records import Delay, Outcome, Ticks
 from rigidimeter.core.words import Column, Table
 
 
 def tables_of(result: Shown, name: str) -> list[Table]:
-    blocks = (block for _, blocks in contents(result) for block in blocks)
+    blocks = (block for _, blocks in sections_of(result) for block in blocks)
     return [block for block in blocks if isinstance(block, Table) and block.name == name]
 
 
@@ -64,7 +71,7 @@ def test_a_section_from_outside_is_in_the_page_and_its_files(
 
 
 def test_a_section_that_is_not_shown_is_absent(study: Shown) -> None:
-    names = [section.name for section, _ in contents(study)]
+    names = [section.name for section, _ in sections_of(study)]
     assert {"about", "results", "exclusions", "provenance"} <= set(names)
     assert not {"study", "comparison", "days", "ratings", "methods"} & set(names)
     assert len(names) == len(set(names))

@@ -15,11 +15,9 @@ from tests.unit.analysis.report.cohorts import (
     of_result,
     of_study,
 )
-from tests.unit.analysis.report.parsed_page import ParsedPage
+from tests.unit.analysis.report.parsed_page import ParsedPage, sections_without
 
-from rigidimeter.analysis.report import SECTIONS, Shown
-from rigidimeter.analysis.report import page as page_module
-from rigidimeter.analysis.report.page import contents, render_page, write_report
+from rigidimeter.analysis.report import SECTIONS, Shown, page_text, report
 from rigidimeter.analysis.statistics import DayDifference, difference
 from rigidimeter.analysis.study_anew import Compared, Condition
 from rigidimeter.core.words import number, p_value
@@ -30,7 +28,7 @@ NASTY = "<script>alert('x')</script>&amp;\"$_$"
 
 def page_of(study: Shown) -> ParsedPage:
     """Return the page without the images of its figures, which is quick."""
-    return ParsedPage(render_page(study, contents(study), {}))
+    return ParsedPage(page_text(study))
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +94,7 @@ def test_numbers_with_the_inertia_held_are_in_the_table_of_that_name_alone(
     held = tuple(dataclasses.replace(f, value=np.array([0.0045, 55.55, 98.76])) for f in fits)
     analysis = dataclasses.replace(study.analysis, fixed_inertia=held)
     other = of_study(study, analysis=analysis)
-    page = render_page(other, contents(other), {})
+    page = page_text(other)
     own = ParsedPage(page).table("Damping and stiffness with the inertia fixed at its median")
     assert len(own) > 1
     assert page.count("98.76") == page.count("55.55") == len(own) - 1
@@ -202,9 +200,8 @@ LONG = ("days", "distributions", "perturbation", "torque", "voluntary", "loops",
 
 
 def short_report(study: Shown, folder: Path) -> Path:
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(page_module, "SECTIONS", [s for s in SECTIONS if s.name not in LONG])
-        return write_report(study, folder)
+    with sections_without(LONG):
+        return report(study, folder)
 
 
 @pytest.fixture(scope="module")
@@ -225,11 +222,9 @@ def test_the_same_study_gives_the_same_bytes(study: Shown, written: Path, tmp_pa
     assert not re.search(r"url\([^#]|@import|https?:", text)
 
 
-def test_virtual_data_say_so_in_every_figure(
-    study: Shown, written: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(page_module, "SECTIONS", [s for s in SECTIONS if s.name in OWN])
-    virtual = write_report(of_study(study, virtual=True), tmp_path)
+def test_virtual_data_say_so_in_every_figure(study: Shown, written: Path, tmp_path: Path) -> None:
+    with sections_without({section.name for section in SECTIONS} - {*OWN}):
+        virtual = report(of_study(study, virtual=True), tmp_path)
     assert len(list((tmp_path / "figures").glob("*.svg"))) == 3
     for name in OWN:
         one, other = (

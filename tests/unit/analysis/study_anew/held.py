@@ -12,7 +12,9 @@ from pathlib import Path
 from rigidimeter.analysis.study_anew import (
     Compared,
     Study,
+    StudyResult,
     counting,
+    difference_cells,
     lead,
     statement,
     traffic_light,
@@ -26,13 +28,16 @@ def said(study: Study, each: Sequence[Compared]) -> list[str]:
     lines = []
     for one in each:
         of_pair = f" {one.other} − {one.reference}" if one.other != study.other else ""
-        why = f" ({'; '.join(filter(None, [one.reason]))})" if one.reason else ""
+        why = f" ({one.reason})" if one.reason else ""
         n = " and ".join(str((counting(study.rows, one.measure.name)["condition"] == c).sum())
                          for c in one.pair)  # fmt: skip
         p = f"p {one.p:.3g}, adjusted {one.p_adjusted:.3g}, {one.role}" if one.tested else "no test"
         needed = f", needs {one.needed.number} {one.needed.unit}" if one.needed else ""
         sizes = ", ".join(f"{size:.4g}" for size in (*one.of_test, one.measured_half))
         lines.append(f"{one.measure.short}{of_pair}: {one.verdict}{why}; {n}; {sizes}; {p}{needed}")
+    result = StudyResult(study, tuple(each), ())
+    for other in dict.fromkeys(one.other for one in each):
+        lines += [f"shown: {' | '.join(cells)}" for cells in difference_cells(result, other)[1]]
     lines.append(f"lead: {lead(study, each)}")
     found = statement(study, each)
     if found is not None:

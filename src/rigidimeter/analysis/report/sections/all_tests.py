@@ -30,7 +30,7 @@ from rigidimeter.analysis.report.contents import (
     paragraph,
     part,
 )
-from rigidimeter.analysis.report.methods_prose import (
+from rigidimeter.analysis.report.methods import (
     method_of,
 )
 from rigidimeter.analysis.report.sections.every_epoch import pooled_table

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from rigidimeter.analysis.recording import split_pooled
 from rigidimeter.analysis.report.contents import Block, Section, from_result, paragraph, part
-from rigidimeter.analysis.report.methods_prose import method_of
+from rigidimeter.analysis.report.methods import method_of
 from rigidimeter.analysis.report.sections.what_was_done import longest_s
 from rigidimeter.analysis.report.shown import Shown
 from rigidimeter.core.records import AMPLITUDE, PARAMETER_VECTORS, PARAMETERS, Fit

@@ -26,7 +26,7 @@ from rigidimeter.analysis.figures import (
 )
 from rigidimeter.analysis.recording import split_pooled
 from rigidimeter.analysis.report.contents import Block, Figure, Section, named, paragraph, part
-from rigidimeter.analysis.report.methods_prose import method_of
+from rigidimeter.analysis.report.methods import method_of
 from rigidimeter.analysis.report.shown import Shown
 from rigidimeter.analysis.traces import (
     analysed_epoch,

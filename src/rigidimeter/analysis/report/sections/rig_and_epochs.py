@@ -28,7 +28,7 @@ from rigidimeter.analysis.report.contents import (
     paragraph,
     part,
 )
-from rigidimeter.analysis.report.methods_prose import method_of
+from rigidimeter.analysis.report.methods import method_of
 from rigidimeter.analysis.report.sections.every_epoch import HOW, WHO
 from rigidimeter.analysis.report.shown import Shown
 from rigidimeter.analysis.study_anew import result_table

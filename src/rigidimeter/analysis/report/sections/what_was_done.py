@@ -29,7 +29,7 @@ from rigidimeter.analysis.report.contents import (
     paragraph,
     part,
 )
-from rigidimeter.analysis.report.methods_prose import methods_prose
+from rigidimeter.analysis.report.methods import methods_prose
 from rigidimeter.analysis.report.shown import Shown
 from rigidimeter.analysis.traces import ChannelFacts, perturbed_epoch
 from rigidimeter.core.settings import Settings
