@@ -70,6 +70,7 @@ def made(
     pooled: Sequence[Fit] = (),
     rated: bool = True,
     days_known: bool = True,
+    other: str = "DBS",
     **parts: Any,
 ) -> Study:
     """Return a study; each fit, score and session may be changed, `parts` replace its fields."""
@@ -98,7 +99,7 @@ def made(
         "analysis": analyses["iv"],
         "ratings": ratings,
     }
-    return Study(together(rows), *NAMES, **given | parts)
+    return Study(together(rows), "OFF", other, **given | parts)
 
 
 def _analysis(fits: Sequence[Fit], scores=(), pooled=()) -> Analysis:

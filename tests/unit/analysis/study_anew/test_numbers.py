@@ -16,7 +16,6 @@ from tests.unit.analysis.study_anew.made import (
     Design,
     alike,
     concluded,
-    doubted,
     in_dbs,
     made,
     score_rows,
@@ -26,7 +25,6 @@ from rigidimeter.analysis.study_anew import (
     MEASURES,
     Columns,
     Compared,
-    LeftOut,
     OfMethod,
     Study,
     agreement,
@@ -181,74 +179,14 @@ class TestMeasured:
             assert math.isnan(found[measure].measured_half)
 
 
-def light(study: Study) -> dict:
-    found = traffic_light(study, [*concluded(study).values()])
-    assert found is not None
-    return found
-
-
 def pooled(name: str) -> Fit:
     finding = Finding(name, "caution", 2.0, 1.0)
     return replace(made().analysis.fits[-1], epoch="pooled", condition="OFF", findings=(finding,))
 
 
-TREMOR = Finding(
-    "tremor", "caution", 2.0, 1.0, facts={"frequency_hz": 5.0, "amplitude_nm": 0.2, "stands_out": 9}
-)
-
-
-def shaking(fit: Fit) -> Fit:
-    return replace(fit, findings=(TREMOR,)) if in_dbs(fit) and fit.outcome.included else fit
-
-
-def no_score(_) -> None:
-    return None
-
-
-class TestTrafficLight:
-    @pytest.mark.parametrize(
-        ("given", "expected"),
-        [
-            (
-                {},
-                {"level": "good", "doubt": "", "epochs": 81, "sound": 78, "excluded": 3,
-                 "doubted": 0, "text": ""},
-            ),
-            (
-                {"fit": shaking},
-                {"level": "caution", "sound": 59, "doubted": 19, "doubt": "tremor",
-                 "doubt_epochs": 19, "text": "Torque oscillates at 5 Hz with 0.2 N·m"},
-            ),
-            (
-                {"left_out": (LeftOut("b.csv", "M1", "1", "DBS", "its angle is in degrees"),)},
-                {"level": "caution", "text": "1 of the study's recordings could not be used"},
-            ),
-            ({"fit": doubted("tremor", bool), "score": no_score}, {"level": "poor", "sound": 0}),
-            (
-                {"fit": lambda one: replace(one, value=-one.value) if one.epoch == "p03" else one},
-                {"level": "poor",
-                 "text": "J is not greater than zero in some epochs, which is impossible"},
-            ),
-            # Scatter between epochs is in the test of two conditions.
-            ({"pooled": [pooled("varying_between_epochs")]}, {"level": "good", "doubt": ""}),
-            (
-                {"pooled": [pooled("varying_between_epochs")], "other": "", "rated": False},
-                {"level": "caution", "doubt": "varying_between_epochs"},
-            ),
-        ],
-    )  # fmt: skip
-    def test_sound_epochs_are_counted_and_the_gravest_doubt_is_named(self, given, expected) -> None:
-        study = made(**{name: one for name, one in given.items() if name != "other"})
-        found = light(replace(study, other=given.get("other", "DBS")))
-        assert {name: found[name] for name in expected} == expected
-
-    def test_it_has_a_remedy(self) -> None:
-        remedy = light(made(fit=shaking))["remedy"]
-        assert remedy.startswith("Use --method iv with the recorded perturbation")
-
-    def test_a_table_of_numbers_has_none(self) -> None:
-        table = pd.DataFrame({"condition": ["a"] * 4 + ["b"] * 4, "k": range(8)})
-        assert traffic_light(table_study(table, Columns(["k"])), ()) is None
+def test_a_table_of_numbers_has_no_quality() -> None:
+    table = pd.DataFrame({"condition": ["a"] * 4 + ["b"] * 4, "k": range(8)})
+    assert traffic_light(table_study(table, Columns(["k"])), ()) is None
 
 
 class TestPrecision:

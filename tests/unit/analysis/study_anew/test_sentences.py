@@ -35,6 +35,7 @@ from rigidimeter.analysis.study_anew import (
     statement,
     table_study,
 )
+from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Analysis, Fit, Outcome
 from rigidimeter.core.study_files import PrimaryTable
 
@@ -88,7 +89,18 @@ def declared(*measures: str, rule: str = "holm") -> dict[str, Primary]:
     return {"primary": Primary(table, "study.toml")}
 
 
-SHAKEN = {"fit": doubted("tremor")}
+TREMOR = Finding(
+    "tremor", "caution", 2.0, 1.0, facts={"frequency_hz": 5.0, "amplitude_nm": 0.2, "stands_out": 9}
+)
+SHAKEN = {"fit": lambda one: replace(one, findings=(TREMOR,)) if in_dbs(one) else one}
+VARYING = Fit("", "pooled", "OFF", "iv", Outcome(), JOINT, findings=(
+    Finding("varying_between_epochs", "caution", 2.0, 1.0),))  # fmt: skip
+
+
+def turned_inertia(one: Fit) -> Fit:
+    return replace(one, value=-one.value) if one.epoch == "p03" else one
+
+
 LOST = tuple(LeftOut(f"{k}.csv", "M1", "9", "DBS", "in degrees") for k in (1, 2))
 SUBJECTS = {"design": Design(scores=0, day_scatter=0.01), "rated": False}
 STUDIES: dict[str, tuple[dict[str, Any], Callable[[Compared], Compared | None] | None]] = {
@@ -119,6 +131,11 @@ STUDIES: dict[str, tuple[dict[str, Any], Callable[[Compared], Compared | None] |
     "a sequence": (declared("damping_nm_s_rad", "stiffness_nm_rad", rule="sequence"), None),
     "one declared measure": (declared("stiffness_nm_rad"), None),
     "a caution of the inertia": ({"fit": alike([1.04, 0.8, 0.8])}, None),
+    # The quality of the data: poor, and what is in the scatter between epochs already.
+    "most epochs doubted": ({"fit": doubted("tremor", bool), "score": nothing}, None),
+    "an impossible inertia": ({"fit": turned_inertia}, None),
+    "epochs that vary": ({"pooled": [VARYING]}, None),
+    "one condition whose epochs vary": ({"pooled": [VARYING], "rated": False, "other": ""}, None),
     "virtual and blinded": ({"virtual": True, "blinded": True}, None),
     "one session left out": ({"left_out": LOST[:1]}, None),
     "two sessions left out": ({"left_out": LOST}, None),

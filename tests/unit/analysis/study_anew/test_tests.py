@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rigidimeter.analysis.statistics import day_difference, ranksum
+from rigidimeter.analysis.statistics import day_difference
 from rigidimeter.analysis.study_anew import (
     MEASURES,
     Measure,
@@ -86,27 +86,6 @@ def test_blocks_and_recordings_in_the_place_of_days(rows: pd.DataFrame) -> None:
     by_recording = by_units(counted, STIFFNESS, PAIR, "recordings")
     assert by_recording.test == "paired t-test of 2 recordings, with the standard error of the " \
         "epochs alone, which is larger"  # fmt: skip
-
-
-def test_the_measurement_alone_has_the_weights_of_the_test(rows: pd.DataFrame) -> None:
-    """Of half intervals of 10 % the weighted mean is 10 % / √(epochs of each condition)."""
-    flat = rows.assign(value=2.0, low=1.8, high=2.2)
-    one = by_units(counting(flat, STIFFNESS.name), STIFFNESS, PAIR)
-    assert one.remark == "the means of the days do not vary, so there is no error to test against"
-    assert one.measured_half == pytest.approx(0.2 * math.sqrt(2 / 12))
-    exact = rows.assign(low=rows["value"], high=rows["value"])
-    one = by_units(counting(exact, STIFFNESS.name), STIFFNESS, PAIR)
-    size = (one.value_reference + one.value_other) / 2
-    assert one.measured_half == pytest.approx(0.001 * size)  # what the instrument is accurate to
-
-
-def test_by_values_it_is_the_rank_sum_test(rows: pd.DataFrame) -> None:
-    counted = counting(rows, STIFFNESS.name)
-    one = by_values(counted, STIFFNESS, PAIR)
-    x, y = (counted.loc[counted["condition"] == name, "value"] for name in PAIR)
-    found = ranksum(x, y)
-    assert (one.difference, one.p, one.sign) == (-found.shift, found.p, -found.z)
-    assert one.value_reference == np.median(x)
 
 
 def test_a_refusal_is_a_row_with_its_reason(rows: pd.DataFrame) -> None:
