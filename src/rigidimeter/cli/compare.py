@@ -77,57 +77,47 @@ def compare(
     from rigidimeter.analysis import study_anew as studies
     from rigidimeter.analysis.report import Shown
     from rigidimeter.cli.comparison_text import comparison_blocks
-    from rigidimeter.cli.inputs import analyse_recordings, study_of
-    from rigidimeter.cli.study_inputs import analyse_study_folder, compare_recordings, study_files
+    from rigidimeter.cli.inputs import Analysed, analyse_recordings, study_of
+    from rigidimeter.cli.study_inputs import analyse_study_folder, study_files
 
     outputs, paths, pair = (json_out, csv_out), recordings.paths, (reference, other)
     is_json = any(path.suffix.lower() == ".json" for path in paths)
     if value and len(paths) != 1:
         raise UserError(f"--value takes one table, but {len(paths)} inputs were given")
-    if not value and (folder := study_of(recordings, key)) is not None:
-        keep_inputs(outputs, study_files(folder, key))
+    how: dict[str, Any] = {"seed": seed, "resamples": resamples}
+    folder = None if value else study_of(recordings, key)
+    keep_inputs(outputs, paths if folder is None else study_files(folder, key))
+    read, analysed = None, Analysed()
+    if folder is not None:
         shown, analysed = analyse_study_folder(
-            folder,
-            recordings,
-            key,
-            pair=pair,
-            group=group,
-            seed=seed,
-            resamples=resamples,
-            recordings_shown=full,
+            folder, recordings, key, pair=pair, group=group, recordings_shown=full, **how
         )
-        try:
-            _write(shown.result, *outputs, str(folder))
-            show(comparison_blocks(shown, full=full))
-            _say_changes(shown.changes)
-            if group is None and not analysed.not_kept:
-                where = folder / "analysis"
-                echo(f"\nTables and JSON: {where}; most tables here: --full")
-        finally:
-            status = analysed.say()
-        raise typer.Exit(status)
-    keep_inputs(outputs, paths)
-    if is_json and not value and len(paths) > 1:
+    elif is_json and not value and len(paths) > 1:
         raise UserError("compare takes one JSON file of estimates, or recordings, not both")
-    of_files = None if value or is_json else analyse_recordings(recordings)
-    status = 0
+    elif not (value or is_json):
+        read, analysed = analyse_recordings(recordings)
     try:
-        with Meter("compare", 1.0) as meter:
-            work: dict[str, Any] = {"seed": seed, "resamples": resamples}
-            work["progress"] = meter.advance
-            if of_files is not None:
-                read, analysed = of_files
-                found = compare_recordings(read, analysed.analysis, pair, group, **work)
-            else:
-                work |= {"value": value, "by": by, "session": session, "group": group}
-                found = studies.compare(paths[0], other, reference=reference, **work)
-        _write(found, *outputs)
-        epochs = () if of_files is None else of_files[0].epochs
-        show(comparison_blocks(Shown(found, epochs), full=full))
-        say(found.notices)
+        if folder is None:
+            with Meter("compare", 1.0) as meter:
+                how |= {"progress": meter.advance}
+                if read is None:
+                    how |= {"value": value, "by": by, "session": session, "group": group}
+                    found = studies.compare(paths[0], other, reference=reference, **how)
+                else:
+                    study = studies.estimates_study(
+                        analysed.analysis, pair, group, epochs=read.epochs, settings=read.settings
+                    )
+                    found = studies.conclude_study(study, **how)
+            shown = Shown(found, () if read is None else read.epochs)
+        _write(shown.result, *outputs, "" if folder is None else str(folder))
+        show(comparison_blocks(shown, full=full))
+        _say_changes(shown.changes)
+        if folder is None:
+            say(shown.result.notices)
+        elif group is None and not analysed.not_kept:
+            echo(f"\nTables and JSON: {folder / 'analysis'}; most tables here: --full")
     finally:
-        if of_files is not None:
-            status = of_files[1].say()
+        status = analysed.say()
     raise typer.Exit(status)
 
 

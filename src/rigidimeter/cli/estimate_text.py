@@ -11,7 +11,7 @@ from rigidimeter.analysis.recording import OF_SCORES, condition_precisions
 from rigidimeter.analysis.statistics import Precision
 from rigidimeter.cli.notes import finding_notes, stiffness_notes, two_lines
 from rigidimeter.cli.terminal_tables import ROWS, Block, Heading, Table, text_lines
-from rigidimeter.core.records import PARAMETERS, Analysis, Fit, Score, degrees
+from rigidimeter.core.records import PARAMETERS, Analysis, Delay, Fit, Score, degrees
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.words import (
     decimals,
@@ -204,12 +204,8 @@ def _short_scores(settings: Settings, analysis: Analysis) -> Iterator[tuple[str,
 def _delays(analysis: Analysis, full: bool) -> Iterator[tuple[str, str]]:
     """Yield how late the torque is in each source, where that is known; of several the largest."""
     names = short_names(delay.source for delay in analysis.delays)
-    late = [
-        delay
-        for delay in analysis.delays
-        if math.isfinite(delay.delay_s)
-        and (delay.corrected or abs(delay.delay_s) >= max(LEAST_S, SIGNIFICANT * delay.delay_s_se))
-    ]
+    known = [delay for delay in analysis.delays if math.isfinite(delay.delay_s)]
+    late = [delay for delay in known if delay.corrected or _is_shown(delay)]
     late.sort(key=lambda delay: -abs(delay.delay_s))
     for delay in late if full else late[:1]:
         done = "corrected" if delay.corrected else delay.remark
@@ -220,15 +216,15 @@ def _delays(analysis: Analysis, full: bool) -> Iterator[tuple[str, str]]:
             text += f", the most of {plural(len(late), 'recording')}"
         texts = [f"{text}: {done}", f"{text}: {done.partition(': ')[0]}", text]
         yield "delay", texts[0] if full else two_lines(*texts)
-    unknown = [
-        delay
-        for delay in analysis.delays
-        if not math.isfinite(delay.delay_s)
-        and delay.remark
-        and any(fit.source == delay.source for fit in analysis.fits)
-    ]
+    fitted = {fit.source for fit in analysis.fits}
+    unknown = [one for one in analysis.delays if one.remark and one.source in fitted]
+    unknown = [one for one in unknown if not math.isfinite(one.delay_s)]
     for delay in unknown if full else unknown[:1]:
         text = f"{names[delay.source]}: {delay.remark}"
         if len(unknown) > 1 and not full:
             text = f"{names[delay.source]} and {len(unknown) - 1} more: {delay.remark}"
         yield "delay", text if full else two_lines(text, text.partition(": ")[0] + ": unknown")
+
+
+def _is_shown(delay: Delay) -> bool:
+    return abs(delay.delay_s) >= max(LEAST_S, SIGNIFICANT * delay.delay_s_se)

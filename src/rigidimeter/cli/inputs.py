@@ -5,6 +5,7 @@ Loads the estimation; a command imports it when it is called.
 
 from __future__ import annotations
 
+import math
 import shlex
 import sys
 from collections.abc import Sequence
@@ -39,9 +40,9 @@ class Analysed(NamedTuple):
         Why the analysis was not kept in the folder of its study, if it was not.
     """
 
-    analysis: Analysis
-    notices: Sequence[Notice]
-    bad: bool
+    analysis: Analysis = Analysis("", (), (), math.nan, ())
+    notices: Sequence[Notice] = ()
+    bad: bool = False
     not_kept: str = ""
 
     def say(self) -> int:
@@ -77,7 +78,7 @@ def analyse_recordings(recordings: Recordings) -> tuple[Recording, Analysed]:
         raise UserError(f"--method {recordings.method}: {no_such_method(recordings.method)}")
     with Meter("estimate", 1.0) as meter:
         analysis = estimate(read, recordings.method, progress=meter.advance)
-    return read, Analysed(analysis, (), read.failed)
+    return read, Analysed(analysis, bad=read.failed)
 
 
 def command_line() -> str:

@@ -69,13 +69,8 @@ def ratings(
             f"rest; for the ratings alone give their table, {path}"
         )
     keep_inputs((json_out,), (table,))
-    columns = {
-        "condition": condition,
-        "score": score,
-        "examiner": examiner,
-        "subject": subject,
-        "day": day,
-    }
+    names = ("condition", "score", "examiner", "subject", "day")
+    columns = dict(zip(names, (condition, score, examiner, subject, day), strict=True))
     found, pair = table_ratings(
         read_text_table(table), columns, random, scale=scale, step=step, contrast=contrast
     )

@@ -9,19 +9,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
-from rigidimeter.analysis.reading import Recording
-from rigidimeter.analysis.recording import provenance
 from rigidimeter.analysis.report import Shown
 from rigidimeter.analysis.study_anew import (
     TESTS_SHARE,
     Loaded,
-    Study,
-    StudyResult,
     analyse,
     conclude_study,
     estimate_study,
-    estimates_study,
     keep,
     kept_study,
     load_study,
@@ -41,27 +37,6 @@ _PREPARED_SHARE = 0.2
 """Of the work on a study: what its epochs take before they are estimated."""
 
 
-def compare_recordings(
-    read: Recording,
-    analysis: Analysis,
-    pair: Pair,
-    group: str | None,
-    *,
-    seed: int,
-    resamples: int,
-    progress: Callable[[float], None],
-) -> StudyResult:
-    """Compare the conditions of recordings.
-
-    Raises
-    ------
-    UserError
-        If there are not two, a name is unknown, or a group is asked for.
-    """
-    study = estimates_study(analysis, pair, group, epochs=read.epochs, settings=read.settings)
-    return conclude_study(study, seed=seed, resamples=resamples, progress=progress)
-
-
 def study_files(folder: Path, key: Path | None) -> tuple[Path, ...]:
     """Return the study's own files, which no other output may be written over."""
     tables = read_study_folder(folder, key).files.values()
@@ -76,18 +51,15 @@ def read_study_inputs(
     group: str | None = None,
 ) -> Loaded:
     """Read a study folder with progress, as the options say."""
-    chosen = load_settings(recordings.settings) if recordings.settings is not None else None
+    asked = _asked(recordings, key, pair)
     with Meter("read", 1.0) as meter:
-        loaded = load_study(
-            folder,
-            key=key,
-            settings=chosen,
-            method=recordings.method,
-            pair=pair,
-            group=group,
-            progress=meter.advance,
-        )
+        loaded = load_study(folder, **asked, group=group, progress=meter.advance)
     return replace(loaded, settings=recordings.adjust(loaded.settings))
+
+
+def _asked(recordings: Recordings, key: Path | None, pair: Pair) -> dict[str, Any]:
+    chosen = load_settings(recordings.settings) if recordings.settings is not None else None
+    return {"key": key, "settings": chosen, "method": recordings.method, "pair": pair}
 
 
 def estimate_study_inputs(loaded: Loaded) -> tuple[Analysis, list[Notice]]:
@@ -120,7 +92,8 @@ def analyse_study_folder(
     """
     before = None
     if group is None and not recordings_shown:
-        before = _kept(folder, recordings, key, pair)
+        asked = _asked(recordings, key, pair)
+        before = kept_study(folder, adjust=recordings.adjust, **asked)
     loaded = before[0] if before else read_study_inputs(folder, recordings, key, pair, group)
     with Meter("study", 1.0) as meter:
         work, shares = partial(_part, meter.advance), (_PREPARED_SHARE, TESTS_SHARE)
@@ -132,11 +105,8 @@ def analyse_study_folder(
         changes = keep(loaded, result) if group is None else []
     except UserError as error:
         not_kept = str(error)
-    shown = replace(
-        Shown.of_study(result, loaded, prepared),
-        changes=tuple(changes),
-        provenance=_provenance(loaded, result),
-    )
+    shown = Shown.of_study(result, loaded, prepared, command_line())
+    shown = replace(shown, changes=tuple(changes))
     bad = any(notice.level == "error" for notice in result.notices)
     # The screen says what could not be tested.
     main = [one for one in result.values if one.other and one.other == study.other]
@@ -144,23 +114,5 @@ def analyse_study_folder(
     return shown, Analysed(study.analysis, result.notices, bad, not_kept)
 
 
-def _kept(
-    folder: Path, recordings: Recordings, key: Path | None, pair: Pair
-) -> tuple[Loaded, Study] | None:
-    chosen = load_settings(recordings.settings) if recordings.settings is not None else None
-    asked = {"key": key, "settings": chosen, "method": recordings.method, "pair": pair}
-    return kept_study(folder, adjust=recordings.adjust, **asked)
-
-
 def _part(progress: Callable[[float], None], share: float) -> Callable[[float], None]:
     return lambda done: progress(share * done)
-
-
-def _provenance(loaded: Loaded, result: StudyResult) -> dict[str, str]:
-    """Return where a result comes from: the tables, and the sessions that count."""
-    folder, read = loaded.folder.folder, loaded.folder
-    tables = [path for name, path in read.files.items() if name != "key"]
-    sessions = [folder / session.path for session in result.study.sessions]
-    known = {path: read.digests[name] for name, path in read.files.items()}
-    known |= {folder / name: digest for name, digest in loaded.recordings.digests.items()}
-    return provenance((*tables, *sessions), known, result.study.settings, command_line())

@@ -36,6 +36,7 @@ from rigidimeter.analysis.study_anew import (
     counting,
     day_tests,
     ratings_of,
+    relations,
     result_table,
     table_study,
     traffic_light,
@@ -325,3 +326,14 @@ class TestRatings:
         found = agreement(ratings_of("ratings.csv", score_rows(records), ["examiner"]))
         assert (found.pairs, found.equal) == (5, 1)
         assert found.mean_difference == pytest.approx((0 + 1 + 1 + 0.5 + 0.5) / 5)
+
+    def test_visits_with_the_same_scores_tie_in_whatever_order_they_come(self) -> None:
+        scores = {"1": (0.1, 0.2, 0.3), "2": (0.3, 0.2, 0.1), "3": (2.0, 2.0, 2.0)}
+        given = [("rating", day, score) for day, own in scores.items() for score in own]
+        rows = as_rows(
+            {"subject": "M", "day": day, "condition": "OFF", "method": "one", "measure": name}
+            | {"value": value}
+            for name, day, value in [*given, *((K, day, float(day)) for day in scores)]
+        )
+        (found,) = relations(rows)
+        assert found.ratings[0] == found.ratings[1]
