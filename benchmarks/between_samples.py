@@ -18,7 +18,7 @@ import numpy as np
 from tests.docs.measured import between_the_marks, folded
 from tests.scenarios.drive_rig import STRUCTURES, TRUTH, DriveRig, run
 
-from rigidimeter.analysis.study import estimate
+from rigidimeter.analysis.recording import estimate
 from rigidimeter.core.settings import parse_settings
 
 TABLE = Path(__file__).parent.parent / "docs" / "development" / "between-samples.md"

@@ -22,11 +22,12 @@ from scipy.stats import kstest, norm
 from rigidimeter.analysis.statistics import (
     TwoGroups,
     compare_effects,
+    difference,
     effect_sizes,
     rank_biserial_interval,
     two_groups,
 )
-from rigidimeter.analysis.study.ratings_model import model_ratings
+from rigidimeter.analysis.study_anew import table_ratings
 from rigidimeter.core.files import TextTable
 
 EXAMINERS = "ABC"
@@ -50,7 +51,7 @@ class Scores:
     rounded : bool
         To half steps from 0 to 3.
     random : tuple of str or None
-        As `model_ratings` takes it; None for its default, with days.
+        As `table_ratings` takes it; None for its default, with days.
     """
 
     name: str
@@ -109,8 +110,10 @@ def mixed(runs: int) -> None:
         p = np.empty((runs, 3))
         zero = 0
         for run in range(runs):
-            found = model_ratings(case.table(rng), COLUMNS, case.random, scale=WIDE, step=0)
-            p[run] = [getattr(found.contrast, name) for name in names]
+            table = case.table(rng)
+            found, pair = table_ratings(table, COLUMNS, case.random, scale=WIDE, step=0)
+            contrast = difference(found.fit, *reversed(pair))
+            p[run] = [getattr(contrast, name) for name in names]
             zero += "examiner" in found.fit.at_zero
         cells = [
             f"{100 * np.mean(column < 0.05):.1f} % (KS p {kstest(column, 'uniform').pvalue:.2g})"

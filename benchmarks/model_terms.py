@@ -21,7 +21,7 @@ from tests.scenarios.recordings import measured_alone
 from tests.scenarios.scenario import Scenario, scenario
 
 from rigidimeter.analysis.reading import Recording
-from rigidimeter.analysis.study import fit_terms
+from rigidimeter.analysis.recording import fit_terms
 from rigidimeter.core.records import Channel, Epoch
 
 Array = NDArray[np.float64]

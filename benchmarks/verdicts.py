@@ -22,7 +22,7 @@ Many more studies are drawn as values of B and K, without recordings, and conclu
 code (`STUDIES`): without a difference, with one (`TRUE`), and with one of the size that is worth
 finding, of which none may be excluded. The chance that `rigidimeter design` predicts stands beside.
 
-    python -m benchmarks.verdicts days --studies 2000   # ten minutes of processor time
+    python -m benchmarks.verdicts days --studies 2000   # 40 minutes of processor time
 """
 
 from __future__ import annotations
@@ -42,11 +42,9 @@ import numpy as np
 from tests.traps.recorded_studies import ALL, AT_REST, MOTION, Session, write_study
 
 import rigidimeter as rm
-from rigidimeter.analysis.study import Observation, StudyResult, conclude
-from rigidimeter.analysis.study.comparison import day_test, measured
-from rigidimeter.analysis.study.measures import MEASURES as TESTED
-from rigidimeter.analysis.study.tested import LEVEL
-from rigidimeter.core.settings import Settings
+from rigidimeter.analysis.study_anew import LEVEL, as_rows, conclude, day_tests
+from rigidimeter.analysis.study_anew import MEASURES as TESTED
+from rigidimeter.analysis.study_anew import Study as Rows
 from rigidimeter.core.study_files import PrimaryTable
 from rigidimeter.planning import Scatter, day_difference_sd, paired_power
 
@@ -121,19 +119,15 @@ def study_row(number: int, *, lower: bool) -> dict[str, Any]:
         seed = 2 * number + lower
         path = write_study(Path(folder) / "study", sessions_of(number, lower=lower), seed)
         result = rm.compare(path, resamples=0)
-    concluded = conclude(result)
-    assert concluded is not None
     now, before = {}, {}
-    for one in concluded.each:
-        name = MEASURES[one.comparison.measure.name]
+    for one in result.comparisons:
+        name = MEASURES[one.measure.name]
         now[name] = one.verdict
-        days = one.comparison.days
-        p = one.comparison.days_p_holm
-        side = "lower" if days is not None and days.estimate > 0 else "higher"
-        before[name] = side if p < LEVEL else "no difference shown"
-        if not np.isfinite(p):
+        side = "lower" if one.sign < 0 else "higher"
+        before[name] = side if one.p_adjusted < LEVEL else "no difference shown"
+        if not one.tested:
             before[name] = "cannot be decided"
-    reasons = {MEASURES[one.comparison.measure.name]: one.reason for one in concluded.each}
+    reasons = {MEASURES[one.measure.name]: one.reason for one in result.comparisons}
     return {"number": number, "lower": lower, "now": now, "before": before, "reasons": reasons}
 
 
@@ -190,7 +184,6 @@ def table(rows: list[dict[str, Any]]) -> Iterator[str]:
             yield f"| {group} difference ({len(own)}) | {name} | {' | '.join(cells)} |"
 
 
-SETTINGS = Settings()
 EPOCHS = 5
 """Of a day and condition."""
 WILD = (1 / 3, 3.0)
@@ -238,8 +231,8 @@ class Study:
 
     def drawn(
         self, name: str, lower: float, rng: np.random.Generator
-    ) -> tuple[list[Observation], float]:
-        """Return the epochs of a measure that is lower in DBS by a share, and that share.
+    ) -> tuple[list[dict[str, Any]], float]:
+        """Return the rows of a measure that is lower in DBS by a share, and that share.
 
         Of one or two subjects it is theirs, else that of all, as the sentence speaks of them.
         """
@@ -270,10 +263,15 @@ class Study:
                     values[hit] *= rng.choice(WILD, int(hit.sum()))
                     if condition == "OFF" and day == recorded.start:
                         values *= 1 + self.high
-                    found += [
-                        Observation(v, condition, f"S{subject}", f"{day}", unit=f"{subject}/{day}")
-                        for v in values.tolist()
-                    ]
+                    row = {
+                        "subject": f"S{subject}",
+                        "day": f"{day}",
+                        "unit": f"{subject}/{day}",
+                        "condition": condition,
+                        "method": "simulated",
+                        "measure": name,
+                    }
+                    found += [row | {"value": value} for value in values.tolist()]
         return found, math.fsum(effects) / len(effects) if self.subjects < 3 else lower
 
     def predicted(self, name: str) -> float:
@@ -291,20 +289,18 @@ class Study:
     def concluded(self, lower: Mapping[str, float], seed: Sequence[int]) -> dict[str, Concluded]:
         """Draw and compare a study; return what is concluded of each measure."""
         rng = np.random.default_rng(seed)
-        compared, shares = [], {}
+        rows: list[dict[str, Any]] = []
+        shares = {}
         for measure in TESTED:
             if measure.name in lower:
                 seen, shares[measure.name] = self.drawn(measure.name, lower[measure.name], rng)
-                one = measured(measure, seen, ("OFF", "DBS"))
-                compared.append(replace(one, days=day_test(one)))
-        result = StudyResult("", "OFF", "DBS", tuple(compared), settings=SETTINGS)
-        concluded = conclude(result)
-        assert concluded is not None
+                rows += seen
+        study = Rows(as_rows(rows), "OFF", "DBS")
         level = 1 + self.wild * (sum(WILD) / len(WILD) - 1)
         found = {}
-        for one in concluded.each:
-            name, d = one.comparison.measure.name, one.difference
-            held = d.low <= -level * shares[name] <= d.high
+        for one in conclude(study, day_tests(study)):
+            name = one.measure.name
+            held = one.low <= -level * shares[name] <= one.high
             found[name] = Concluded(one.verdict, held, shares[name])
         return found
 

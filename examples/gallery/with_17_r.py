@@ -27,7 +27,7 @@ MEASURES = {
 
 result = rm.compare(rm.data("study"))
 folder = Path(mkdtemp())
-table = result.analysis.table()
+table = result.study.analysis.table()
 table = table[table["outcome"] == "included"]
 table["day"] = table["source"].str.extract(r"day-(\d+)", expand=False)
 table.to_csv(folder / "estimates.csv", index=False)
@@ -75,14 +75,13 @@ relative = []
 for (name, letter), (w, p_ranks, mean, low, high, p_days, p_aov) in zip(
     MEASURES.items(), of_r, strict=True
 ):
-    ours = result.comparison(name)
-    test, days = ours.test, ours.days
+    epochs, days = result.value_test(name), result.comparison(name)
     pairs = {
-        "W": (test.u, w),
-        "p, rank-sum": (test.p, p_ranks),
-        "difference of days": (days.estimate, mean),
-        "its lower end": (days.low, low),
-        "its upper end": (days.high, high),
+        "W": (epochs.statistic.u, w),
+        "p, rank-sum": (epochs.p, p_ranks),
+        "difference of days": (-days.difference, mean),
+        "its lower end": (-days.high, low),
+        "its upper end": (-days.low, high),
         "p, paired t-test": (days.p, p_days),
         "p, aov": (days.p, p_aov),
     }

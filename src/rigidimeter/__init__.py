@@ -26,9 +26,11 @@ from rigidimeter.core.version import __version__
 
 if TYPE_CHECKING:
     from rigidimeter.analysis.batch import batch
+    from rigidimeter.analysis.figures import plot
     from rigidimeter.analysis.reading import data, identify, read
-    from rigidimeter.analysis.report import plot, report
-    from rigidimeter.analysis.study import compare, estimate, fit_terms
+    from rigidimeter.analysis.recording import estimate, fit_terms
+    from rigidimeter.analysis.report import report
+    from rigidimeter.analysis.study_anew import compare
     from rigidimeter.planning import design
     from rigidimeter.virtual import simulate
 
@@ -51,12 +53,12 @@ _ROOMS = {
     "identify": "rigidimeter.analysis.reading",
     "read": "rigidimeter.analysis.reading",
     "data": "rigidimeter.analysis.reading",
-    "estimate": "rigidimeter.analysis.study",
-    "compare": "rigidimeter.analysis.study",
-    "fit_terms": "rigidimeter.analysis.study",
+    "estimate": "rigidimeter.analysis.recording",
+    "compare": "rigidimeter.analysis.study_anew",
+    "fit_terms": "rigidimeter.analysis.recording",
     "simulate": "rigidimeter.virtual",
     "design": "rigidimeter.planning",
-    "plot": "rigidimeter.analysis.report",
+    "plot": "rigidimeter.analysis.figures",
     "report": "rigidimeter.analysis.report",
     "batch": "rigidimeter.analysis.batch",
 }
@@ -82,11 +84,9 @@ def _for_python(function: Callable[..., Any]) -> Callable[..., Any]:
             found = function(*values, **named)
         except UserError as error:
             raise UserError(*map(arguments_named, error.lines)) from error.__cause__
-        if not (notices := getattr(found, "notices", ())):
-            return found
-        texts = (arguments_named(notice.text) for notice in notices)
-        told = tuple(replace(one, text=text) for one, text in zip(notices, texts, strict=True))
-        return replace(found, notices=told)
+        notices = getattr(found, "notices", ())
+        told = tuple(replace(one, text=arguments_named(one.text)) for one in notices)
+        return replace(found, notices=told) if told else found
 
     return called
 

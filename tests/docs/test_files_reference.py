@@ -106,7 +106,7 @@ def test_the_keys_of_a_study_are_documented(study: Path) -> None:
     _assert_valid(document, "comparison.json")
     kept = {path.name for path in (study / "analysis").iterdir()}
     section = FILES.read_text("utf-8").split("## Study folder")[1].split("### Top level")[0]
-    assert kept <= set(re.findall(r"`([a-z_-]+\.(?:json|csv))`", section))
+    assert kept <= set(re.findall(r"`([a-z_-]+\.(?:json|csv|parquet))`", section))
     inputs = json.loads((study / "analysis/inputs.json").read_text("utf-8"))
     for schema in (document["schema"], inputs["schema"], STUDY_SCHEMA):
         assert f"`{schema}`" in FILES.read_text("utf-8")

@@ -6,10 +6,10 @@ import json
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 from tests.unit.virtual.tiny import tiny
 
+from rigidimeter.analysis.study_anew import counting
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.words import number
 from rigidimeter.model import JointDynamics
@@ -187,11 +187,10 @@ def test_the_whole_study_has_the_counts_of_table_1() -> None:
 def test_every_measure_of_the_virtual_study_has_its_day_test(context: Context) -> None:
     compared = context.study.comparison("stiffness_nm_rad")
     assert compared is not None
-    found = compared.days
-    assert found is not None
-    assert (found.n_days_x, found.n_days_y) == (2, 2)
-    off, dbs = (compared.values[name] for name in ("OFF", "DBS"))
-    assert found.estimate == pytest.approx(np.mean(off) - np.mean(dbs))  # as many on each day
+    assert (compared.by, compared.units) == ("days", (2, 2))
+    rows = counting(context.study.study.rows, "stiffness_nm_rad")
+    means = rows.groupby("condition")["value"].mean()
+    assert compared.difference == pytest.approx(means["DBS"] - means["OFF"])  # as many on each day
 
 
 def test_an_unknown_row_is_refused_with_the_names() -> None:
@@ -274,11 +273,12 @@ def test_the_ratings_effect_is_not_significantly_smaller() -> None:
 
 
 def test_the_drawn_epoch_is_of_median_stiffness(rows: dict[str, Claim], context: Context) -> None:
-    fits = [fit for fit in context.study.analysis.fixed_inertia if fit.condition == "OFF"]
+    fits = [fit for fit in context.study.study.analysis.fixed_inertia if fit.condition == "OFF"]
     ranked = sorted(fit.stiffness_nm_rad for fit in fits if fit.outcome.included)
     median = ranked[(len(ranked) - 1) // 2]
-    assert f"with the median stiffness (J {number(context.study.analysis.inertia_kg_m2)}, " in (
-        rows["fig-4b"].ours
+    assert (
+        f"with the median stiffness (J {number(context.study.study.analysis.inertia_kg_m2)}, "
+        in (rows["fig-4b"].ours)
     )
     assert f"K {number(median)})" in rows["fig-4b"].ours
 

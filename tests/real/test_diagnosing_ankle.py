@@ -8,7 +8,7 @@ import pytest
 import rigidimeter as rm
 from rigidimeter.analysis.estimation import estimate_recorded, prepare
 from rigidimeter.analysis.reading import ReadOptions, Recording, read_recording
-from rigidimeter.analysis.study import fit_terms
+from rigidimeter.analysis.recording import fit_terms
 from rigidimeter.core.records import Channel
 from rigidimeter.core.settings import Settings
 

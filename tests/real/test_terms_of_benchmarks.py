@@ -5,7 +5,7 @@ import pytest
 import scipy.io
 
 from rigidimeter.analysis.reading import Recording
-from rigidimeter.analysis.study import fit_terms
+from rigidimeter.analysis.recording import fit_terms
 from rigidimeter.core.records import Channel, Epoch
 from rigidimeter.core.settings import parse_settings
 

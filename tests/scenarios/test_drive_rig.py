@@ -10,7 +10,7 @@ from tests.scenarios.catalogue import SCENARIOS
 from tests.scenarios.drive_rig import TRUTH, DriveRig, run
 
 from rigidimeter.analysis.estimation import estimate_recorded, prepare
-from rigidimeter.analysis.study import estimate
+from rigidimeter.analysis.recording import estimate
 from rigidimeter.core.records import Epoch
 from rigidimeter.core.settings import parse_settings
 

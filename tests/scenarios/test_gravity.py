@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.scenarios.catalogue import SCENARIOS
 
-from rigidimeter.analysis.study import estimate
+from rigidimeter.analysis.recording import estimate
 from rigidimeter.core.settings import changed_settings
 
 

@@ -12,7 +12,7 @@ import pytest
 from tests.scenarios.late_drive_rig import LateRig, simulate
 
 import rigidimeter
-from rigidimeter.analysis.study import estimate
+from rigidimeter.analysis.recording import estimate
 from rigidimeter.core.records import Epoch
 from rigidimeter.core.settings import parse_settings
 

@@ -12,17 +12,25 @@ from __future__ import annotations
 import math
 import sys
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, astuple, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from tests.study_anew.designs import random_study, random_table
+from tests.study_anew.designs import random_ratings, random_study, random_table
 
 from rigidimeter.analysis import study as old
 from rigidimeter.analysis import study_anew as new
+from rigidimeter.analysis.reading import estimates_document
+from rigidimeter.analysis.study.ratings_found import (
+    rating_contrast,
+    rating_offsets,
+    ratings_document,
+)
+from rigidimeter.analysis.study.ratings_model import model_ratings
 from rigidimeter.core.errors import UserError
+from rigidimeter.core.records import Analysis
 
 RESAMPLES = 199
 """Of the bootstrap in studies that are read from folders."""
@@ -38,7 +46,7 @@ Rows = Sequence[Mapping[str, Any]]
 TABLES = ("precision", "comparisons", "summaries", "days", "effect_differences", "sensitivity",
           "conditions", "sessions", "excluded_epochs", "left_out", "account", "ratings",
           "rating_offsets", "rating_contrast", "rating_relation", "deviations",
-          "without_deviating")  # fmt: skip
+          "without_deviating", "estimates", "scores")  # fmt: skip
 """Of a folder beside what is concluded."""
 
 
@@ -55,6 +63,7 @@ class Answers(NamedTuple):
     documents: Sequence[Any] = ()
     digests: Mapping[str, str] = {}
     plan: str = ""
+    shown: Mapping[str, Any] = {}
 
     def cells(self) -> dict[str, Any]:
         """Return every answer by its name."""
@@ -70,9 +79,13 @@ class Answers(NamedTuple):
                 where = f"{table} {k} {row.get('measure', '')} {row.get('other', '')}"
                 found |= {f"{where} {name}": cell for name, cell in row.items()}
                 found[f"{where} columns"] = list(row)
+        found |= {f"shown {name}": cell for name, cell in leaves(self.shown)}
         for k, document in enumerate(self.documents):
             found |= {f"document {k} {name}": cell for name, cell in leaves(document)}
         return found
+
+
+NOTHING = Answers((), (), "", (), ())
 
 
 def leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
@@ -123,17 +136,45 @@ def old_answers(result: old.StudyResult) -> Answers:
             None if (said := result.statements) is None else tuple(said),
         ],
         plan=old.deviation_words(result),
+        shown={
+            "differences": [old.difference_cells(pair) for pair in pairs if pair.other],
+            **_shown(result),
+        },
     )
 
 
-def new_answers(study: new.Study, methods: Sequence[new.OfMethod]) -> Answers:
+def _shown(result: Any) -> dict[str, Any]:
+    """Return what a terminal and a notebook show of a result of either room."""
+    return {
+        "repr": repr(result),
+        "html": result._repr_html_(),
+        "table": result.table().to_dict("list"),
+        "full table": result.table(full=True).to_dict("list"),
+        "conditions": result.condition_names,
+        "resampled": result.resampled,
+    }
+
+
+def concluded_study(result: old.StudyResult) -> new.StudyResult:
+    """Return what the new room concludes of what was recorded; effect sizes are as they were."""
+    study, methods = new_study(result)
+    sizes = {c.measure.name: c.effects for c in result.comparisons if c.effects is not None}
+    return new.StudyResult(
+        study,
+        new.conclude(study, new.day_tests(study), methods),
+        new.compare_values(study),
+        sizes,
+        methods=tuple(methods),
+    )
+
+
+def new_answers(result: new.StudyResult) -> Answers:
     """Return what the new room says."""
-    concluded = new.conclude(study, new.compare(study), methods)
+    study, concluded, methods = result.study, result.comparisons, result.methods
     said = new.statements(study, concluded)
     again = new.without_deviating(study, concluded)
     light = new.traffic_light(study, concluded)
-    findings = (*study.analysis.findings, *new.reasons(concluded))
-    values = [one for one in new.compare_values(study) if one.other]
+    values = [one for one in result.values if one.other]
     return Answers(
         new.conclusion_rows(concluded, methods),
         [{"other": other, **one._asdict()} for other, one in said.items()],
@@ -167,10 +208,14 @@ def new_answers(study: new.Study, methods: Sequence[new.OfMethod]) -> Answers:
             "quality": [] if light is None else [light],
         },
         documents=[
-            [(one.finding.row(), one.where) for one in findings],
-            None if (every := new.statement(study, concluded)) is None else tuple(every),
+            [(one.finding.row(), one.where) for one in result.findings],
+            None if (every := result.statements) is None else tuple(every),
         ],
         plan=new.deviation_sentence(study, again),
+        shown={
+            "differences": [new.difference_cells(result, other) for other in study.others],
+            **_shown(result),
+        },
     )
 
 
@@ -190,13 +235,17 @@ def of_folder(folder: Path, **options: Any) -> tuple[Answers | str, Answers | st
             documents=[old.comparison_document(result, str(folder)), _agreement(result)],
             digests={**read.folder.digests, **read.gathered.digests},
         )
+        estimates = old.estimate_study(read)[0]
+        scatter = _scatter(old.day_scatter, read, estimates)
+        more = {"estimates": estimates_document(estimates), "scatter": scatter}
+        before = before._replace(shown={**before.shown, **more})
     try:
         loaded = new.load_study(folder, **options)
     except UserError as error:
         return before, str(error)
     found = new.conclude_study(new.analyse(loaded), resamples=RESAMPLES)
     ratings = found.study.ratings
-    now = new_answers(found.study, found.methods)._replace(
+    now = new_answers(found)._replace(
         notices=[f"{one.level} {one.text}" for one in found.notices],
         tables={name: new.result_table(found, name) for name in TABLES},
         documents=[
@@ -205,7 +254,19 @@ def of_folder(folder: Path, **options: Any) -> tuple[Answers | str, Answers | st
         ],
         digests=found.study.digests,
     )
-    return before, now
+    estimates = new.estimate_study(loaded)[0]
+    scatter = _scatter(new.day_scatter, loaded, estimates)
+    more = {"estimates": estimates_document(estimates), "scatter": scatter}
+    return before, now._replace(shown={**now.shown, **more})
+
+
+def _scatter(day_scatter: Callable[..., Any], read: Any, estimates: Analysis) -> Any:
+    """Return the scatter between days of one of the rooms, or why it is unknown."""
+    try:
+        found = day_scatter(read, estimates)
+    except UserError as error:
+        return str(error)
+    return [one._asdict() if hasattr(one, "_asdict") else asdict(one) for one in found]
 
 
 def _agreement(result: old.StudyResult) -> tuple[Any, ...] | None:
@@ -223,15 +284,54 @@ def of_table(seed: int) -> tuple[Answers | str, Answers | str]:
         before = str(error)
     else:
         before = old_answers(result)._replace(notices=[one.text for one in result.notices])
-    pair = options["reference"], options["other"]
-    columns = new.Columns(options["value"], options["by"], options["session"])
     try:
-        study = new.table_study(table, columns, pair, options["group"])
+        found = new.compare(table, resamples=0, **options)
     except UserError as error:
         now = str(error)
     else:
-        now = new_answers(study, ())._replace(notices=[one.text for one in study.notices])
+        now = new_answers(found)._replace(notices=[one.text for one in found.notices])
     return before, now
+
+
+def of_anything(x: Any, **options: Any) -> tuple[Answers | str, Answers | str]:
+    """Return what `compare` of both rooms says, or why it refuses."""
+    before: Answers | str
+    try:
+        result = old.compare(x, **options)
+    except UserError as error:
+        before = str(error)
+    else:
+        tables = {name: old.result_table(result, name) for name in TABLES}
+        documents = [old.comparison_document(result)]
+        before = old_answers(result)._replace(tables=tables, documents=documents)
+    try:
+        found = new.compare(x, **options)
+    except UserError as error:
+        return before, str(error)
+    tables = {name: new.result_table(found, name) for name in TABLES}
+    documents = [new.comparison_document(found)]
+    return before, new_answers(found)._replace(tables=tables, documents=documents)
+
+
+def of_ratings(seed: int) -> tuple[Answers | str, Answers | str]:
+    """Return what both rooms say of the ratings of a random table, or why they refuse it."""
+    table, columns, options = random_ratings(seed)
+    before: Answers | str
+    try:
+        found = model_ratings(table, columns, **options)
+    except UserError as error:
+        before = str(error)
+    else:
+        rows = rating_offsets(found), rating_contrast(found)
+        before = NOTHING._replace(documents=[ratings_document(found), *map(list, rows)])
+    options["contrast"] = options.pop("pair")
+    try:
+        ratings, pair = new.table_ratings(table, columns, **options)
+    except UserError as error:
+        return before, str(error)
+    document = new.ratings_document(ratings, pair)
+    rows = new.rating_offsets(ratings), new.rating_contrast(ratings, pair)
+    return before, NOTHING._replace(documents=[document, *map(list, rows)])
 
 
 def new_study(result: old.StudyResult) -> tuple[new.Study, list[new.OfMethod]]:
@@ -345,7 +445,7 @@ def compare_seeds(seeds: range) -> int:
         for known_days in (True, False):
             result = random_study(seed, known_days=known_days)
             before = old_answers(result)
-            found = list(apart(before, new_answers(*new_study(result))))
+            found = list(apart(before, new_answers(concluded_study(result))))
             differing += bool(found)
             seen["studies"] += 1
             seen.update(f"verdict {row['verdict']}" for row in before.conclusion)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from tests.unit.analysis.report.cohorts import (
+from tests.study_anew.old_cohorts import (
     JOINT,
     PULL,
     day_tests,
@@ -24,7 +24,7 @@ from tests.unit.analysis.report.cohorts import (
     sensitivity_row,
     with_days,
 )
-from tests.unit.analysis.report.cohorts import Rating as OldRating
+from tests.study_anew.old_cohorts import Rating as OldRating
 
 from rigidimeter.analysis.statistics import fit_mixed, holm, two_groups
 from rigidimeter.analysis.study import (
@@ -39,6 +39,7 @@ from rigidimeter.analysis.study import (
     compare_analysis,
     compare_measures,
 )
+from rigidimeter.core.files import TextTable
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Analysis, Fit, Outcome, Score
 from rigidimeter.core.study_files import PrimaryTable
@@ -358,3 +359,38 @@ def random_table(seed: int) -> tuple[pd.DataFrame, dict[str, Any]]:
     ):
         options[name] = choices[rng.integers(len(choices))]
     return table, options
+
+
+def random_ratings(seed: int) -> tuple[TextTable, dict[str, str], dict[str, Any]]:
+    """Return a table of ratings, what it calls its columns, and how it is to be modelled.
+
+    Some have one examiner, one day or none, several subjects, scores that are missing, between
+    steps or outside the scale, or options that are wrong.
+    """
+    rng = np.random.default_rng(seed)
+    n = int(rng.choice([2, 4, 9, 16, 30]))
+    names = ["ON", "OFF", "half"][: rng.choice([1, 2, 2, 2, 3])]
+    cells = {"state": rng.choice(names, n)}
+    scores = rng.integers(0, 6, n) / 2 + (rng.random(n) < rng.choice([0.0, 0.1])) * 0.2
+    cells["score"] = np.where(rng.random(n) < rng.choice([0.0, 0.0, 0.1]), "", scores.astype(str))
+    if rng.random() < 0.9:
+        cells["examiner"] = rng.choice(["A", "B", "C", "D"][: rng.integers(1, 5)], n)
+    if rng.random() < 0.4:
+        cells["subject"] = rng.choice(["R1", "R2", "R3"][: rng.integers(1, 4)], n)
+    if rng.random() < 0.7:
+        days = ["1", "2", "3", "4"][: rng.integers(1, 5)]
+        cells["day"] = rng.choice(days, n)
+        if rng.random() < 0.3:
+            cells["day"] = cells["state"]  # each condition on a day of its own
+    columns = {name: name for name in ("score", "examiner", "subject", "day")}
+    kinds = [None, None, None, ["examiner"], ["examiner", "subject"], ["subject/day"], ["day"]]
+    kinds += [["examiner", "day/condition"], ["rater"]]
+    options: dict[str, Any] = {
+        "random": kinds[rng.integers(len(kinds))],
+        "scale": [(0.0, 3.0), (0.0, 3.0), (0.0, 2.0), (3.0, 0.0)][rng.choice([0, 0, 1, 2, 3])],
+        "step": float(rng.choice([0.5, 0.5, 0.0])),
+        "pair": [None, None, None, ("ON", "OFF"), ("ON", "ON"), ("ON", "gone")][rng.integers(6)],
+    }
+    texts = {name: tuple(map(str, column)) for name, column in cells.items()}
+    table = TextTable("ratings.csv", texts, tuple(range(2, n + 2)))
+    return table, {"condition": "state", **columns}, options

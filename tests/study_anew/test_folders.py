@@ -4,6 +4,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from benchmarks.verdicts import sessions_of
 from tests.small_study import record
@@ -11,8 +12,11 @@ from tests.study_anew.both import Answers, apart, of_folder
 from tests.traps.recorded_studies import write_study
 from tests.unit.analysis.study import test_deviations
 
+from rigidimeter.analysis import study_anew as new
+
 planned_study = test_deviations.study
 
+PAIR = ("OFF", "DBS")
 Edit = Callable[[Path, str, str], None]
 
 
@@ -30,6 +34,25 @@ def test_of_a_study_with_every_method_and_ratings(fitted_study: Path) -> None:
 
 def test_of_a_study_of_scores(scored_study: Path) -> None:
     assert len(same(scored_study).conclusion) == 3
+
+
+def test_prepared_beforehand_and_read_again(study: Path) -> None:
+    loaded = new.load_study(study, pair=("DBS", "OFF"), method="iv")
+    found = new.analyse(loaded, new.prepare_study(loaded))
+    pd.testing.assert_frame_equal(found.rows, new.analyse(loaded).rows)
+    again = found.folder_read()
+    assert (again.names, again.method) == (loaded.names, "iv")
+    assert [epoch.label for epoch in again.epochs] == [epoch.label for epoch in loaded.epochs]
+
+
+def test_the_public_function_tells_how_far_it_is(study: Path) -> None:
+    shares: list[float] = []
+    found = new.compare(study, "DBS", reference="OFF", resamples=199, progress=shares.append)
+    assert sum(shares) == pytest.approx(1.0)
+    by_hand = new.conclude_study(new.analyse(new.load_study(study, pair=PAIR)), resamples=199)
+    place = str(study)
+    assert new.comparison_document(found, place) == new.comparison_document(by_hand, place)
+    assert found.study.folder_read is not None
 
 
 def test_other_conditions_and_a_group(study: Path) -> None:

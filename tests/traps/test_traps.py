@@ -22,7 +22,7 @@ from tests.traps.recorded_studies import (
 )
 
 import rigidimeter as rm
-from rigidimeter.analysis.study import StudyResult, comparison_document, lead, statements
+from rigidimeter.analysis.study_anew import StudyResult, comparison_document, lead
 
 OFF, DBS = Session("1", "OFF"), Session("1", "DBS")
 NAMES = ("OFF", "DBS")
@@ -71,9 +71,9 @@ def one_day_each(study: Path) -> None:
 def told(result: StudyResult) -> Told:
     """Return the conclusions of the JSON file by measure, and what is said of the conditions."""
     rows = {row["measure"]: row for row in comparison_document(result)["conclusion"]}
-    said = statements(result)
+    said = result.statements
     assert said is not None
-    return rows, " ".join([lead(result), *said.concluded])
+    return rows, " ".join([lead(result.study, result.comparisons), *said.concluded])
 
 
 def compared(study: Path) -> Told:
@@ -239,10 +239,9 @@ def test_an_inertia_that_differs_does_not_reach_the_stiffness(recorded):
     assert rows["inertia_kg_m2"]["reason"].startswith("inertia differs by 15 %")
     assert "inertia differs by 15 %" in sentence
     (held,) = (
-        row
-        for row in result.sensitivity
-        if (row.measure.name, row.method, row.inertia) == ("stiffness_nm_rad", "iv", "fixed")
+        one.by_days
+        for one in result.methods
+        if (one.by_days.measure.name, one.method, one.inertia)
+        == ("stiffness_nm_rad", "iv", "fixed")
     )
-    assert (
-        held.p_day < 0.05
-    )  # the paper's second stage, which is shown beside and concludes nothing
+    assert held.p < 0.05  # the paper's second stage, which is shown beside and concludes nothing

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -17,7 +17,7 @@ from rigidimeter.cli.terminal_tables import show
 from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.analysis.study import StudyResult
+    from rigidimeter.analysis.study_anew import StudyResult
 
 
 @reads_recordings
@@ -74,73 +74,57 @@ def compare(
       rigidimeter compare demo-study/analysis/estimates.json --reference DBS
       rigidimeter compare demo-study/ratings.csv --value score --by condition
     """
-    from rigidimeter.analysis import study as studies
+    from rigidimeter.analysis import study_anew as studies
+    from rigidimeter.analysis.report import Shown
     from rigidimeter.cli.comparison_text import comparison_blocks
-    from rigidimeter.cli.inputs import (
-        analyse_recordings,
-        analyse_study_folder,
-        study_files,
-        study_of,
-    )
+    from rigidimeter.cli.inputs import Analysed, analyse_recordings, study_of
+    from rigidimeter.cli.study_inputs import analyse_study_folder, study_files
 
-    outputs = (json_out, csv_out)
-    paths = recordings.paths
+    outputs, paths, pair = (json_out, csv_out), recordings.paths, (reference, other)
     is_json = any(path.suffix.lower() == ".json" for path in paths)
     if value and len(paths) != 1:
         raise UserError(f"--value takes one table, but {len(paths)} inputs were given")
-    if not value and (folder := study_of(recordings, key)) is not None:
-        keep_inputs(outputs, study_files(folder, key))
-        study = analyse_study_folder(
-            folder,
-            recordings,
-            key,
-            pair=(reference, other),
-            group=group,
-            seed=seed,
-            resamples=resamples,
+    how: dict[str, Any] = {"seed": seed, "resamples": resamples}
+    folder = None if value else study_of(recordings, key)
+    keep_inputs(outputs, paths if folder is None else study_files(folder, key))
+    read, analysed = None, Analysed()
+    if folder is not None:
+        shown, analysed = analyse_study_folder(
+            folder, recordings, key, pair=pair, group=group, recordings_shown=full, **how
         )
-        try:
-            _write(study.result, *outputs, str(folder))
-            show(comparison_blocks(study.result, full=full))
-            _say_changes(study.result, folder, kept=group is None and not study.not_kept)
-        finally:
-            status = study.say()
-        raise typer.Exit(status)
-    keep_inputs(outputs, paths)
-    if is_json and not value and len(paths) > 1:
+    elif is_json and not value and len(paths) > 1:
         raise UserError("compare takes one JSON file of estimates, or recordings, not both")
-    analysed = None if value or is_json else analyse_recordings(recordings)[1]
-    status = 0
+    elif not (value or is_json):
+        read, analysed = analyse_recordings(recordings)
     try:
-        with Meter("compare", 1.0) as meter:
-            found = studies.compare(
-                paths[0] if analysed is None else analysed.result.analysis,
-                other,
-                reference=reference,
-                value=value,
-                by=by,
-                session=session,
-                group=group,
-                seed=seed,
-                resamples=resamples,
-                progress=meter.advance,
-            )
-        if analysed is not None:
-            read = analysed.result
-            found = replace(found, epochs=read.epochs, settings=read.settings)
-        _write(found, *outputs)
-        show(comparison_blocks(found, full=full))
-        say(found.notices)
+        if folder is None:
+            with Meter("compare", 1.0) as meter:
+                how |= {"progress": meter.advance}
+                if read is None:
+                    how |= {"value": value, "by": by, "session": session, "group": group}
+                    found = studies.compare(paths[0], other, reference=reference, **how)
+                else:
+                    study = studies.estimates_study(
+                        analysed.analysis, pair, group, epochs=read.epochs, settings=read.settings
+                    )
+                    found = studies.conclude_study(study, **how)
+            shown = Shown(found, () if read is None else read.epochs)
+        _write(shown.result, *outputs, "" if folder is None else str(folder))
+        show(comparison_blocks(shown, full=full))
+        _say_changes(shown.changes)
+        if folder is None:
+            say(shown.result.notices)
+        elif group is None and not analysed.not_kept:
+            echo(f"\nTables and JSON: {folder / 'analysis'}; most tables here: --full")
     finally:
-        if analysed is not None:
-            status = analysed.say()
+        status = analysed.say()
     raise typer.Exit(status)
 
 
 def _write(
     found: StudyResult, json_out: Path | None, csv_out: Path | None, place: str = ""
 ) -> None:
-    from rigidimeter.analysis.study import (
+    from rigidimeter.analysis.study_anew import (
         columns_of_rows,
         comparison_document,
         result_table,
@@ -156,12 +140,10 @@ def _write(
         write_dictionary_beside(csv_out, "comparisons", columns_of_rows(rows))
 
 
-def _say_changes(found: StudyResult, folder: Path, *, kept: bool) -> None:
-    from rigidimeter.analysis.study import UNCHANGED
+def _say_changes(changes: Sequence[str]) -> None:
+    from rigidimeter.analysis.study_anew import UNCHANGED
 
-    if found.changes and found.changes != (UNCHANGED,):
+    if changes and changes != (UNCHANGED,):
         echo("\nSince the last analysis:")
-        for change in found.changes:
+        for change in changes:
             echo(f"  {change}")
-    if kept:
-        echo(f"\nTables and JSON: {folder / 'analysis'}; most tables here: --full")

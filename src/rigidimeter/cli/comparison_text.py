@@ -8,21 +8,20 @@ from collections.abc import Iterator
 from markupsafe import Markup
 
 from rigidimeter.analysis import report  # what is taken from it is imported when it is used
-from rigidimeter.analysis.study import (
+from rigidimeter.analysis.study_anew import (
+    Study,
     StudyResult,
-    deviation_words,
+    counting,
+    deviation_sentence,
     difference_cells,
     lead,
+    measures_of,
+    result_table,
     statements,
 )
-from rigidimeter.cli.terminal_tables import Block, Heading, Table, paragraph, shown_table
-from rigidimeter.core.records import Analysis, notes_text
+from rigidimeter.cli.notes import finding_notes, stiffness_notes
+from rigidimeter.cli.terminal_tables import Block, Heading, Table, shown_table
 from rigidimeter.core.words import condition_name, plural
-
-MOST_FINDINGS = 3
-
-NOTE_WIDTH = 67
-"""Letters of a line beside the label of a note, of the 80 of a line."""
 
 BY = {
     "protocol": "by the protocol",
@@ -32,58 +31,65 @@ BY = {
 }
 
 
-def comparison_blocks(found: StudyResult, *, full: bool = False) -> Iterator[Block]:
+def comparison_blocks(shown: report.Shown, *, full: bool = False) -> Iterator[Block]:
     """Yield the first screen: each measure, and what was measured, tested and concluded.
 
     With `full` every finding, and the tables of the report.
     """
+    found, analysis = shown.result, shown.analysis
     yield Heading(_about(found))
-    for pair in (found, *found.further_pairs):
+    for other in _others(found):
         yield ""
-        yield from difference_blocks(pair)
+        yield from difference_blocks(found, other)
         yield ""
-        yield from statement_blocks(pair)
-    analysis = found.analysis
-    notes = [*stiffness_notes(analysis), *_plan(found), *_left_out(found)]
+        yield from statement_blocks(found, other)
+    notes = [*stiffness_notes(analysis), *_plan(found), *_left_out(found.study)]
     notes += finding_notes(analysis, full)
     if notes:
         yield ""
         yield Table((), notes, "<<", 1)
     if full:
-        yield from full_blocks(found)
+        yield from full_blocks(shown)
+
+
+def _others(found: StudyResult) -> list[str]:
+    """Return each condition that was compared with the reference, the main one first."""
+    return list(dict.fromkeys([found.study.other, *(one.other for one in found.values)]))
 
 
 def _about(found: StudyResult) -> str:
     """Return what was compared, and how much of it."""
-    names = [found.reference, *(each.other for each in (found, *found.further_pairs))]
+    study = found.study
+    names = [study.reference, *_others(found)]
     parts = [" and ".join(condition_name(name) for name in dict.fromkeys(names) if name)]
-    if found.virtual or any(epoch.virtual for epoch in found.epochs):
+    if study.virtual or study.partly_virtual:
         parts.append("virtual data")
-    if found.blinded:
+    if study.blinded:
         parts.append("blinded: the conditions are codes")
-    groups = {o.group for c in found.comparisons for o in c.observations}
+    each = (counting(study.rows, measure.name)["group"] for measure in measures_of(study.rows))
+    groups = {group for own in each for group in own}
     if len(groups) == 1 and (group := groups.pop()):
         parts.append(f"group {group}")
-    if found.sessions:
-        parts.append(plural(len({each.subject for each in found.sessions}), "subject"))
-        parts.append(plural(len({(s.subject, s.day) for s in found.sessions}), "day"))
-    if results := found.analysis.results:
+    if study.sessions:
+        parts.append(plural(len({each.subject for each in study.sessions}), "subject"))
+        parts.append(plural(len({(s.subject, s.day) for s in study.sessions}), "day"))
+    if results := study.analysis.results:
         used = sum(one.outcome.included for one in results)
         parts.append(f"{plural(len(results), 'epoch')}, {used} used")
     return " · ".join(parts)
 
 
-def difference_blocks(found: StudyResult) -> Iterator[Block]:
+def difference_blocks(found: StudyResult, other: str) -> Iterator[Block]:
     """Yield what was found of each measure; of a virtual study beside what was simulated."""
-    if found.other:
-        yield Table(*difference_cells(found), "=>>>>>>=", 1)
+    if other:
+        yield Table(*difference_cells(found, other), "=>>>>>>=", 1)
 
 
-def statement_blocks(found: StudyResult) -> Iterator[Block]:
+def statement_blocks(found: StudyResult, other: str) -> Iterator[Block]:
     """Yield what was measured, tested and concluded."""
-    said = statements(found)
+    said = statements(found.study, found.comparisons).get(other)
     if said is None:
-        yield lead(found)
+        yield lead(found.study, found.comparisons)
         return
     rows = [("measured", said.measured), ("tested", said.tested)]
     rows += [("concluded" * (not k), sentence) for k, sentence in enumerate(said.concluded)]
@@ -92,66 +98,27 @@ def statement_blocks(found: StudyResult) -> Iterator[Block]:
 
 def _plan(found: StudyResult) -> Iterator[tuple[str, str]]:
     """Yield where the study was not carried out as planned."""
-    if words := deviation_words(found):
+    again = result_table(found, "without_deviating")
+    if words := deviation_sentence(found.study, again):
         yield "plan", words
 
 
-def _left_out(found: StudyResult) -> Iterator[tuple[str, str]]:
+def _left_out(study: Study) -> Iterator[tuple[str, str]]:
     """Yield how many epochs and sessions do not count, and why."""
-    counts = Counter((exclusion.by, exclusion.reason) for exclusion in found.exclusions)
+    counts = Counter((exclusion.by, exclusion.reason) for exclusion in study.exclusions)
     for k, ((by, reason), count) in enumerate(counts.most_common(3)):
         yield "excluded" * (not k), f"{count} epoch{'s' * (count > 1)} {BY[by]}: {reason}"
     if len(counts) > 3:
         yield "", f"{sum(counts.values())} epochs in all; --full has all reasons"
     # A session with a row for each of its conditions is left out once.
-    for path, reason in dict.fromkeys((out.path, out.reason) for out in found.left_out):
+    for path, reason in dict.fromkeys((out.path, out.reason) for out in study.left_out):
         yield "left out", f"{path}: {reason}"
 
 
-def stiffness_notes(analysis: Analysis) -> Iterator[tuple[str, str]]:
-    """Yield which K is given and at what motion, in two lines."""
-    if words := analysis.stiffness_words:
-        yield "K", two_lines(words, words.partition(", range")[0])
-
-
-def finding_notes(analysis: Analysis, full: bool) -> Iterator[tuple[str, str]]:
-    """Yield each kind of finding once, the most serious first.
-
-    Without `full` the first few that are more than a note, in two lines each: where the epochs'
-    names are too long for that, their number; the names of the others; and how many notes change
-    nothing.
-    """
-    groups = analysis.findings
-    serious = [group for group in groups if group.finding.level != "note"]
-    shown = groups if full else serious[:MOST_FINDINGS]
-    for group in shown:
-        text = f"{group.finding.name}  {group.finding.headline}"
-        wheres = [group.where]
-        if not full:
-            named = sum(fit.epoch != "pooled" for fit in group.fits)
-            wheres += [f"{named} of {plural(len(analysis.fits), 'epoch')}"]
-        words = [f"{text}; {where}" for where in wheres]
-        yield group.finding.level, words[0] if full else two_lines(*words, text)
-    seen = {group.finding.name for group in shown}
-    rest = groups[len(shown) :]
-    quiet = {one.finding.name for one in rest if one.finding.harmless}
-    names = dict.fromkeys(one.finding.name for one in rest if not one.finding.harmless)
-    if listed := [name for name in names if name not in seen]:
-        text = f"{'and ' * bool(shown)}{', '.join(listed)} (--full)"
-        yield "" if shown else "note", two_lines(text, f"{len(listed)} more (--full)")
-    if quiet := quiet - seen - names.keys():
-        yield "" if listed and not shown else "note", f"{notes_text(quiet)} (--full)"
-
-
-def two_lines(*texts: str) -> str:
-    """Return the first text that two lines beside a label hold; else the last."""
-    return next((text for text in texts if len(paragraph(text, NOTE_WIDTH)) <= 2), texts[-1])
-
-
-def full_blocks(found: StudyResult, *, by_epoch: bool = False) -> Iterator[Block]:
+def full_blocks(shown: report.Shown, *, by_epoch: bool = False) -> Iterator[Block]:
     """Yield the tables of the report; with `by_epoch` also those with a row for each epoch."""
-    names = report.source_names(found)
-    for table in report.shown_tables(found):
+    names = report.source_names(shown)
+    for table in report.shown_tables(shown):
         if by_epoch or not (table.folding and any(c.name == "epoch" for c in table.columns)):
             yield from ("", Heading(table.title), shown_table(table, names))
             if table.note:

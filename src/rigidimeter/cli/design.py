@@ -121,7 +121,7 @@ def design(
         )
     show(design_blocks(designed, full=full))
     if out is not None:
-        from rigidimeter.analysis.report.design_folder import write_design_folder
+        from rigidimeter.analysis.figures import write_design_folder
 
         echo(f"\nWritten to {out}: {', '.join(write_design_folder(out, designed))}")
     if declare is not None:
@@ -168,8 +168,8 @@ def _primary(
 
 def _scatter_of(folder: Path) -> dict[str, Scatter]:
     """Estimate every epoch of a study, and return how much inertia, damping and stiffness vary."""
-    from rigidimeter.analysis.study import day_scatter
-    from rigidimeter.cli.inputs import estimate_study_inputs, read_study_inputs
+    from rigidimeter.analysis.study_anew import day_scatter
+    from rigidimeter.cli.study_inputs import estimate_study_inputs, read_study_inputs
     from rigidimeter.core.study_files import STUDY_FILE, is_study
     from rigidimeter.planning import CORRELATION, Scatter
 

@@ -40,7 +40,7 @@ def estimate(
           --column "torque=torque [Nm]" --unit torque=Nm --json estimates.json
     """
     from rigidimeter.analysis.reading import write_estimates_csv, write_estimates_json
-    from rigidimeter.analysis.study.subject_torque_table import check_name, write_subject_torque
+    from rigidimeter.analysis.recording import check_name, write_subject_torque
     from rigidimeter.cli.estimate_text import estimate_blocks
     from rigidimeter.cli.inputs import analyse_recordings
 
@@ -48,15 +48,15 @@ def estimate(
     if subject_torque_out is not None:
         check_name(subject_torque_out)
     read, analysed = analyse_recordings(recordings)
-    result = analysed.result
+    analysis = analysed.analysis
     try:
         if json_out is not None:
-            write_estimates_json(json_out, result.analysis)
+            write_estimates_json(json_out, analysis)
         if csv_out is not None:
-            write_estimates_csv(csv_out, result.analysis)
-        show(estimate_blocks(result, full=full))
+            write_estimates_csv(csv_out, analysis)
+        show(estimate_blocks(read, analysis, full=full))
         if subject_torque_out is not None:
-            write_subject_torque(subject_torque_out, read, result.analysis)
+            write_subject_torque(subject_torque_out, read, analysis)
     finally:
         status = analysed.say()
     raise typer.Exit(status)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from rigidimeter.analysis.estimation import METHODS
-from rigidimeter.analysis.study import Precision, StudyResult, condition_precisions
-from rigidimeter.cli.comparison_text import finding_notes, full_blocks, stiffness_notes, two_lines
+from rigidimeter.analysis.reading import Recording
+from rigidimeter.analysis.recording import OF_SCORES, condition_precisions
+from rigidimeter.analysis.statistics import Precision
+from rigidimeter.cli.notes import finding_notes, stiffness_notes, two_lines
 from rigidimeter.cli.terminal_tables import ROWS, Block, Heading, Table, text_lines
-from rigidimeter.core.records import PARAMETERS, Analysis, Fit, Score, degrees
+from rigidimeter.core.records import PARAMETERS, Analysis, Delay, Fit, Score, degrees
+from rigidimeter.core.settings import Settings
 from rigidimeter.core.words import (
     decimals,
     epoch_name,
@@ -21,6 +24,9 @@ from rigidimeter.core.words import (
     with_error,
 )
 
+Precisions = Mapping[str, Mapping[str, Precision]]
+"""By condition and measure."""
+
 MOST_EPOCHS, FIRST_EPOCHS = 8, 4
 """Of more epochs than the first number the second and the last are shown, of several recordings
 none."""
@@ -31,44 +37,47 @@ SIGNIFICANT, LEAST_S = 3.0, 1e-4
 MORE = "--full: every table · --json FILE: every number · rigidimeter explain NAME"
 
 
-def estimate_blocks(result: StudyResult, *, full: bool = False) -> Iterator[Block]:
+def estimate_blocks(read: Recording, analysis: Analysis, *, full: bool = False) -> Iterator[Block]:
     """Yield the first screen: J, B and K of the epochs and together, scores, what was found.
 
     With `full` every finding, and the tables of the report. Otherwise as many epochs one by one as
     one screen has room for.
     """
-    analysis = result.analysis
+    precisions = condition_precisions(read, analysis)
     found = (
         stiffness_notes(analysis),
         _method(analysis),
         _excluded(analysis),
-        _short_scores(result),
+        _short_scores(read.settings, analysis),
         _delays(analysis, full),
     )
     notes = [note for notes in (*found, finding_notes(analysis, full)) for note in notes]
 
-    def first_screen(fits: Table) -> list[Block]:
-        blocks: list[Block] = [Heading(_about(result))]
-        tables = (fits, _scores(result), Table((), notes, "<<", 1))
+    def first_screen(most: int) -> list[Block]:
+        fits = _fits(analysis, precisions, most)
+        blocks: list[Block] = [Heading(_about(read, analysis))]
+        tables = (fits, _scores(precisions), Table((), notes, "<<", 1))
         for table in tables:
             if table.rows:
                 blocks += ["", table]
         return blocks if full else [*blocks, "", MORE]
 
-    screens = (first_screen(_fits(result, most)) for most in (MOST_EPOCHS, FIRST_EPOCHS + 2, 0))
-    yield from next(
-        (one for one in screens if len(text_lines(one)) <= ROWS), first_screen(_fits(result, 0))
-    )
+    screens = map(first_screen, (MOST_EPOCHS, FIRST_EPOCHS + 2, 0))
+    yield from next((one for one in screens if len(text_lines(one)) <= ROWS), first_screen(0))
     if full:
-        yield from full_blocks(result, by_epoch=True)
+        from rigidimeter.analysis.report import Shown
+        from rigidimeter.cli.comparison_text import full_blocks
+        from rigidimeter.cli.inputs import command_line
+
+        shown = Shown.of_recording(read, analysis, command_line())
+        yield from full_blocks(shown, by_epoch=True)
 
 
-def _about(result: StudyResult) -> str:
+def _about(read: Recording, analysis: Analysis) -> str:
     """Return what was read, and how it was estimated."""
-    analysis = result.analysis
     names = list(short_names({one.source for one in analysis.results}).values())
     parts = [names[0] if len(names) == 1 else plural(len(names), "recording")]
-    if any(epoch.virtual for epoch in result.epochs):
+    if any(epoch.virtual for epoch in read.epochs):
         parts.append("virtual data")
     if analysis.fits:
         used = sum(fit.outcome.included for fit in analysis.fits)
@@ -83,12 +92,12 @@ def _about(result: StudyResult) -> str:
     return " · ".join(parts)
 
 
-def _fits(result: StudyResult, most: int) -> Table:
+def _fits(analysis: Analysis, precisions: Precisions, most: int) -> Table:
     """Return a row for each epoch, ± one standard error, and the rows of all together.
 
     Of more than `most` epochs of one recording the first and the last, of several none.
     """
-    fits = result.analysis.fits
+    fits = analysis.fits
     names = short_names({fit.source for fit in fits})
     scales = [
         scaled(max((abs(fit.value[i]) for fit in fits), default=0.0), parameter.unit)
@@ -106,7 +115,7 @@ def _fits(result: StudyResult, most: int) -> Table:
         outcome = "" if fit.outcome.included else fit.outcome.kind
         return (label, fit.condition, *values, angle, vaf, outcome)
 
-    together = [*_together(result, [factor for factor, _ in scales])]
+    together = [*_together(precisions, [factor for factor, _ in scales])]
     rows: list[Sequence[str] | str] = []
     if len(fits) <= most:
         rows += map(row, fits)
@@ -120,11 +129,10 @@ def _fits(result: StudyResult, most: int) -> Table:
     return Table(headings, rows, "<<>>>>>=", 1)
 
 
-def _together(result: StudyResult, factors: Sequence[float]) -> Iterator[Sequence[str] | str]:
+def _together(precisions: Precisions, factors: Sequence[float]) -> Iterator[Sequence[str] | str]:
     """Yield value, interval and scatter of each condition's epochs together."""
-    for condition, each in condition_precisions(result).items():
-        by_name = {one.measure.name: one for one in each}
-        found: list[Precision] = [by_name[p.name] for p in PARAMETERS if p.name in by_name]
+    for condition, by_name in precisions.items():
+        found = [by_name[p.name] for p in PARAMETERS if p.name in by_name]
         if len(found) < len(PARAMETERS):
             continue
         cells = []
@@ -142,19 +150,19 @@ def _together(result: StudyResult, factors: Sequence[float]) -> Iterator[Sequenc
         yield ("SD", "", *scatters, "", "", "")
 
 
-def _scores(result: StudyResult) -> Table:
+def _scores(precisions: Precisions) -> Table:
     """Return the mean of the scores of each condition, per cycle."""
     rows = []
-    for condition, each in condition_precisions(result).items():
-        found = {one.measure.short: one for one in each if one.measure.origin == "scores"}
-        if found:
-            cells = [
-                f"{number(found[name].value, 3)} (SD {number(found[name].sd_percent, 2)} %)"
-                if not math.isnan(found[name].sd_percent)
-                else number(found[name].value, 3)
-                for name in ("impulse", "work")
-            ]
-            rows.append((condition or "all", str(found["impulse"].n), *cells))
+    for condition, by_name in precisions.items():
+        found = [by_name[name] for name in OF_SCORES if name in by_name]
+        cells = [
+            f"{number(one.value, 3)} (SD {number(one.sd_percent, 2)} %)"
+            if not math.isnan(one.sd_percent)
+            else number(one.value, 3)
+            for one in found
+        ]
+        if cells:
+            rows.append((condition or "all", str(found[0].n), *cells))
     return Table(("sinusoids", "epochs", "impulse, N·m·s", "work, J"), rows, "<>>>", 1)
 
 
@@ -181,9 +189,9 @@ def _excluded(analysis: Analysis) -> Iterator[tuple[str, str]]:
         yield kind, two_lines(f"{where}: {reason}", f"{where}: {reason.partition('. ')[0]}", where)
 
 
-def _short_scores(result: StudyResult) -> Iterator[tuple[str, str]]:
+def _short_scores(settings: Settings, analysis: Analysis) -> Iterator[tuple[str, str]]:
     """Yield that sinusoids were scored over fewer cycles than the settings say."""
-    wanted, scores = result.settings.scores, result.analysis.scores
+    wanted, scores = settings.scores, analysis.scores
     short = [score.n_cycles for score in scores if 0 < score.n_cycles < wanted.cycles]
     if short:
         text = (
@@ -196,12 +204,8 @@ def _short_scores(result: StudyResult) -> Iterator[tuple[str, str]]:
 def _delays(analysis: Analysis, full: bool) -> Iterator[tuple[str, str]]:
     """Yield how late the torque is in each source, where that is known; of several the largest."""
     names = short_names(delay.source for delay in analysis.delays)
-    late = [
-        delay
-        for delay in analysis.delays
-        if math.isfinite(delay.delay_s)
-        and (delay.corrected or abs(delay.delay_s) >= max(LEAST_S, SIGNIFICANT * delay.delay_s_se))
-    ]
+    known = [delay for delay in analysis.delays if math.isfinite(delay.delay_s)]
+    late = [delay for delay in known if delay.corrected or _is_shown(delay)]
     late.sort(key=lambda delay: -abs(delay.delay_s))
     for delay in late if full else late[:1]:
         done = "corrected" if delay.corrected else delay.remark
@@ -212,15 +216,15 @@ def _delays(analysis: Analysis, full: bool) -> Iterator[tuple[str, str]]:
             text += f", the most of {plural(len(late), 'recording')}"
         texts = [f"{text}: {done}", f"{text}: {done.partition(': ')[0]}", text]
         yield "delay", texts[0] if full else two_lines(*texts)
-    unknown = [
-        delay
-        for delay in analysis.delays
-        if not math.isfinite(delay.delay_s)
-        and delay.remark
-        and any(fit.source == delay.source for fit in analysis.fits)
-    ]
+    fitted = {fit.source for fit in analysis.fits}
+    unknown = [one for one in analysis.delays if one.remark and one.source in fitted]
+    unknown = [one for one in unknown if not math.isfinite(one.delay_s)]
     for delay in unknown if full else unknown[:1]:
         text = f"{names[delay.source]}: {delay.remark}"
         if len(unknown) > 1 and not full:
             text = f"{names[delay.source]} and {len(unknown) - 1} more: {delay.remark}"
         yield "delay", text if full else two_lines(text, text.partition(": ")[0] + ": unknown")
+
+
+def _is_shown(delay: Delay) -> bool:
+    return abs(delay.delay_s) >= max(LEAST_S, SIGNIFICANT * delay.delay_s_se)

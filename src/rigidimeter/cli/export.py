@@ -94,7 +94,7 @@ def _of_recordings(
     analysis = None
     if estimates:
         read, analysed = analyse_recordings(recordings)
-        analysis, status = analysed.result.analysis, analysed.say()
+        analysis, status = analysed.analysis, analysed.say()
     else:
         read = recordings.read()
         say(read.notices)
@@ -113,7 +113,7 @@ def _of_study(
     folder: Path, recordings: Recordings, key: Path | None, *, estimates: bool
 ) -> tuple[list[ExportedSession], int]:
     from rigidimeter.analysis.export import sessions_of_study
-    from rigidimeter.cli.inputs import estimate_study_inputs, read_study_inputs
+    from rigidimeter.cli.study_inputs import estimate_study_inputs, read_study_inputs
 
     read = read_study_inputs(folder, recordings, key)
     analysis, notices = estimate_study_inputs(read) if estimates else (None, read.notices)

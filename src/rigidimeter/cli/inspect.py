@@ -114,7 +114,7 @@ def _inspect(
     if write_mapping is not None:
         write_text(write_mapping, mapping_text(found.options))
     if plot is not None:
-        from rigidimeter.analysis.report.inspected_columns import draw_columns
+        from rigidimeter.analysis.figures import draw_columns
 
         draw_columns(found, plot)
 

@@ -42,8 +42,7 @@ def model(
     For example:
       rigidimeter model demo-study/elbow.csv --terms inertia,reflex --compare
     """
-    from rigidimeter.analysis.study.fitted_terms import fit_terms
-    from rigidimeter.analysis.study.torque_models import model_document
+    from rigidimeter.analysis.recording import fit_terms, model_document
     from rigidimeter.cli.model_text import model_blocks
     from rigidimeter.core.files import write_json
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from statistics import median
 
 from rigidimeter.analysis.estimation import Comparison, ModelRow
-from rigidimeter.analysis.study.torque_models import ModelledEpoch
+from rigidimeter.analysis.recording import ModelledEpoch
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
 from rigidimeter.core.findings import SERIOUS_FIRST
 from rigidimeter.core.records import notes_text

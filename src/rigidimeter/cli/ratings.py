@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,7 @@ from rigidimeter.cli.terminal_tables import Block, Heading, Table, show
 from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.analysis.study import RatingsFound
+    from rigidimeter.analysis.study_anew import Ratings
 
 MOST_OFFSETS, MOST_PAIRS = 6, 3
 """On the first screen."""
@@ -56,8 +57,7 @@ def ratings(
       rigidimeter ratings demo-study/ratings.csv --json ratings.json
       rigidimeter ratings demo-study/ratings.csv --scale 0 4 --step 0.5
     """
-    from rigidimeter.analysis.study.ratings_found import ratings_document
-    from rigidimeter.analysis.study.ratings_model import model_ratings
+    from rigidimeter.analysis.study_anew import ratings_document, table_ratings
     from rigidimeter.core.files import read_text_table, write_json
     from rigidimeter.core.records import Notice
     from rigidimeter.core.study_files import is_study, table_path
@@ -69,90 +69,79 @@ def ratings(
             f"rest; for the ratings alone give their table, {path}"
         )
     keep_inputs((json_out,), (table,))
-    columns = {
-        "condition": condition,
-        "score": score,
-        "examiner": examiner,
-        "subject": subject,
-        "day": day,
-    }
-    found = model_ratings(
-        read_text_table(table),
-        columns,
-        random,
-        scale=scale,
-        step=step,
-        pair=contrast,
+    names = ("condition", "score", "examiner", "subject", "day")
+    columns = dict(zip(names, (condition, score, examiner, subject, day), strict=True))
+    found, pair = table_ratings(
+        read_text_table(table), columns, random, scale=scale, step=step, contrast=contrast
     )
     say(tuple(Notice("warning", text) for text in found.notices))
     if json_out is not None:
-        write_json(json_out, ratings_document(found))
-    show(_blocks(found, full))
+        write_json(json_out, ratings_document(found, pair))
+    show(_blocks(found, pair, full))
 
 
-def _blocks(found: RatingsFound, full: bool) -> Iterator[Block]:
+def _blocks(found: Ratings, pair: tuple[str, str], full: bool) -> Iterator[Block]:
     """Yield the table and its sentences; with `full` every offset and every pair."""
-    fit = found.fit
+    from rigidimeter.analysis.study_anew import rating_offsets, ratings_document
+
+    document, fit = ratings_document(found, pair), found.fit
+    by_day = any("day" in name for name in fit.variances)
     offsets = " + ".join(f"offset of {name}" for name in fit.variances)
     yield Heading(f"{found.source}: {fit.n} ratings in {len(fit.conditions)} conditions")
     yield f"score = mean of condition + {offsets} + error, fitted by REML"
+    counts, means, errors = (document[name] for name in ("counts", "means", "means_se"))
     rows = [
-        (name, f"{found.counts[name]}", f"{mean:.4f}", f"{math.sqrt(variance):.4f}")
-        for name, mean, variance in zip(
-            fit.conditions, fit.means, fit.covariance.diagonal(), strict=True
-        )
+        (name, f"{counts[name]}", f"{means[name]:.4f}", f"{errors[name]:.4f}") for name in means
     ]
     yield from ("", Table(("condition", "n", "mean", "SE"), rows, "<>>>"))
-    for group, offsets_of in fit.offsets.items():
-        counts = found.counts_of(group)
-        groups = [(name, f"{counts[name]}", f"{value:.4f}") for name, value in offsets_of.items()]
+    for group, each in groupby(rating_offsets(found), lambda row: row["grouping"]):
+        groups = [(row["name"], f"{row['ratings']}", f"{row['offset']:.4f}") for row in each]
         if full or len(groups) <= MOST_OFFSETS:
             yield from ("", Table((group, "n", "offset"), groups, "<>>"))
         else:
             yield from ("", f"{len(groups)} offsets of {group}: --full")
-        variance = fit.variances[group]
-        yield f"Variance of {group}: {variance:.4g} (SD {math.sqrt(variance):.4g})."
-    residual = fit.variance_residual
-    yield f"Variance of the residual: {residual:.4g} (SD {math.sqrt(residual):.4g})."
+        yield _variance(group, fit.variances[group])
+    yield _variance("the residual", fit.variance_residual)
     yield ""
-    yield from _contrast(found)
+    yield from _contrast(found, pair, by_day=by_day)
     if len(fit.conditions) > 2:
-        yield from ("", f"{len(found.pairs)} pairs (p unadjusted; Holm's are in the JSON file):")
-        for pair in found.pairs if full else found.pairs[:MOST_PAIRS]:
-            c = pair.contrast
-            other = (
-                f"{c.p_kenward_roger:.3g} (Kenward and Roger)"
-                if found.by_day
-                else f"{c.p_residual:.3g} (residual)"
-            )
+        contrasts = document["contrasts"]
+        yield from ("", f"{len(contrasts)} pairs (p unadjusted; Holm's are in the JSON file):")
+        key, name = ("kenward_roger", "Kenward and Roger") if by_day else ("residual", "residual")
+        for c in contrasts if full else contrasts[:MOST_PAIRS]:
             yield (
-                f"  {pair.first} minus {pair.second}: {c.estimate:.4g}, SE {c.se:.4g}, "
-                f"p {other}, {c.p_satterthwaite:.3g} (Satterthwaite)"
+                f"  {c['first']} minus {c['second']}: {c['estimate']:.4g}, SE {c['se']:.4g}, "
+                f"p {c[f'p_{key}']:.3g} ({name}), {c['p_satterthwaite']:.3g} (Satterthwaite)"
             )
-        j = found.joint
+        j = document["joint"]
+        df, f = j["df_numerator"], j["f"]
         yield (
-            f"All means equal: F({j.df_numerator}, {j.df_residual:.4g}) = {j.f:.4g}, "
-            f"p = {j.p_residual:.3g}; Satterthwaite F({j.df_numerator}, {j.df_satterthwaite:.4g}), "
-            f"p = {j.p_satterthwaite:.3g}"
+            f"All means equal: F({df}, {j['df_residual']:.4g}) = {f:.4g}, "
+            f"p = {j['p_residual']:.3g}; Satterthwaite F({df}, {j['df_satterthwaite']:.4g}), "
+            f"p = {j['p_satterthwaite']:.3g}"
         )
     yield from ("", "Corrected score = score minus the offsets of its groups.")
     if found.model_notices:
         yield from ("", "Note:", *(f"  - {text}" for text in found.model_notices))
 
 
-def _contrast(found: RatingsFound) -> Iterator[Block]:
-    first, second = found.other, found.reference
-    c, (low, high) = found.contrast, found.interval
-    way = "higher" if c.estimate > 0 else "lower" if c.estimate < 0 else "neither higher nor lower"
-    se = c.se_kenward_roger if found.by_day else c.se
-    yield f"{first} minus {second}: {c.estimate:.4g} [{low:.4g} to {high:.4g}, 95 %], SE {se:.4g}"
-    choices = (
-        (c.f, c.df_residual, c.p_residual, "residual degrees of freedom, n − p"),
-        (c.f, c.df_satterthwaite, c.p_satterthwaite, "Satterthwaite"),
-        (c.f_kenward_roger, c.df_kenward_roger, c.p_kenward_roger, "Kenward and Roger"),
-    )
-    for f, df, p, name in choices[::-1] if found.by_day else choices:
-        yield f"  F(1, {df:.4g}) = {f:.4g}, p = {p:.3g}   {name}"
-    if found.by_day:
+def _variance(name: str, variance: float) -> str:
+    return f"Variance of {name}: {variance:.4g} (SD {math.sqrt(variance):.4g})."
+
+
+def _contrast(found: Ratings, pair: tuple[str, str], *, by_day: bool) -> Iterator[Block]:
+    from rigidimeter.analysis.study_anew import rating_contrast
+
+    second, first = pair
+    names = ("residual degrees of freedom, n − p", "Satterthwaite", "Kenward and Roger")
+    choices = [*zip(rating_contrast(found, pair), names, strict=False)]
+    choices = choices[::-1] if by_day else choices
+    c, _ = choices[0]
+    low, high, size = c["low"], c["high"], c["estimate"]
+    way = "higher" if size > 0 else "lower" if size < 0 else "neither higher nor lower"
+    yield f"{first} minus {second}: {size:.4g} [{low:.4g} to {high:.4g}, 95 %], SE {c['se']:.4g}"
+    for row, name in choices:
+        yield f"  F(1, {row['df']:.4g}) = {row['f']:.4g}, p = {row['p']:.3g}   {name}"
+    if by_day:
         yield "The interval is Kenward and Roger's: with few days n − p is too many."
     yield f"{first} was rated {way} than {second}; a positive difference means {first} is higher."

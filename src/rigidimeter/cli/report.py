@@ -18,7 +18,7 @@ from rigidimeter.cli.terminal_tables import Heading, show
 from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.analysis.study import StudyResult
+    from rigidimeter.analysis.report import Shown
 
 
 @reads_recordings
@@ -47,9 +47,10 @@ def report(
       rigidimeter report demo-study/sessions/day-1-OFF --out day-1
       rigidimeter report demo-study/elbow.csv --column epoch=trial --out elbow
     """
-    from rigidimeter.analysis.report import inputs_seen_from, why_not_own
-    from rigidimeter.analysis.study import lead
-    from rigidimeter.cli.inputs import analyse_recordings, analyse_study_folder, study_of
+    from rigidimeter.analysis.report import Shown, inputs_seen_from, why_not_own
+    from rigidimeter.analysis.study_anew import lead
+    from rigidimeter.cli.inputs import analyse_recordings, command_line, study_of
+    from rigidimeter.cli.study_inputs import analyse_study_folder
     from rigidimeter.core.session import is_session
 
     if any(is_session(folder) for folder in (out, *out.resolve().parents)):
@@ -68,14 +69,15 @@ def report(
                 f"--out {out}: is the study or its stored analysis; name another folder, such as "
                 f"{folder / 'report'}"
             )
-        analysed = analyse_study_folder(folder, recordings, key, group=group)
+        shown, analysed = analyse_study_folder(folder, recordings, key, group=group)
     elif group is not None:
         raise UserError(f"--group {group}: recordings name no group; give a study folder")
     else:
-        _, analysed = analyse_recordings(recordings)
+        read, analysed = analyse_recordings(recordings)
+        shown = Shown.of_recording(read, analysed.analysis, command_line())
     try:
-        page = write_page(analysed.result, out, recordings.paths, title, overwrite=overwrite)
-        show([Heading(lead(analysed.result)), ""])
+        page = write_page(shown, out, recordings.paths, title, overwrite=overwrite)
+        show([Heading(lead(shown.study, shown.result.comparisons)), ""])
         echo(str(page))
     finally:
         status = analysed.say()
@@ -91,20 +93,20 @@ def can_be_made(out: Path) -> None:
 
 
 def write_page(
-    result: StudyResult,
+    shown: Shown,
     out: Path,
     inputs: Sequence[Path],
     title: str | None = None,
     *,
     overwrite: bool = False,
 ) -> Path:
-    """Write the report of a result with progress; return the path of its page."""
+    """Write the report of what is shown with progress; return the path of its page."""
     from rigidimeter.analysis import report as reporting
     from rigidimeter.analysis.reading import write_estimates_json
 
     with Meter("report", 1.0) as meter:
         page = reporting.report(
-            result, out, title, inputs=inputs, overwrite=overwrite, progress=meter.reach
+            shown, out, title, inputs=inputs, overwrite=overwrite, progress=meter.reach
         )
-    write_estimates_json(out / "estimates.json", result.analysis)
+    write_estimates_json(out / "estimates.json", shown.analysis)
     return page

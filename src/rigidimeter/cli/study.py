@@ -200,7 +200,7 @@ def demo(
       rigidimeter demo --out small --days 3 --prbs-epochs 3
     """
     from rigidimeter.cli.comparison_text import comparison_blocks
-    from rigidimeter.cli.inputs import analyse_study_folder
+    from rigidimeter.cli.study_inputs import analyse_study_folder
     from rigidimeter.virtual import SHORT_EPOCH_S, short_design
 
     start_s = time.monotonic()
@@ -211,17 +211,17 @@ def demo(
     )
     _simulated(out, short_design(days, prbs_epochs, sinusoid_epochs), seed)
     _write_plain_table(out / "sessions" / "day-1-OFF", out / "elbow.csv")
-    found = analyse_study_folder(out, plain_recordings(out))
+    shown, analysed = analyse_study_folder(out, plain_recordings(out))
     try:
-        page = write_page(found.result, out / "report", [out])
-        show(["", *comparison_blocks(found.result), ""])
+        page = write_page(shown, out / "report", [out])
+        show(["", *comparison_blocks(shown), ""])
         echo(f"Done in {time.monotonic() - start_s:.0f} s. Open {page.resolve()}")
         echo(
             f"Next: rigidimeter compare {out} --full; rigidimeter inspect {out / 'elbow.csv'}; "
             f"rigidimeter estimate {out / 'sessions' / 'day-1-OFF'}"
         )
     finally:
-        status = found.say()
+        status = analysed.say()
     raise typer.Exit(status)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from functools import partial
 
-from rigidimeter.analysis.report.contents import Figure
+from rigidimeter.analysis.report import Figure
 from rigidimeter.core.words import number
 from rigidimeter.paper import printed
 from rigidimeter.paper.comparison_table import Claim, near, rounded, within_percent

@@ -16,7 +16,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
-from rigidimeter.analysis.report.contents import Figure
+from rigidimeter.analysis.report import Figure
 from rigidimeter.core.words import number
 
 RowVerdict: TypeAlias = Literal["agrees", "differs", "cannot be computed from what was published"]

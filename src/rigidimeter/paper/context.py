@@ -12,9 +12,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rigidimeter.analysis.study import StudyResult, compare_measures, estimate, read_study
-from rigidimeter.analysis.study.comparison import day_tests, gathered
-from rigidimeter.analysis.study.ratings_model import rated
+from rigidimeter.analysis.study_anew import StudyResult, analyse, conclude_study, load_study
+from rigidimeter.analysis.traces import Prepared, prepared_epochs
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import read_json, write_json
 from rigidimeter.core.settings import Settings
@@ -94,21 +93,30 @@ class Context:
                 counted[task][plan.condition] = counted[task].get(plan.condition, 0) + count
         return counted
 
-    @cached_property
+    @property
     def study(self) -> StudyResult:
-        """The virtual study: estimates, rank-sum tests, tests by days, and ratings.
+        """The virtual study, compared and concluded: rank-sum tests, tests by days, and ratings.
 
         Raises
         ------
         UserError
             If the folder holds another seed, design or version, or an unfinished study.
         """
-        if self._folder is not None:
-            return self._study_in(self._folder)
-        with tempfile.TemporaryDirectory() as place:
-            return self._study_in(Path(place) / "virtual-study")
+        return self._read[0]
 
-    def _study_in(self, folder: Path) -> StudyResult:
+    @property
+    def prepared(self) -> Prepared:
+        """The epochs of the virtual study as they were analysed."""
+        return self._read[1]
+
+    @cached_property
+    def _read(self) -> tuple[StudyResult, Prepared]:
+        if self._folder is not None:
+            return self._read_from(self._folder)
+        with tempfile.TemporaryDirectory() as place:
+            return self._read_from(Path(place) / "virtual-study")
+
+    def _read_from(self, folder: Path) -> tuple[StudyResult, Prepared]:
         wanted = {"design": self.design.name, "seed": self.seed, "rigidimeter": __version__}
         made = folder / MADE
         if made.is_file():
@@ -128,25 +136,10 @@ class Context:
                 progress=lambda time_s: self._progress(time_s / length_s),
             )
             write_json(made, wanted)
-        read = read_study(folder)
-        analysis = estimate(read.epochs, settings=read.settings)
-        sessions = read.gathered.entries
-        pair = read.names.pair
-        comparisons, _ = compare_measures(gathered(analysis, pair, sessions), resamples=0)
-        ratings, _ = rated(read.folder, read.names)
-        return StudyResult(
-            title=read.folder.about.title,
-            reference=pair[0],
-            other=pair[1],
-            comparisons=day_tests(comparisons),
-            resamples=0,
-            analysis=analysis,
-            epochs=read.epochs,
-            settings=read.settings,
-            sessions=tuple(session.entry for session in read.gathered.sessions),
-            virtual=True,
-            ratings=ratings,
-        )
+        loaded = load_study(folder)
+        study = analyse(loaded)
+        prepared = prepared_epochs(loaded.epochs, study.analysis, study.settings)
+        return conclude_study(study, resamples=0), prepared
 
 
 def _named(made: Mapping[str, object]) -> str:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
-from rigidimeter.analysis.report.style import GREY, note, styled
+from rigidimeter.analysis.figures import GREY, note, styled
 from rigidimeter.model import JointDynamics
 
 _BODE = (("#222222", "-"), ("#0072B2", (0, (1, 1.5))), ("#D55E00", "--"), ("#009E73", "-."))

@@ -14,8 +14,14 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from scipy.stats import norm
 
-from rigidimeter.analysis.statistics import compare_published, effect_from_p, joint_test
-from rigidimeter.analysis.study import RatingsFound
+from rigidimeter.analysis.statistics import (
+    Contrast,
+    compare_published,
+    difference,
+    effect_from_p,
+    joint_test,
+)
+from rigidimeter.analysis.study_anew import Ratings
 from rigidimeter.core.words import number, p_value
 from rigidimeter.paper.comparison_table import Bound, Claim, bounded, rounded, within_percent
 from rigidimeter.paper.context import Context
@@ -161,20 +167,25 @@ def larger_effects(names: Sequence[str], other: str, context: Context) -> Claim:
     )
 
 
-def virtual_ratings(context: Context) -> RatingsFound:
+def virtual_ratings(context: Context) -> Ratings:
     """Return the ratings of the virtual study with the model of Sec. 2.2.
 
     A mean for each condition, no intercept, and a random offset for each examiner.
     """
-    ratings = context.study.ratings
+    ratings = context.study.study.ratings
     assert ratings is not None  # every virtual study is rated
     return ratings
+
+
+def contrast_of(ratings: Ratings) -> Contrast:
+    """Return the contrast DBS − OFF of virtual ratings."""
+    return difference(ratings.fit, "DBS", "OFF")
 
 
 def f_test(context: Context) -> Claim:
     """Compare the F-test of all fixed effects with that of the contrast."""
     ratings = virtual_ratings(context)
-    fit, contrast = ratings.fit, ratings.contrast
+    fit, contrast = ratings.fit, contrast_of(ratings)
     both_zero = joint_test(fit, np.eye(len(fit.conditions)))
     means = " and ".join(number(mean, 3) for mean in fit.means.tolist())
     return Claim(

@@ -13,9 +13,8 @@ from functools import partial
 import numpy as np
 
 from rigidimeter.analysis.estimation import scoring_cycles
-from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.curves import draw_perturbation, draw_spectrum
-from rigidimeter.analysis.report.style import drawn
+from rigidimeter.analysis.figures import draw_perturbation, draw_spectrum, drawn
+from rigidimeter.analysis.report import Figure
 from rigidimeter.core.records import Channel
 from rigidimeter.core.settings import BlockSettings
 from rigidimeter.core.words import number

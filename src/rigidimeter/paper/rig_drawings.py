@@ -15,8 +15,8 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.patches import Arc, Circle, FancyBboxPatch, Polygon, Rectangle
 from scipy.constants import g
 
-from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.style import GREY, styled
+from rigidimeter.analysis.figures import GREY, styled
+from rigidimeter.analysis.report import Figure
 from rigidimeter.core.words import number
 from rigidimeter.model import (
     BiquadState,

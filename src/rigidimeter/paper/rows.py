@@ -17,8 +17,8 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from rigidimeter.analysis.report.page import data_uri, shown_text
-from rigidimeter.analysis.report.style import svg_text
+from rigidimeter.analysis.figures import svg_text
+from rigidimeter.analysis.report import data_uri, shown_text
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import json_text, write_text
 from rigidimeter.core.version import __version__

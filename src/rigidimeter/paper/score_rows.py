@@ -22,9 +22,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from rigidimeter.analysis.estimation import Cycles, loop_area_j, score_epoch, scoring_cycles
-from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.curves import draw_loops
-from rigidimeter.analysis.report.style import GREY, drawn
+from rigidimeter.analysis.figures import GREY, draw_loops, drawn
+from rigidimeter.analysis.report import Figure
 from rigidimeter.core.records import Channel, Epoch, Motion, Score
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.units import rad_from_deg

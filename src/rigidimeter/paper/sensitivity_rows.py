@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from rigidimeter.analysis.report.contents import Figure
+from rigidimeter.analysis.report import Figure
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.words import number
 from rigidimeter.paper import printed

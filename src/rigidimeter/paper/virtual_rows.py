@@ -11,24 +11,24 @@ from functools import partial
 import numpy as np
 
 from rigidimeter.analysis.estimation import Signals, epoch_signals, scoring_cycles, zero_phase_band
-from rigidimeter.analysis.report.contents import Figure
-from rigidimeter.analysis.report.curves import draw_loops, loop_limits
-from rigidimeter.analysis.report.points import distribution_size, draw_distribution
-from rigidimeter.analysis.report.style import condition_colours, drawn
-from rigidimeter.analysis.statistics import difference, fit_mixed, summarise
-from rigidimeter.analysis.study import Comparison
-from rigidimeter.analysis.study.examples import (
-    analysed_epoch,
-    representative_scores,
-    representatives,
+from rigidimeter.analysis.figures import (
+    condition_colours,
+    distribution_size,
+    draw_distribution,
+    draw_loops,
+    drawn,
+    loop_limits,
 )
-from rigidimeter.analysis.study.rating_table import groupings
+from rigidimeter.analysis.report import Figure
+from rigidimeter.analysis.statistics import RankSum, difference, summarise
+from rigidimeter.analysis.study_anew import Compared, counting, fit_scores
+from rigidimeter.analysis.traces import analysed_epoch, representative_scores, representatives
 from rigidimeter.core.words import number, p_value
 from rigidimeter.model import Array, ClosedLoopMotion, JointDynamics, closed_loop_motion
 from rigidimeter.paper.comparison_table import Claim
 from rigidimeter.paper.context import Context
 from rigidimeter.paper.paper_figures import torque_traces
-from rigidimeter.paper.printed_effects import virtual_ratings
+from rigidimeter.paper.printed_effects import contrast_of, virtual_ratings
 
 _COLOURS = condition_colours(("OFF", "DBS"))
 _MISSING = "The recordings of the animal were not published; "
@@ -50,11 +50,11 @@ def torque_figure(name: str, context: Context) -> Claim:
     alone causes in the closed loop, and its torque. All go through one band.
     """
     part, shows = _PARTS[name]
-    study = context.study
-    held = representatives(study, study.analysis.fixed_inertia, lambda one: one.stiffness_nm_rad)
-    fit = next(fit for fit in held if fit.condition == "OFF")
+    study = context.study.study
+    held = study.analysis.fixed_inertia
+    (fit,) = representatives(["OFF"], held, lambda one: one.stiffness_nm_rad)
     joint = JointDynamics(fit.inertia_kg_m2, fit.damping_nm_s_rad, fit.stiffness_nm_rad)
-    epoch = analysed_epoch(study, fit)
+    epoch = analysed_epoch(context.prepared, fit)
     assert epoch is not None  # a fit of the study is of one of its epochs
     measured = epoch_signals(epoch, study.settings, "bandlimited")
     perturbation = epoch.channels["perturbation_nm"]
@@ -122,17 +122,19 @@ def _missed_percent(values: Array, wanted: Array) -> str:
 def measure_figure(name: str, measure: str, context: Context) -> Claim:
     """Compare one measure in OFF and DBS."""
     compared = _comparison(context, measure)
-    p, r, by_day = _tests(compared)
+    p, r, by_day = _tests(context, compared)
     medians = " and ".join(
         f"{number(summary.median)} ({condition}, n = {summary.n})"
-        for condition, summary in compared.summaries.items()
+        for condition, summary in context.study.summaries(measure).items()
     )
-    label = compared.measure.label
+    rows = counting(context.study.study.rows, measure)
+    values = {name: rows.loc[rows["condition"] == name, "value"].tolist() for name in compared.pair}
+    label = f"{compared.measure.title} ({compared.measure.unit})"
     return Claim(
         ours=f"virtual study: medians {medians} {compared.measure.unit}; p = {p}, "
         f"r = {r}; when days count, not epochs, p = {by_day}",
         reading="Two-sided rank-sum test with tie and continuity correction; every epoch a point. "
-        + (f"Beside it, by days: {compared.days.test}." if compared.days else ""),
+        f"Beside it, by days: {compared.test}.",
         unpublished=f"{_VIRTUAL_STUDY}stands in for them, with a subject that we chose.",
         figures=(
             Figure(
@@ -144,7 +146,7 @@ def measure_figure(name: str, measure: str, context: Context) -> Claim:
                     distribution_size(2),
                     draw_distribution,
                     label,
-                    compared.values,
+                    values,
                     _COLOURS,
                     f"p = {p} (epochs), {by_day} (days)",
                 ),
@@ -155,27 +157,27 @@ def measure_figure(name: str, measure: str, context: Context) -> Claim:
     )  # fmt: skip
 
 
-def _comparison(context: Context, measure: str) -> Comparison:
+def _comparison(context: Context, measure: str) -> Compared:
     compared = context.study.comparison(measure)
     assert compared is not None  # every virtual study has both tasks
     return compared
 
 
-def _tests(compared: Comparison) -> tuple[str, str, str]:
+def _tests(context: Context, compared: Compared) -> tuple[str, str, str]:
     """Return p and r of the rank-sum test and p by days in words; dashes for too few epochs."""
-    by_day = "–" if compared.days is None else p_value(compared.days.p)
-    if compared.test is None:
-        return "–", "–", by_day
-    return p_value(compared.test.p), f"{compared.test.r:.2f}".replace("-", "−"), by_day
+    ranked = context.study.value_test(compared.measure.name)
+    if ranked is None or not isinstance(ranked.statistic, RankSum):
+        return "–", "–", p_value(compared.p)
+    r = f"{ranked.statistic.r:.2f}".replace("-", "−")
+    return p_value(ranked.statistic.p), r, p_value(compared.p)
 
 
 def figure_5a(context: Context) -> Claim:
     """Compare the ratings, corrected for the examiners."""
     ratings = virtual_ratings(context)
-    fit, contrast = ratings.fit, ratings.contrast
-    conditions = [row.condition for row in ratings.rows]
-    offsets_of = groupings(ratings.rows, ["examiner", "day"])
-    with_days = fit_mixed([row.score for row in ratings.rows], conditions, offsets_of)
+    fit, contrast = ratings.fit, contrast_of(ratings)
+    conditions = list(ratings.rows["condition"])
+    with_days = fit_scores(ratings.rows, ["examiner", "day"])
     p_days = p_value(difference(with_days, "OFF", "DBS").p_kenward_roger)
     corrected = list(zip(conditions, fit.corrected.tolist(), strict=True))
     values = {
@@ -214,9 +216,9 @@ def figure_5a(context: Context) -> Claim:
 
 def figure_7(context: Context) -> Claim:
     """Compare torque against angle in the epoch of median work of each condition."""
-    study = context.study
-    chosen = representative_scores(study)
-    epochs = [epoch for score in chosen if (epoch := analysed_epoch(study, score)) is not None]
+    study = context.study.study
+    chosen = representative_scores(study.analysis, context.study.condition_names)
+    epochs = [e for score in chosen if (e := analysed_epoch(context.prepared, score)) is not None]
     cycles = [scoring_cycles(epoch, study.settings.scores) for epoch in epochs]
     works = " and ".join(f"{number(s.work_j, 3)} J ({s.condition})" for s in chosen)
     return Claim(
@@ -242,7 +244,7 @@ def figure_7(context: Context) -> Claim:
 
 def median_inertia(context: Context) -> Claim:
     """Show the two stages on the virtual study: J at the median of all epochs, then B and K."""
-    analysis = context.study.analysis
+    analysis = context.study.study.analysis
     counted = [fit for fit in analysis.fixed_inertia if fit.outcome.included]
     damping = float(np.median([fit.damping_nm_s_rad for fit in counted]))
     stiffness = float(np.median([fit.stiffness_nm_rad for fit in counted]))
@@ -258,12 +260,12 @@ def median_inertia(context: Context) -> Claim:
 
 def table_2(context: Context) -> Claim:
     """Compare the tests of Table 2 with those of the virtual study."""
-    parts = [f"mUPDRS p = {p_value(virtual_ratings(context).contrast.p_residual)} (contrast)"]
+    parts = [f"mUPDRS p = {p_value(contrast_of(virtual_ratings(context)).p_residual)} (contrast)"]
     for measure in (
         "impulse_nm_s", "work_j", "inertia_kg_m2", "damping_nm_s_rad", "stiffness_nm_rad"
     ):  # fmt: skip
         compared = _comparison(context, measure)
-        p, r, by_day = _tests(compared)
+        p, r, by_day = _tests(context, compared)
         parts.append(f"{compared.measure.title} p = {p}, r = {r} ({by_day})")
     return Claim(
         ours="virtual study, in parentheses p when days count: " + "; ".join(parts),

@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.study import estimate_study, read_study
+from rigidimeter.analysis.study_anew import estimate_study, load_study
 
 INCLUDES = "K includes the slope of the limb's weight "
 STATED = [
@@ -60,9 +60,9 @@ def test_a_weight_about_a_vertical_axis_is_refused(rigidimeter, table, tmp_path)
 
 
 def test_the_virtual_rig_is_vertical_unless_a_study_states_another_axis(fitted_study, tmp_path):
-    assert estimate_study(read_study(fitted_study))[0].axis == "vertical"
+    assert estimate_study(load_study(fitted_study))[0].axis == "vertical"
     study = shutil.copytree(fitted_study, tmp_path / "study")
     with (study / "study.toml").open("a") as file:
         file.write('\n[analysis]\naxis = "horizontal"\n')
-    found, _ = estimate_study(read_study(study))
+    found, _ = estimate_study(load_study(study))
     assert found.weight_in_stiffness.endswith("(not corrected)")

@@ -9,11 +9,12 @@ import pytest
 from tests.known_joint import angle_rad, torque_nm
 
 import rigidimeter as rm
-from rigidimeter.analysis.study import compare_analysis
+from rigidimeter.analysis.reading import Recording
 from rigidimeter.cli.estimate_text import estimate_blocks
 from rigidimeter.cli.terminal_tables import text_lines
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import Analysis, Fit, Outcome, Score
+from rigidimeter.core.settings import Settings
 
 
 def test_help_names_every_command_and_gives_examples(rigidimeter):
@@ -374,7 +375,7 @@ def test_what_was_not_estimated_is_a_dash_and_has_no_error():
     )
     scores = (Score("a.csv", "3", "OFF", Outcome("failed", "no motion")),)
     analysis = Analysis("iv", fits, fits, 0.0045, scores, fits[:1])
-    _, *lines = text_lines(estimate_blocks(compare_analysis(analysis, resamples=0)), 100)
+    _, *lines = text_lines(estimate_blocks(Recording((), (), Settings(), ()), analysis), 100)
     text = "\n".join(lines)
     assert "nan" not in text
     assert not re.search(r"\d ?±", text)

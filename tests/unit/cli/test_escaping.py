@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigidimeter.analysis.report.page import shown_text
-from rigidimeter.analysis.report.style import svg_text
+from rigidimeter.analysis.figures import svg_text
+from rigidimeter.analysis.report import shown_text
 from rigidimeter.cli.output import echo
 from rigidimeter.core.files import as_read, as_written, csv_text, read_text_table, visible
 

@@ -122,15 +122,15 @@ def test_every_output_of_a_study_says_the_same(pushed, rigidimeter, no_figures, 
     for sentence in (said.measured, said.tested, *said.concluded):
         assert terminal.count(sentence) == 1, ran
         assert sentence in page  # and in the sentence to quote, where nothing is shown
-    of_epochs = [(fit.epoch, one) for fit in result.analysis.fits for one in fit.findings]
+    of_epochs = [(fit.epoch, one) for fit in result.study.analysis.fits for one in fit.findings]
     assert [(e["epoch"], f) for e in estimates["epochs"] for f in e["findings"]] == [
         (epoch, plain_values(one.row())) for epoch, one in of_epochs
     ]
     cells = [one for row in rows for one in row["findings"].split(" / ") if one]
     assert sorted(cells) == sorted(f"{f.level}, {f.name}: {f.headline}" for _, f in of_epochs)
-    across = [plain_values(one.row()) for one in result.analysis.across]
+    across = [plain_values(one.row()) for one in result.study.analysis.across]
     assert estimates["across"] == across
-    reasons = result.findings[len(result.analysis.findings) :]
+    reasons = result.findings[len(result.study.analysis.findings) :]
     assert document["reasons"] == [
         plain_values(one.row()) | {"measures": where} for one, _, where in reasons
     ]
@@ -139,7 +139,7 @@ def test_every_output_of_a_study_says_the_same(pushed, rigidimeter, no_figures, 
         == {group.finding.name for group in reasons}
         >= {"flagged_epochs"}
     )
-    cautions = [g.finding for g in result.analysis.findings if g.finding.level != "note"]
+    cautions = [g.finding for g in result.study.analysis.findings if g.finding.level != "note"]
     assert len(cautions) > 1
     for one, _, where in result.findings:
         assert page.count(f"<strong>{one.name}</strong> {one.headline}; {where}</summary>") == 1

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from tests.unit.analysis.report.cohorts import Design, made_study
 
-from rigidimeter.analysis.study import StudyResult, compare_analysis
+from rigidimeter.analysis.reading import Recording
+from rigidimeter.analysis.report import Shown
 from rigidimeter.cli.comparison_text import comparison_blocks
 from rigidimeter.cli.estimate_text import estimate_blocks
 from rigidimeter.cli.terminal_tables import text_lines
+from rigidimeter.core.records import Analysis
 
 ROWS, COLUMNS = 24, 80
 
@@ -22,43 +24,44 @@ def assert_one_screen(lines: list[str]) -> None:
 
 
 @pytest.fixture(scope="module")
-def study() -> StudyResult:
-    return made_study(Design(days=(5, 5), epochs=(5, 5), scores=(3, 3), both_on_a_day=True))
+def study() -> Shown:
+    return made_study(Design(days=(6, 6), epochs=(5, 5), scores=(3, 3), both_on_a_day=True))
 
 
-def of_sources(study: StudyResult, *sources: str) -> StudyResult:
-    """Return what `estimate` shows of these recordings."""
+def of_sources(study: Shown, *sources: str) -> tuple[Recording, Analysis]:
+    """Return these recordings, and what was estimated of them."""
     fits, scores = (
         tuple(one for one in results if one.source in sources)
         for results in (study.analysis.fits, study.analysis.scores)
     )
     analysis = replace(study.analysis, fits=fits, fixed_inertia=fits, scores=scores)
     epochs = tuple(epoch for epoch in study.epochs if epoch.source in sources)
-    return replace(compare_analysis(analysis, resamples=0), epochs=epochs)
+    return Recording(epochs, (), study.study.settings, ()), analysis
 
 
 def test_estimates_of_one_session_of_five_epochs_and_three_sinusoids(study) -> None:
-    result = of_sources(study, study.sessions[6].source)
-    assert (len(result.analysis.fits), len(result.analysis.scores)) == (5, 3)
-    assert_one_screen(text_lines(estimate_blocks(result)))
+    read, analysis = of_sources(study, study.study.sessions[6].source)
+    assert (len(analysis.fits), len(analysis.scores)) == (5, 3)
+    assert_one_screen(text_lines(estimate_blocks(read, analysis)))
 
 
 def test_estimates_of_sixteen_sessions() -> None:
     made = made_study(Design(days=(8, 8), epochs=(5, 5), scores=(3, 3), both_on_a_day=True))
-    result = of_sources(made, *(session.source for session in made.sessions))
-    assert len({fit.source for fit in result.analysis.fits}) == 16
-    assert_one_screen(text_lines(estimate_blocks(result)))
+    read, analysis = of_sources(made, *(session.source for session in made.study.sessions))
+    assert len({fit.source for fit in analysis.fits}) == 16
+    assert_one_screen(text_lines(estimate_blocks(read, analysis)))
 
 
 def test_a_study_with_ratings(study) -> None:
-    assert study.ratings is not None
+    assert study.study.ratings is not None
     assert_one_screen(text_lines(comparison_blocks(study)))
 
 
 def test_one_recording_of_each_condition(study) -> None:
-    result = of_sources(study, *(session.source for session in study.sessions[4:6]))
-    assert {fit.condition for fit in result.analysis.fits} == {"OFF", "DBS"}
-    assert_one_screen(text_lines(comparison_blocks(result)))
+    read, analysis = of_sources(study, *(session.source for session in study.study.sessions[4:6]))
+    assert {fit.condition for fit in analysis.fits} == {"OFF", "DBS"}
+    shown = Shown.of_recording(read, analysis)
+    assert_one_screen(text_lines(comparison_blocks(shown)))
 
 
 def test_commands_on_files(rigidimeter, tmp_path: Path, monkeypatch) -> None:

@@ -73,5 +73,5 @@ def test_an_example_is_as_it_was_drawn_and_can_be_carried_out(
         f"{block.subject}-day-{day}-{block.order}" for block in first
     ]
     found = rm.compare(study, resamples=0)
-    assert not found.deviations
-    assert {fit.condition for fit in found.analysis.fits} == set(spec.conditions)
+    assert not found.study.deviations
+    assert {fit.condition for fit in found.study.analysis.fits} == set(spec.conditions)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from tests.unit.virtual.tiny import SHORT, tiny
 
-from rigidimeter.analysis.study import compare_analysis, estimate
+import rigidimeter as rm
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.session import read_session, session_settings
 from rigidimeter.virtual import PAPER, PUSHING, plan_study, study_length_s, write_virtual_study
@@ -118,12 +118,10 @@ def test_the_tables_name_every_session(folder: Path) -> None:
 def test_its_sessions_are_estimated_and_compared(folder: Path) -> None:
     paths = [folder / row["path"] for row in rows_of(folder / "sessions.csv")]
     epochs = [epoch for path in paths for epoch in read_session(path)[0]]
-    found = {
-        c.measure.name: c
-        for c in compare_analysis(estimate(epochs, settings=session_settings(paths[0]))).comparisons
-    }
-    assert all(len(values) == 2 for c in found.values() for values in c.values.values())
-    assert found["inertia_kg_m2"].summaries["OFF"].median == pytest.approx(0.0045, rel=0.15)
+    found = rm.compare(rm.estimate(epochs, settings=session_settings(paths[0])), resamples=0)
+    assert all(one.n == (2, 2) for one in found.comparisons)
+    inertia = found.summaries("inertia_kg_m2")
+    assert inertia["OFF"].median == pytest.approx(0.0045, rel=0.15)
 
 
 def test_nothing_is_written_over(folder: Path) -> None:
@@ -157,13 +155,8 @@ def test_pushing_moves_the_published_estimate_and_not_the_instrumental_one(
     epochs = [e for plan in plans for e in read_session(tmp_path / "study" / plan.folder)[0]]
     shift_percent = {}
     for method in ("published", "iv"):
-        found = {
-            c.measure.name: c
-            for c in compare_analysis(
-                estimate(epochs, method, settings=plans[0].settings)
-            ).comparisons
-        }
-        damping = found["damping_nm_s_rad"].summaries
+        estimates = rm.estimate(epochs, method, settings=plans[0].settings)
+        damping = rm.compare(estimates, resamples=0).summaries("damping_nm_s_rad")
         shift_percent[method] = 100 * (damping["DBS"].median / damping["OFF"].median - 1)
     assert shift_percent["published"] < -30.0
     assert abs(shift_percent["iv"]) < 15.0  # six epochs with 0.2 N·m: an SE of about 6 %

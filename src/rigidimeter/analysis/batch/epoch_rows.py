@@ -17,9 +17,8 @@ from rigidimeter.analysis.batch.archive_inputs import Input, content_digest, dig
 from rigidimeter.analysis.batch.parts import Row
 from rigidimeter.analysis.reading.formats import ReadOptions
 from rigidimeter.analysis.reading.recording import read_as
-from rigidimeter.analysis.study import estimate
-from rigidimeter.analysis.study.exclusions import operators_exclusions
-from rigidimeter.analysis.study.sessions import gather, source_of
+from rigidimeter.analysis.recording import estimate
+from rigidimeter.analysis.study_anew import load_recordings, source_of, without_excluded
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.extensions import load_file
 from rigidimeter.core.files import plain_values
@@ -121,11 +120,11 @@ def _read(one: Input, how: How) -> tuple[Iterable[Epoch], list[Notice], Settings
         read = read_as({one.path: how.options.condition}, how.options, how.settings)
         return read.epochs, [*read.notices], read.settings, how.method
     folder = one.study.folder
-    gathered = gather(folder, one.study.names)
-    epochs, _, excluded = operators_exclusions(folder, gathered)
+    recordings = load_recordings(folder, one.study.names)
+    epochs, _, excluded = without_excluded(folder, recordings)
     method = how.method if how.method != "auto" else folder.about.analysis.method
-    settings = how.settings or gathered.settings or Settings()
-    return epochs, [*gathered.notices, *excluded], settings, method
+    settings = how.settings or recordings.settings or Settings()
+    return epochs, [*recordings.notices, *excluded], settings, method
 
 
 def _rows(

@@ -18,9 +18,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.analysis.reading import Recording, estimates_document
 from rigidimeter.analysis.reading.formats.clocked_table import Stream
-from rigidimeter.analysis.study.results import Condition
-from rigidimeter.analysis.study.sessions import Session
-from rigidimeter.analysis.study.study_analysis import StudyRead
+from rigidimeter.analysis.study_anew import Condition, Loaded, Session
 from rigidimeter.core.files import plain_values
 from rigidimeter.core.records import CHANNEL_UNITS, EMG_CHANNELS, Analysis, Delay, Epoch, Fit, Score
 from rigidimeter.core.session import (
@@ -141,13 +139,13 @@ def sessions_of_recording(
     return found
 
 
-def sessions_of_study(read: StudyRead, analysis: Analysis | None) -> list[ExportedSession]:
+def sessions_of_study(loaded: Loaded, analysis: Analysis | None) -> list[ExportedSession]:
     """Return what is given away of each session of a study."""
-    epochs = _by_source(read.epochs)
-    about, names = read.folder.about, read.names
+    epochs = _by_source(loaded.epochs)
+    about, names = loaded.folder.about, loaded.names
     found = []
     rows: dict[str, list[Session]] = {}
-    for session in read.gathered.sessions:
+    for session in loaded.recordings.sessions:
         rows.setdefault(session.entry.source, []).append(session)
     for session, *more in rows.values():
         entry = session.entry
@@ -155,13 +153,13 @@ def sessions_of_study(read: StudyRead, analysis: Analysis | None) -> list[Export
         ratings = [
             {"examiner": row["examiner"], "score": row.number("score")}
             | ({"condition": names.named(row["condition"])} if more else {})
-            for row in read.folder.ratings
+            for row in loaded.folder.ratings
             if (row["subject"], row["day"]) == (entry.subject, entry.day)
             and names.named(row["condition"]) in conditions
         ]
         exclusions = [
             {"epoch": label, "by": row["by"], "reason": row["reason"]}
-            for (source, label), row in read.operator.items()
+            for (source, label), row in loaded.operator.items()
             if source == entry.source
         ]
         facts = {
@@ -185,8 +183,8 @@ def sessions_of_study(read: StudyRead, analysis: Analysis | None) -> list[Export
             facts=facts,
             blinded=names.blinded,
         )
-        path = read.folder.folder / entry.path
-        settings = session.settings or read.settings
+        path = loaded.folder.folder / entry.path
+        settings = session.settings or loaded.settings
         own = epochs.get(entry.source, [])
         found.append(_exported(path, entry.source, own, settings, analysis, described))
     return found

@@ -8,22 +8,36 @@ from typing import TYPE_CHECKING
 from rigidimeter.core.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from rigidimeter.analysis.report.contents import Figure, Section, paragraph
+    from rigidimeter.analysis.report.contents import Block, Figure, Section, paragraph
     from rigidimeter.analysis.report.make_report import report
-    from rigidimeter.analysis.report.page import shown_tables, source_names
-    from rigidimeter.analysis.report.plots import plot
+    from rigidimeter.analysis.report.methods import methods_prose
+    from rigidimeter.analysis.report.page import (
+        data_uri,
+        page_text,
+        sections_of,
+        shown_tables,
+        shown_text,
+        source_names,
+    )
     from rigidimeter.analysis.report.report_folder import inputs_seen_from, why_not_own
     from rigidimeter.analysis.report.sections import SECTIONS
+    from rigidimeter.analysis.report.shown import Shown
 
 __all__ = [
     "SECTIONS",
+    "Block",
     "Figure",
     "Section",
+    "Shown",
+    "data_uri",
     "inputs_seen_from",
+    "methods_prose",
+    "page_text",
     "paragraph",
-    "plot",
     "report",
+    "sections_of",
     "shown_tables",
+    "shown_text",
     "source_names",
     "why_not_own",
 ]
@@ -31,11 +45,19 @@ __all__ = [
 __getattr__ = lazy_names(
     __name__,
     {
-        "contents": ("Figure", "Section", "paragraph"),
+        "contents": ("Block", "Figure", "Section", "paragraph"),
         "make_report": ("report",),
-        "page": ("shown_tables", "source_names"),
-        "plots": ("plot",),
+        "methods": ("methods_prose",),
+        "page": (
+            "data_uri",
+            "page_text",
+            "sections_of",
+            "shown_tables",
+            "shown_text",
+            "source_names",
+        ),
         "report_folder": ("inputs_seen_from", "why_not_own"),
         "sections": ("SECTIONS",),
+        "shown": ("Shown",),
     },
 )

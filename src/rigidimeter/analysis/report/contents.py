@@ -9,7 +9,8 @@ from typing import Any, Literal
 from markupsafe import Markup
 from matplotlib.figure import Figure as Drawing
 
-from rigidimeter.analysis.study import StudyResult, result_table
+from rigidimeter.analysis.report.shown import Shown
+from rigidimeter.analysis.study_anew import deviation_sentence, result_table
 from rigidimeter.core.records import Epoch, Fit, Score
 from rigidimeter.core.words import Column, Table, epoch_name, short_names
 
@@ -59,9 +60,9 @@ class Section:
     title : str
         Its heading.
     blocks : callable
-        Takes the result; returns text, tables and figures in the order of the page.
+        Takes what is shown; returns text, tables and figures in the order of the page.
     shown_if : callable
-        Takes the result; whether the page has this section.
+        Takes what is shown; whether the page has this section.
     part : str
         The part of the page, an entry of its contents bar; sections of one part follow each other.
         One without a part is a part by itself.
@@ -71,8 +72,8 @@ class Section:
 
     name: str
     title: str
-    blocks: Callable[[StudyResult], Iterable[Block]]
-    shown_if: Callable[[StudyResult], bool] = lambda _: True
+    blocks: Callable[[Shown], Iterable[Block]]
+    shown_if: Callable[[Shown], bool] = lambda _: True
     part: str = ""
     printed: bool = False
 
@@ -85,21 +86,24 @@ def part(title: str, *sections: Section, printed: int = 0) -> list[Section]:
     ]
 
 
-def from_study_folder(result: StudyResult) -> bool:
+def from_study_folder(shown: Shown) -> bool:
     """Return whether a result comes from a study folder, which has days, ratings and exclusions."""
-    return bool(result.sessions)
+    return bool(shown.study.sessions)
 
 
-def from_result(
-    result: StudyResult, name: str, title: str, *columns: Column, **options: Any
-) -> Table:
+def from_result(shown: Shown, name: str, title: str, *columns: Column, **options: Any) -> Table:
     """Return a table of the rows of that name in a result; `options` are those of `Table`."""
-    return Table(name, title, columns, result_table(result, name), **options)
+    return Table(name, title, columns, result_table(shown.result, name), **options)
 
 
-def named(result: StudyResult, one: Epoch | Fit | Score) -> str:
+def deviations_in_words(shown: Shown) -> str:
+    """Return one sentence on all deviations from the plan, and what depends on them; or nothing."""
+    return deviation_sentence(shown.study, result_table(shown.result, "without_deviating"))
+
+
+def named(shown: Shown, one: Epoch | Fit | Score) -> str:
     """Return what the page calls an epoch."""
-    names = short_names(epoch.source for epoch in result.epochs)
+    names = short_names(epoch.source for epoch in shown.epochs)
     label = one.label if isinstance(one, Epoch) else one.epoch
     return epoch_name(label, one.source, names)
 

@@ -6,24 +6,23 @@ import json
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from rigidimeter.analysis.study import StudyResult
-from rigidimeter.analysis.study.drawing import epoch_traces
-from rigidimeter.analysis.study.drawn_signals import EpochTrace
+from rigidimeter.analysis.report.shown import Shown
+from rigidimeter.analysis.traces import EpochTrace, epoch_traces
 from rigidimeter.core.records import Fit, Score
 from rigidimeter.core.words import amount, condition_name, epoch_name, number, short_names
 
 Trace = dict[str, Any]
 
 
-def page_traces(result: StudyResult) -> dict[tuple[str, str], Trace]:
+def page_traces(shown: Shown) -> dict[tuple[str, str], Trace]:
     """Return what the page shows of each epoch that was fitted or scored, by source and label."""
-    analysis = result.analysis
-    names = short_names(epoch.source for epoch in result.epochs)
+    analysis = shown.analysis
+    names = short_names(epoch.source for epoch in shown.epochs)
     results: list[Fit | Score] = [*analysis.scores, *analysis.fits]
     by_name = {(one.source, one.epoch): one for one in results}
     return {
         (trace.source, trace.epoch): _trace(trace, by_name[trace.source, trace.epoch], names)
-        for trace in epoch_traces(result)
+        for trace in epoch_traces(analysis, shown.as_analysed, shown.study.settings)
     }
 
 

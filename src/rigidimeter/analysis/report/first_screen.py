@@ -4,34 +4,25 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib import resources
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jinja2
 from markupsafe import Markup
 
-from rigidimeter.analysis.study import (
-    WANTED_PERCENT,
+from rigidimeter.analysis.report.shown import Shown
+from rigidimeter.analysis.statistics import WANTED_PERCENT
+from rigidimeter.analysis.study_anew import (
     DifferenceRow,
-    Precision,
-    Statements,
+    Statement,
     StudyResult,
-    TrafficLight,
-    conclude,
     difference_rows,
-    precisions,
-    precisions_untested,
+    p_name,
+    result_table,
     statements,
 )
-from rigidimeter.analysis.study.drawing import channel_facts
-from rigidimeter.core.words import (
-    number,
-    plural,
-    scaled,
-    series,
-    within,
-)
+from rigidimeter.core.words import condition_name, number, plural, scaled, series, within
 
 _WIDTH, _PAD = 190, 12
 MOST_PERCENT = 100.0
@@ -58,8 +49,9 @@ class PrecisionRow(NamedTuple):
 class Strip(NamedTuple):
     """Two conditions as the first screen shows them: a row and a drawing for each measure."""
 
-    pair: StudyResult
-    said: Statements
+    reference: str
+    other: str
+    said: Statement
     p_name: str
     rows: tuple[tuple[DifferenceRow, Markup], ...]
 
@@ -67,27 +59,25 @@ class Strip(NamedTuple):
 def strips(result: StudyResult) -> list[Strip]:
     """Return the comparisons of the first screen; none where there were not two conditions."""
     found = []
-    for pair in (result, *result.further_pairs):
-        concluded, said = conclude(pair), statements(pair)
-        if concluded is None or said is None:
-            continue
-        percents = [size for one in concluded.each for size in one.difference.percent]
-        to = reach(percents, MOST_PERCENT)
-        rows = tuple((row, _plot(row, to)) for row in difference_rows(concluded))
-        found.append(Strip(pair, said, concluded.p_name, rows))
+    for other, said in statements(result.study, result.comparisons).items():
+        each = [one for one in result.comparisons if one.other == other]
+        to = reach((size for one in each for size in one.percent(one.of_test)), MOST_PERCENT)
+        rows = tuple((row, _plot(row, to)) for row in difference_rows(each))
+        names = condition_name(result.study.reference), condition_name(other)
+        found.append(Strip(*names, said, p_name(each), rows))
     return found
 
 
 def _plot(row: DifferenceRow, to: float) -> Markup:
     """Draw the difference with the interval of its test, in % where that has a meaning."""
-    d = row.conclusion.difference
-    if math.isnan(d.estimate):
+    one = row.compared
+    if math.isnan(one.difference):
         return Markup("")
-    drawn, unit = d.percent, " %"
-    if math.isnan(d.percent[0]):
-        drawn, unit = d.tested, f" {row.unit}".rstrip()
+    drawn, unit = one.percent(one.of_test), " %"
+    if math.isnan(drawn[0]):
+        drawn, unit = one.of_test, f" {row.unit}".rstrip()
         to = reach(drawn)
-    kind = KINDS.get(row.conclusion.verdict, "")
+    kind = KINDS.get(one.verdict, "")
     words = f"{row.measure} {row.difference}, 95 % interval {row.interval or 'unknown'}"
     return interval_plot(drawn, to, unit, kind=kind, words=words)
 
@@ -168,43 +158,45 @@ def reach(sizes: Iterable[float], most: float = math.inf) -> float:
 
 def precision_tables(result: StudyResult) -> dict[str, list[PrecisionRow]]:
     """Return by caption a row for each measure of the only condition, or of two without a test."""
-    where = f" in {result.reference}" if result.reference else ""
-    found = {f"All epochs together{where}": precisions(result)} | {
-        f"All epochs in {name} together; what differs between days is not in these intervals": each
-        for name, each in precisions_untested(result).items()
-    }
-    halves = [one.percent for each in found.values() for one in each]
+    found: dict[str, list[Mapping[str, Any]]] = {}
+    for row in result_table(result, "precision"):
+        found.setdefault(_caption(row["condition"], result.study.other), []).append(row)
+    halves = [row["half_width_percent"] for each in found.values() for row in each]
     to = reach([WANTED_PERCENT, *halves], MOST_PERCENT)
-    return {
-        caption: [_precision_row(one, to) for one in each]
-        for caption, each in found.items()
-        if each
-    }
+    return {caption: [_precision_row(row, to) for row in each] for caption, each in found.items()}
 
 
-def _precision_row(one: Precision, to: float) -> PrecisionRow:
-    factor, unit = scaled(one.value, one.measure.unit)
-    digits = resolving(one.value, (one.high - one.low) / 2)
-    low, high = (number(factor * end, digits) for end in (one.low, one.high))
-    known = not math.isnan(one.percent)
-    percent = f"±\N{NO-BREAK SPACE}{number(one.percent, 2)}{_PERCENT}" if known else ""
+def _caption(condition: str, other: str) -> str:
+    if other:
+        alone = "what differs between days is not in these intervals"
+        return f"All epochs in {condition} together; {alone}"
+    return f"All epochs together in {condition}" if condition else "All epochs together"
+
+
+def _precision_row(row: Mapping[str, Any], to: float) -> PrecisionRow:
+    title, value, half = row["title"], row["value"], row["half_width_percent"]
+    factor, unit = scaled(value, row["unit"])
+    digits = resolving(value, (row["high"] - row["low"]) / 2)
+    low, high = (number(factor * row[end], digits) for end in ("low", "high"))
+    percent = "" if math.isnan(half) else f"±\N{NO-BREAK SPACE}{number(half, 2)}{_PERCENT}"
+    needed = row["epochs_for_5_percent"]
     return PrecisionRow(
-        one.measure.title,
+        title,
         unit,
-        number(factor * one.value, digits),
-        f"{low} to {high}" if known else "not known from one epoch",
+        number(factor * value, digits),
+        f"{low} to {high}" if percent else "not known from one epoch",
         percent,
-        "" if math.isnan(one.sd_percent) else f"{number(one.sd_percent, 2)}{_PERCENT}",
-        one.n,
-        "" if one.epochs_needed is None else str(one.epochs_needed),
+        "" if math.isnan(row["sd_percent"]) else f"{number(row['sd_percent'], 2)}{_PERCENT}",
+        row["epochs"],
+        "" if needed is None else str(needed),
         interval_plot(
-            (0.0, -one.percent, one.percent),
+            (0.0, -half, half),
             to,
             _PERCENT,
             kind="shown",
             middle="estimate",
             band=WANTED_PERCENT,
-            words=f"{one.measure.title} {percent}",
+            words=f"{title} {percent}",
         ),
     )
 
@@ -227,34 +219,35 @@ LIGHTS = {"good": ("✓", "good"), "caution": ("!", "use with caution"), "poor":
 """The sign and the words of each level, so that colour is never alone."""
 
 
-def light_words(light: TrafficLight) -> str:
+def light_words(light: Mapping[str, Any]) -> str:
     """Return how many epochs have no caution, and what of the others."""
-    text = f"{light.sound} of {plural(light.epochs, 'epoch')} without a caution"
+    text = f"{light['sound']} of {plural(light['epochs'], 'epoch')} without a caution"
     others = []
-    if light.doubted:
-        others.append(f"{light.doubted} with a caution")
-    if light.excluded:
-        others.append(f"{light.excluded} excluded")
+    if light["doubted"]:
+        others.append(f"{light['doubted']} with a caution")
+    if light["excluded"]:
+        others.append(f"{light['excluded']} excluded")
     more = f" ({', '.join(others)})" if others else ""
     return f"{text}{more}."
 
 
-def main_finding(light: TrafficLight) -> str:
+def main_finding(light: Mapping[str, Any]) -> str:
     """Return the name of the main finding and where it is; what was found, if it is no check."""
-    if not light.doubt:
-        text = light.text.removesuffix(".")
+    if not light["doubt"]:
+        text = light["text"].removesuffix(".")
         return f"{text[:1].upper()}{text[1:]}." if text else ""
-    name = light.doubt.replace("_", " ")
-    where = f"{light.doubt_epochs} of them" if light.doubt_epochs else "all epochs together"
+    name = light["doubt"].replace("_", " ")
+    epochs = light["doubt_epochs"]
+    where = f"{epochs} of them" if epochs else "all epochs together"
     return f"Main finding: {name}, in {where}."
 
 
-def advice(result: StudyResult, light: TrafficLight | None) -> list[str]:
+def advice(shown: Shown, light: Mapping[str, Any] | None) -> list[str]:
     """Return what would make the estimates of one condition better."""
     found = []
     perturbed = [
         {channel.name for channel in channels}
-        for epoch, channels in zip(result.epochs, channel_facts(result), strict=True)
+        for epoch, channels in zip(shown.epochs, shown.channels, strict=True)
         if epoch.task != "sinusoid"
     ]
     if perturbed and not any("perturbation_nm" in names for names in perturbed):
@@ -262,21 +255,21 @@ def advice(result: StudyResult, light: TrafficLight | None) -> list[str]:
             "Record the perturbation (perturbation_nm): without it torque of the subject is "
             "separated from the joint by its frequencies alone."
         )
-    measured = precisions(result)
-    more = [
-        f"{one.epochs_needed} for {within(one.measure.title)} (now {one.n})"
-        for one in measured
-        if one.epochs_needed is not None and one.epochs_needed > one.n
-    ]
+    more, unknown = [], []
+    for row in result_table(shown.result, "precision"):
+        title, needed = within(row["title"]), row["epochs_for_5_percent"]
+        if needed is None:
+            unknown.append(title)
+        elif needed > row["epochs"]:
+            more.append(f"{needed} for {title} (now {row['epochs']})")
     if more:
         found.append(
             f"Repeat epochs like these, for ±\N{NO-BREAK SPACE}{WANTED_PERCENT:g}{_PERCENT} about "
             f"{series(more)}."
         )
-    unknown = [within(one.measure.title) for one in measured if one.epochs_needed is None]
     if unknown:
         found.append(f"Record several epochs: one gives no interval of {series(unknown)}.")
-    if light is not None and light.remedy:
-        name = light.doubt.replace("_", " ")
-        found.append(f"Because of {name}: {light.remedy}")
+    if light is not None and light["remedy"]:
+        name = light["doubt"].replace("_", " ")
+        found.append(f"Because of {name}: {light['remedy']}")
     return found

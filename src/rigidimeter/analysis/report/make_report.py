@@ -8,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 
 from rigidimeter.analysis.reading import Recording, read
+from rigidimeter.analysis.recording import estimate
 from rigidimeter.analysis.report.page import source_names, write_report
 from rigidimeter.analysis.report.report_folder import (
     INPUTS,
@@ -15,12 +16,14 @@ from rigidimeter.analysis.report.report_folder import (
     joined_names,
     why_not_own,
 )
-from rigidimeter.analysis.study import (
+from rigidimeter.analysis.report.shown import Shown
+from rigidimeter.analysis.study_anew import (
     StudyResult,
-    compare,
-    compare_analysis,
-    estimate,
-    recording_result,
+    analyse,
+    analysis_study,
+    conclude_study,
+    load_study,
+    prepare_study,
 )
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import Analysis
@@ -32,7 +35,7 @@ AnyPath = str | PathLike[str]
 
 
 def report(
-    result: StudyResult | Analysis | Recording | AnyPath | Sequence[AnyPath],
+    result: StudyResult | Shown | Analysis | Recording | AnyPath | Sequence[AnyPath],
     out: AnyPath,
     title: str | None = None,
     *,
@@ -46,7 +49,8 @@ def report(
     ----------
     result : StudyResult, Analysis, Recording, path or sequence of paths
         What `compare`, `estimate` or `read` returned; or a study folder, session folders and files,
-        which are read and analysed. Estimates alone have no figures of the recorded signals.
+        which are read and analysed. The recordings of a compared study folder are read again, for
+        the figures of the recorded signals; estimates alone have none.
     out : path
         The folder; made if it does not exist. An older report of the same inputs is replaced.
     title : str, optional
@@ -67,7 +71,8 @@ def report(
     Raises
     ------
     UserError
-        If something cannot be read, the folder cannot be written, or it holds other files.
+        If something cannot be read, the folder cannot be written, it holds other files, or a
+        study folder has changed since it was compared.
 
     Examples
     --------
@@ -86,11 +91,12 @@ def report(
     paths, names = [Path(one) for one in inputs], ""
     if paths:  # before anything is computed
         _require_own(folder, names := inputs_seen_from(folder, paths), overwrite)
-    shown = _result(result)
+    shown = _shown(result)
     if not paths:
         _require_own(folder, names := joined_names(source_names(shown)), overwrite)
     facts = {**shown.provenance, INPUTS: names}
-    shown = replace(shown, title=title or shown.title or TITLE, provenance=facts)
+    called = title or shown.title or shown.study.title or TITLE
+    shown = replace(shown, title=called, provenance=facts)
     try:
         return write_report(shown, folder, progress)
     except OSError as error:
@@ -104,15 +110,17 @@ def _require_own(out: Path, names: str, overwrite: bool) -> None:
         raise UserError(f"{out}: {why}; name another folder, or write with overwrite=True")
 
 
-def _result(
-    result: StudyResult | Analysis | Recording | AnyPath | Sequence[AnyPath],
-) -> StudyResult:
-    if isinstance(result, StudyResult):
+def _shown(
+    result: StudyResult | Shown | Analysis | Recording | AnyPath | Sequence[AnyPath],
+) -> Shown:
+    if isinstance(result, Shown):
         return result
+    if isinstance(result, StudyResult):
+        return Shown.of_result(result)
     if isinstance(result, Analysis):
-        return compare_analysis(result, resamples=0)
+        return Shown(conclude_study(analysis_study(result), resamples=0))
     if isinstance(result, Recording):
-        return recording_result(result, estimate(result.epochs, settings=result.settings))
+        return Shown.of_recording(result, estimate(result))
     if not isinstance(result, (str, PathLike, Sequence)):
         raise UserError(
             "report takes what compare, estimate or read returned, or paths; not something of type "
@@ -120,5 +128,7 @@ def _result(
         )
     paths = [Path(result)] if isinstance(result, (str, PathLike)) else [Path(one) for one in result]
     if len(paths) == 1 and is_study(paths[0]):
-        return compare(paths[0])
-    return _result(read(paths))
+        loaded = load_study(paths[0])
+        prepared = prepare_study(loaded)
+        return Shown.of_study(conclude_study(analyse(loaded, prepared)), loaded, prepared)
+    return _shown(read(paths))

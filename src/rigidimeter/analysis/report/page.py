@@ -14,14 +14,14 @@ from typing import Any, NamedTuple
 import jinja2
 from markupsafe import Markup
 
+from rigidimeter.analysis.figures import inline_svg, svg_text
 from rigidimeter.analysis.report import first_screen
-from rigidimeter.analysis.report.contents import Block, Figure, Section
+from rigidimeter.analysis.report.contents import Block, Figure, Section, deviations_in_words
 from rigidimeter.analysis.report.epoch_traces import page_traces, traces_json
-from rigidimeter.analysis.report.inline_svg import inline_svg
-from rigidimeter.analysis.report.methods_prose import methods_prose
+from rigidimeter.analysis.report.methods import methods_prose
 from rigidimeter.analysis.report.sections import SECTIONS
-from rigidimeter.analysis.report.style import svg_text
-from rigidimeter.analysis.study import StudyResult, deviation_words, lead, traffic_light
+from rigidimeter.analysis.report.shown import Shown
+from rigidimeter.analysis.study_anew import lead, traffic_light
 from rigidimeter.core.files import DICTIONARY, csv_text, dictionary_text, visible
 from rigidimeter.core.version import __version__
 from rigidimeter.core.words import Column, Table, epoch_name, short_names, shown_below, shown_value
@@ -33,16 +33,16 @@ MOST_OPEN = 5
 """A table that could be folded is open where it is as short as this."""
 
 Contents = Sequence[tuple[Section, Sequence[Block]]]
-"""The sections of a result, each with its text, tables and figures."""
+"""The sections of a page, each with its text, tables and figures."""
 
 
-def contents(result: StudyResult, progress: Callable[[float], None] = lambda _: None) -> Contents:
-    """Return the sections of a result in the order of the page, also those with nothing to show."""
-    shown = [section for section in SECTIONS if section.shown_if(result)]
+def sections_of(shown: Shown, progress: Callable[[float], None] = lambda _: None) -> Contents:
+    """Return the sections in the order of the page, also those with nothing to show."""
+    sections = [section for section in SECTIONS if section.shown_if(shown)]
     made = []
-    for done, section in enumerate(shown, start=1):
-        made.append((section, tuple(section.blocks(result))))
-        progress(done / len(shown))
+    for done, section in enumerate(sections, start=1):
+        made.append((section, tuple(section.blocks(shown))))
+        progress(done / len(sections))
     return made
 
 
@@ -84,7 +84,7 @@ def tables(made: Contents) -> dict[str, Table]:
 
 
 def write_report(
-    result: StudyResult, out: Path, progress: Callable[[float], None] = lambda _: None
+    shown: Shown, out: Path, progress: Callable[[float], None] = lambda _: None
 ) -> Path:
     """Write ``report.html``, ``tables/*.csv`` and ``figures/*`` into a folder.
 
@@ -95,8 +95,7 @@ def write_report(
 
     Parameters
     ----------
-    result : StudyResult
-        What to show.
+    shown : Shown
     out : Path
         The folder; made if it does not exist. Files of the same names are replaced.
     progress : callable
@@ -107,9 +106,9 @@ def write_report(
     Path
         Of the page.
     """
-    made = contents(result, lambda share: progress(share / 2))
+    made = sections_of(shown, lambda share: progress(share / 2))
     figures = [block for _, blocks in made for block in blocks if isinstance(block, Figure)]
-    mark = _mark(result)
+    mark = _mark(shown)
     svg: dict[str, str] = {}
     for figure in figures:
         svg[figure.name] = svg_text(figure.draw(), mark)
@@ -123,10 +122,10 @@ def write_report(
     _write(out / "tables" / DICTIONARY, described)
     for name, text in svg.items():
         _write(out / "figures" / f"{file_stem(name)}.svg", text)
-    if result.sessions:
-        _write(out / "methods.txt", methods_prose(result).text)
+    if shown.study.sessions:
+        _write(out / "methods.txt", methods_prose(shown).text)
     page = out / "report.html"
-    _write(page, render_page(result, made, svg))
+    _write(page, render_page(shown, made, svg))
     progress(1.0)
     return page
 
@@ -150,60 +149,66 @@ def _columns(table: Table) -> list[str]:
     return list(names) or [column.name for column in table.columns]
 
 
-def _mark(result: StudyResult) -> str:
+def _mark(shown: Shown) -> str:
     """Return what is written into every figure where data were simulated."""
-    virtual = sum(epoch.virtual for epoch in result.epochs)
-    if result.virtual or 0 < virtual == len(result.epochs):
+    virtual = sum(epoch.virtual for epoch in shown.epochs)
+    if shown.study.virtual or 0 < virtual == len(shown.epochs):
         return "virtual data"
     return "some of the data are virtual" if virtual else ""
 
 
-def shown_tables(result: StudyResult) -> list[Table]:
+def shown_tables(shown: Shown) -> list[Table]:
     """Return the tables that the page shows, in its order."""
-    blocks = itertools.chain.from_iterable(blocks for _, blocks in contents(result))
+    blocks = itertools.chain.from_iterable(blocks for _, blocks in sections_of(shown))
     return [block for block in blocks if isinstance(block, Table) and _is_shown(block)]
 
 
-def source_names(result: StudyResult) -> dict[str, str]:
+def page_text(shown: Shown) -> str:
+    """Return the page without its figures, whose drawing takes long."""
+    return render_page(shown, sections_of(shown), {})
+
+
+def source_names(shown: Shown) -> dict[str, str]:
     """Return what each source is called in tables, as short as keeps them apart."""
-    analysis = result.analysis
-    sources = [epoch.source for epoch in result.epochs]
+    analysis = shown.analysis
+    sources = [epoch.source for epoch in shown.epochs]
     sources += [fit.source for fit in (*analysis.fits, *analysis.fixed_inertia)]
     return short_names([*sources, *(score.source for score in analysis.scores)])
 
 
-def render_page(result: StudyResult, made: Contents, svg: Mapping[str, str]) -> str:
+def render_page(shown: Shown, made: Contents, svg: Mapping[str, str]) -> str:
     """Return the page as text, with its style inside, and the figures that `svg` has by name."""
-    names = source_names(result)
-    light = traffic_light(result)
-    traces = page_traces(result)
+    study, concluded = shown.study, shown.result.comparisons
+    names = source_names(shown)
+    light = traffic_light(study, concluded)
+    traces = page_traces(shown)
     script = _script() if traces else ""
-    shown = parts(made)
+    own = parts(made)
     return _template().render(
-        result=result,
+        shown=shown,
         show=lambda row, column: shown_value(row, column, names),
         below=lambda row, column: shown_below(row, column, names),
         shown_columns=lambda table: table.shown_columns(several_sources=len(names) > 1),
         # The style is this package's own file and needs no escaping.
         css=Markup("\n".join([_text("page.css"), *([_plot(".min.css")] if traces else [])])),
-        parts=shown,
+        parts=own,
         most_printed=MOST_PRINTED,
         most_open=MOST_OPEN,
         not_printed=[
-            section.title for part in shown for section, _ in part.sections if not section.printed
+            section.title for each in own for section, _ in each.sections if not section.printed
         ],
         images=_images(made, svg, {key: place for place, key in enumerate(traces)}, names),
         traces=Markup(traces_json(traces.values())) if traces else "",
         script=Markup(script),
         script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii"),
-        lead=lead(result),
-        deviations=deviation_words(result),
-        strips=first_screen.strips(result),
-        precision=first_screen.precision_tables(result),
+        lead=lead(study, concluded),
+        deviations=deviations_in_words(shown),
+        strips=first_screen.strips(shown.result),
+        precision=first_screen.precision_tables(shown.result),
         light=light,
         screen=first_screen,
-        advice=() if result.other else first_screen.advice(result, light),
-        virtual=sum(epoch.virtual for epoch in result.epochs),
+        advice=() if study.other else first_screen.advice(shown, light),
+        virtual=sum(epoch.virtual for epoch in shown.epochs),
         version=__version__,
     )
 

@@ -31,6 +31,7 @@ from rigidimeter.analysis.statistics.effects import (
     two_groups,
 )
 from rigidimeter.analysis.statistics.mixed import Mixed, fit_mixed, nested
+from rigidimeter.analysis.statistics.precision import WANTED_PERCENT, Precision, precision_of
 from rigidimeter.analysis.statistics.profiled_likelihood import evaluate, minimise, products
 from rigidimeter.analysis.statistics.published_effects import (
     compare_published,

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from rigidimeter.analysis.statistics import DayDifference, RankSum
-from rigidimeter.analysis.study_anew.measures import LEVEL, Family, Measure, Role
+from rigidimeter.analysis.study_anew.measures import LEVEL, RATING, Family, Measure, Role
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.words import clear_of_zero, decimals, fixed, p_text, within
 
@@ -188,6 +188,13 @@ class Compared:
     def share(self) -> float:
         """The difference as a share of the larger value."""
         return abs(self.difference) / max(abs(self.value_reference), abs(self.value_other))
+
+    @property
+    def simulated_difference(self) -> tuple[float, float]:
+        """The difference that was simulated, and in % of the reference; NaN without a meaning."""
+        first, second = self.simulated or (math.nan, math.nan)
+        known = first > 0 and self.measure != RATING
+        return second - first, 100 / first * (second - first) if known else math.nan
 
     def numbers(self) -> dict[str, Any]:
         """Return the values and the difference as documents and tables have them."""

@@ -15,7 +15,6 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
-import scipy
 
 from rigidimeter.analysis.estimation import METHODS
 from rigidimeter.analysis.statistics import (
@@ -25,7 +24,7 @@ from rigidimeter.analysis.statistics import (
     compare_effects,
     effect_sizes,
     holm,
-    summarise,
+    precision_of,
     two_groups,
 )
 from rigidimeter.analysis.study_anew.compared import Compared
@@ -48,11 +47,6 @@ from rigidimeter.core.words import fixed
 Progress = Callable[[float], None]
 
 _FITTED = tuple(one for one in MEASURES if one.origin == "fits")
-_WIDE = 1.959963984540054
-"""97.5 % quantile of the normal distribution."""
-
-WANTED_PERCENT = 5.0
-"""Half the interval that is asked for, in per cent of the value."""
 
 
 class EffectPair(NamedTuple):
@@ -67,7 +61,7 @@ class EffectPair(NamedTuple):
     p_holm: float
 
 
-def compare(study: Study) -> tuple[Compared, ...]:
+def day_tests(study: Study) -> tuple[Compared, ...]:
     """Return the test of each measure in each pair of conditions, before anything is concluded.
 
     The test is by days where days are known, and of ratings that of their mixed model; else by
@@ -304,14 +298,8 @@ def precisions(rows: pd.DataFrame, condition: str) -> list[dict[str, Any]]:
     """Return how precise each measure of the only condition of some rows is, from its epochs alone.
 
     J, B and K are those fitted to all epochs together; scores are means over epochs, with an
-    interval from their scatter. Interval and scatter are in % of the value. The number of epochs
-    whose interval is ± `WANTED_PERCENT` is
-
-        N ≈ n (1.96 SE / (0.05 |K|))²,   SE the standard error from n epochs
-
-    since SE falls with the root of the number of epochs. 1.96 SE is half the 95 % interval of many
-    epochs; that of few is wider, for their scatter is not well known. A bias, such as that by the
-    subject's own torque, does not fall.
+    interval from their scatter (`precision_of`). Interval and scatter are in % of the value. A
+    bias, such as that by the subject's own torque, is not in it.
     """
     found = []
     for measure in sorted(MEASURES, key=lambda one: one.place):
@@ -319,39 +307,11 @@ def precisions(rows: pd.DataFrame, condition: str) -> list[dict[str, Any]]:
         together = _together(rows, measure, condition)
         if measure.origin == "fits" and not len(together) and len(values) == 1:
             together = values
-        if len(together):
-            numbers = together.iloc[0][["value", "low", "high", "se"]].astype(float)
-            found.append(_precision(measure, values, *numbers))
-        elif len(values):
-            found.append(_precision(measure, values, *_mean(values["value"])))
+        if len(values) or len(together):
+            numbers = together[["value", "low", "high", "se"]].itertuples(index=False, name=None)
+            precision = precision_of(values["value"].to_numpy(), next(numbers, None))
+            found.append(measure.names | precision.row())
     return found
-
-
-def _precision(
-    measure: Measure, values: pd.DataFrame, value: float, low: float, high: float, se: float
-) -> dict[str, Any]:
-    n = max(len(values), 1)
-    size = abs(value) or math.nan
-    epochs = n * (100 * _WIDE * se / size / WANTED_PERCENT) ** 2
-    return {
-        **measure.names,
-        "epochs": n,
-        "value": value,
-        "low": low,
-        "high": high,
-        "se": se,
-        "half_width_percent": 100 * (high - low) / 2 / size,
-        "sd_percent": summarise(values["value"].to_numpy()).sd_percent,
-        "epochs_for_5_percent": math.ceil(epochs - 1e-9) if math.isfinite(epochs) else None,
-    }
-
-
-def _mean(values: pd.Series) -> tuple[float, float, float, float]:
-    """Return the mean with the interval from the scatter, and its standard error."""
-    n, mean = len(values), float(values.mean())
-    se = float(values.std(ddof=1)) / math.sqrt(n) if n > 1 else math.nan
-    half = float(scipy.stats.t.ppf(0.975, n - 1)) * se if n > 1 else math.nan
-    return mean, mean - half, mean + half, se
 
 
 def precisions_of_each(rows: pd.DataFrame, conditions: Iterable[str]) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""What a study concludes as one result, its tables and its document: every number, unrounded.
+"""What a study concludes as tables and as one document: every number, unrounded.
 
 A table of one name has the same rows and columns wherever it is written. Two analyses of the same
 inputs give the same bytes: neither time nor place is written down.
@@ -7,25 +7,18 @@ inputs give the same bytes: neither time nor place is written down.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
-from typing import Any
+from dataclasses import asdict, fields
+from typing import TYPE_CHECKING, Any
 
-import pandas as pd
-
-from rigidimeter.analysis.statistics import DayDifference, Effects, RankSum, Summary, summarise
+from rigidimeter.analysis.statistics import DayDifference, RankSum, Summary, summarise
 from rigidimeter.analysis.study_anew.compared import Compared
 from rigidimeter.analysis.study_anew.comparisons import (
-    EffectPair,
     OfMethod,
-    Progress,
-    compare,
-    compare_values,
-    effects,
     method_caveats,
     precisions_of_each,
-    sensitivity,
     without_deviating,
 )
+from rigidimeter.analysis.study_anew.estimate_cells import estimate_cells, score_cells
 from rigidimeter.analysis.study_anew.measures import MEASURE_NAMES, RATING, Measure
 from rigidimeter.analysis.study_anew.rating_document import (
     rating_contrast,
@@ -37,16 +30,17 @@ from rigidimeter.analysis.study_anew.rating_document import (
 from rigidimeter.analysis.study_anew.rows import counting, measures_of, recorded
 from rigidimeter.analysis.study_anew.sentences import deviation_sentence, lead, statements
 from rigidimeter.analysis.study_anew.study import Ratings, Study
-from rigidimeter.analysis.study_anew.verdicts import conclude, reasons, traffic_light
-from rigidimeter.core.files import plain_values
-from rigidimeter.core.records import Fit, Notice, Score
+from rigidimeter.analysis.study_anew.verdicts import reasons, traffic_light
+from rigidimeter.core.files import csv_text, plain_values
+from rigidimeter.core.records import Fit, Score
 from rigidimeter.core.words import within
+
+if TYPE_CHECKING:
+    from rigidimeter.analysis.study_anew.results import StudyResult
 
 Rows = Sequence[Mapping[str, Any]]
 
 TEST = "Wilcoxon rank-sum, two-sided, asymptotic, tie and continuity corrected"
-TESTS_SHARE = 0.1
-"""Of the work on a study: what its tests take."""
 
 COMPARISON_SCHEMA = "rigidimeter.comparison/3"
 
@@ -56,66 +50,6 @@ _RANKS = tuple(one.name for one in fields(RankSum))
 _SIZES = ("r_low", "r_high", "rank_biserial", "rank_biserial_low", "rank_biserial_high")
 _SUMMARY = ("median", "q1", "q3", "sd_percent")
 _EXCLUDED_BY = ("protocol", "check", "estimate", "operator")
-
-
-@dataclass(frozen=True)
-class Result:
-    """A study, compared and concluded.
-
-    Attributes
-    ----------
-    study : Study
-    concluded : tuple of Compared
-        For each pair of conditions and measure; the first pair is the main one.
-    values : tuple of Compared
-        The rank-sum tests, in which each epoch counts, with p by Holm's method.
-    effects : mapping of str to Effects
-        Effect sizes of the main pair, by the name of the measure.
-    effect_pairs : tuple of EffectPair
-    methods : tuple of OfMethod
-        The main pair by every method.
-    notices : tuple of Notice
-    seed, resamples : int
-        Of the bootstrap.
-    """
-
-    study: Study
-    concluded: tuple[Compared, ...]
-    values: tuple[Compared, ...]
-    effects: Mapping[str, Effects] = field(default_factory=dict)
-    effect_pairs: tuple[EffectPair, ...] = ()
-    methods: tuple[OfMethod, ...] = ()
-    notices: tuple[Notice, ...] = ()
-    seed: int = 1
-    resamples: int = 9999
-
-
-def conclude_study(
-    study: Study,
-    *,
-    seed: int = 1,
-    resamples: int = 9999,
-    progress: Progress = lambda _: None,
-) -> Result:
-    """Compare a study and conclude from it, once.
-
-    Parameters
-    ----------
-    study : Study
-    seed, resamples : int
-        Of the bootstrap; with 0 resamples there are no effect sizes with intervals.
-    progress : callable
-        Called with the share of the work that was done since, 1 in all.
-    """
-    values = compare_values(study)
-    sizes, pairs = effects(study, values, seed=seed, resamples=resamples, progress=progress)
-    methods: tuple[OfMethod, ...] = ()
-    notices = study.notices
-    if study.sessions and study.other:
-        methods, lacking = sensitivity(study.rows, study.pair)
-        notices = (*notices, *lacking)
-    concluded = conclude(study, compare(study), methods)
-    return Result(study, concluded, values, sizes, pairs, methods, notices, seed, resamples)
 
 
 def conclusion_rows(
@@ -158,17 +92,12 @@ def _needed(one: Compared) -> dict[str, Any]:
 def _simulated(one: Compared) -> dict[str, float]:
     if one.simulated is None:
         return {}
-    first, second = one.simulated
-    known = first > 0 and one.measure != RATING
-    return {
-        "simulated_reference": first,
-        "simulated_other": second,
-        "simulated_difference": second - first,
-        "simulated_difference_percent": 100 / first * (second - first) if known else float("nan"),
-    }
+    names = ("reference", "other", "difference", "difference_percent")
+    cells = (*one.simulated, *one.simulated_difference)
+    return {f"simulated_{name}": cell for name, cell in zip(names, cells, strict=True)}
 
 
-def comparison_values(result: Result) -> list[dict[str, Any]]:
+def comparison_values(result: StudyResult) -> list[dict[str, Any]]:
     """Return each measure in each pair of conditions: summaries, rank-sum test, test by days."""
     days = _by_days(result)
     return [
@@ -176,7 +105,11 @@ def comparison_values(result: Result) -> list[dict[str, Any]]:
             **one.measure.names,
             "reference": one.reference,
             "other": one.other,
-            "groups": _groups(result, one),
+            "groups": {
+                name: asdict(own) | {"excluded": excluded}
+                for name, (own, excluded) in summaries_of(result.study, one.measure.name).items()
+                if name in (one.reference, one.other)
+            },
             "test": TEST,
             **_tested(result, one),
             "remark": one.remark,
@@ -186,7 +119,7 @@ def comparison_values(result: Result) -> list[dict[str, Any]]:
     ]
 
 
-def comparison_rows(result: Result) -> list[dict[str, Any]]:
+def comparison_rows(result: StudyResult) -> list[dict[str, Any]]:
     """Return the same as a table, one row for each measure and pair."""
     rows = []
     for values in comparison_values(result):
@@ -204,21 +137,23 @@ def comparison_rows(result: Result) -> list[dict[str, Any]]:
     return rows
 
 
-def _groups(result: Result, one: Compared) -> dict[str, dict[str, Any]]:
-    every = recorded(result.study.rows, one.measure.name)
-    names = one.pair if one.other else (one.reference,)
-    of_each = {name: _summary(every, name) for name in names}
-    return {name: asdict(own) | {"excluded": out} for name, (own, out) in of_each.items()}
+def summaries_of(study: Study, measure: str) -> dict[str, tuple[Summary, int]]:
+    """Return the summary of the values that count, and how many do not, by condition.
+
+    The compared conditions come first.
+    """
+    every = recorded(study.rows, measure)
+    compared = study.pair if study.other else (study.reference,)
+    found = {}
+    for name in dict.fromkeys([*compared, *every["condition"]]):
+        own = every[every["condition"] == name]
+        included = own["outcome"] == "included"
+        summary = summarise(own.loc[included, "value"].to_numpy())
+        found[name] = summary, int((~included).sum())
+    return found
 
 
-def _summary(every: pd.DataFrame, condition: str) -> tuple[Summary, int]:
-    """Return the summary of a condition's values that count, and how many do not."""
-    own = every[every["condition"] == condition]
-    included = own["outcome"] == "included"
-    return summarise(own.loc[included, "value"].to_numpy()), int((~included).sum())
-
-
-def _tested(result: Result, one: Compared) -> dict[str, Any]:
+def _tested(result: StudyResult, one: Compared) -> dict[str, Any]:
     sizes = result.effects.get(one.measure.name) if one.other == result.study.other else None
     return {
         **{name: getattr(one.statistic, name, None) for name in _RANKS},
@@ -228,10 +163,10 @@ def _tested(result: Result, one: Compared) -> dict[str, Any]:
     }
 
 
-def _by_days(result: Result) -> dict[tuple[Measure, str], dict[str, Any]]:
+def _by_days(result: StudyResult) -> dict[tuple[Measure, str], dict[str, Any]]:
     """Return the tests by days, by measure and other condition."""
     found = {}
-    for one in result.concluded:
+    for one in result.comparisons:
         if one.by == "days" and isinstance(one.statistic, DayDifference):
             row = asdict(one.statistic)
             del row["weights"]
@@ -246,26 +181,25 @@ def condition_names(study: Study) -> tuple[str, ...]:
     """Return all conditions in the order of the study or the protocol, then as recorded."""
     order = [each.name for each in study.conditions]
     order = order or [block.condition for block in study.settings.protocol.blocks]
-    recorded_ones = map(str, study.rows["condition"].drop_duplicates())
-    names = dict.fromkeys([*filter(None, study.pair), *recorded_ones])
+    of_epochs = study.rows[study.rows["scope"] != "all"]  # that of all epochs has no condition
+    names = dict.fromkeys([*filter(None, study.pair), *map(str, of_epochs["condition"].unique())])
     return tuple(sorted(names, key=lambda n: order.index(n) if n in order else len(order)))
 
 
-def _summaries(result: Result) -> Iterator[dict[str, Any]]:
-    study = result.study
-    for measure in measures_of(study.rows):
-        every = recorded(study.rows, measure.name)
-        there = {*every["condition"], *study.pair}
-        for name in filter(there.__contains__, condition_names(study)):
-            summary, excluded = _summary(every, name)
+def _summaries(result: StudyResult) -> Iterator[dict[str, Any]]:
+    names = condition_names(result.study)
+    for measure in measures_of(result.study.rows):
+        of_each = summaries_of(result.study, measure.name)
+        for name in filter(of_each.__contains__, names):
+            summary, excluded = of_each[name]
             if summary.n or excluded:
                 counts = {"condition": name, "n": summary.n, "excluded": excluded}
                 yield measure.names | counts | asdict(summary)
 
 
-def _days(result: Result) -> Iterator[dict[str, Any]]:
+def _days(result: StudyResult) -> Iterator[dict[str, Any]]:
     """Yield median and quartiles of every day of every subject and condition, ratings excepted."""
-    if not any(one.by == "days" for one in result.concluded):
+    if not any(one.by == "days" for one in result.comparisons):
         return
     for measure in measures_of(result.study.rows):
         rows = counting(result.study.rows, measure.name)
@@ -278,7 +212,7 @@ def _days(result: Result) -> Iterator[dict[str, Any]]:
             yield {"measure": measure.name} | dict(zip(key, labels, strict=True)) | numbers
 
 
-def _effect_differences(result: Result) -> Iterator[dict[str, Any]]:
+def _effect_differences(result: StudyResult) -> Iterator[dict[str, Any]]:
     titles = {one.measure.name: one.measure.title for one in result.values}
     for pair in result.effect_pairs:
         yield {
@@ -291,15 +225,15 @@ def _effect_differences(result: Result) -> Iterator[dict[str, Any]]:
         }
 
 
-def _precision(result: Result) -> Iterator[dict[str, Any]]:
+def _precision(result: StudyResult) -> Iterator[dict[str, Any]]:
     """Yield the measures of the only condition, or of each of two without a test."""
     study = result.study
-    if study.other and any(one.tested for one in result.concluded if one.other == study.other):
+    if study.other and any(one.tested for one in result.comparisons if one.other == study.other):
         return
-    yield from precisions_of_each(study.rows, study.pair)
+    yield from precisions_of_each(study.rows, dict.fromkeys(study.pair))
 
 
-def _conditions(result: Result) -> Iterator[dict[str, Any]]:
+def _conditions(result: StudyResult) -> Iterator[dict[str, Any]]:
     """Yield each condition; a code without its stimulation, which would give it away."""
     for condition in result.study.conditions:
         mine = [each for each in result.study.sessions if each.condition == condition.name]
@@ -311,7 +245,7 @@ def _conditions(result: Result) -> Iterator[dict[str, Any]]:
         yield about | {"days": days, "sessions": len(mine)}
 
 
-def _account(result: Result) -> Iterator[dict[str, Any]]:
+def _account(result: StudyResult) -> Iterator[dict[str, Any]]:
     """Yield for each task and condition what was recorded, what counts, and who left out the rest.
 
     `unlisted` are epochs that neither count nor are among the exclusions.
@@ -339,13 +273,13 @@ def _account(result: Result) -> Iterator[dict[str, Any]]:
 
 
 def _of_ratings(
-    result: Result, rows: Callable[[Ratings], Iterable[dict[str, Any]]]
+    result: StudyResult, rows: Callable[[Ratings], Iterable[dict[str, Any]]]
 ) -> Iterable[dict[str, Any]]:
     return [] if result.study.ratings is None else rows(result.study.ratings)
 
 
-TABLES: Mapping[str, Callable[[Result], Iterable[Mapping[str, Any]]]] = {
-    "conclusion": lambda result: conclusion_rows(result.concluded, result.methods),
+TABLES: Mapping[str, Callable[[StudyResult], Iterable[Mapping[str, Any]]]] = {
+    "conclusion": lambda result: conclusion_rows(result.comparisons, result.methods),
     "precision": _precision,
     "comparisons": comparison_rows,
     "summaries": _summaries,
@@ -363,24 +297,36 @@ TABLES: Mapping[str, Callable[[Result], Iterable[Mapping[str, Any]]]] = {
     "excluded_epochs": lambda result: [one._asdict() for one in result.study.exclusions],
     "left_out": lambda result: [one._asdict() for one in result.study.left_out],
     "deviations": lambda result: [one._asdict() for one in result.study.deviations],
-    "without_deviating": lambda result: without_deviating(result.study, result.concluded),
+    "without_deviating": lambda result: without_deviating(result.study, result.comparisons),
     "account": _account,
+    "estimates": lambda result: estimate_cells(result.study),
+    "scores": lambda result: score_cells(result.study),
 }
 """The tables of conclusions by name, each made alone."""
 
 
-def result_table(result: Result, name: str) -> Rows:
+def result_table(result: StudyResult, name: str) -> Rows:
     """Return one of the tables of conclusions; the others are not made."""
     return list(TABLES[name](result))
 
 
-def comparison_document(result: Result, place: str = "") -> dict[str, Any]:
+def table_csv(rows: Rows) -> str:
+    """Return a table as CSV; a column is there if any row has it."""
+    return csv_text(columns_of_rows(rows), rows)
+
+
+def columns_of_rows(rows: Rows) -> list[str]:
+    """Return the columns of a table, in their order."""
+    return list(dict.fromkeys(name for row in rows for name in row))
+
+
+def comparison_document(result: StudyResult, place: str = "") -> dict[str, Any]:
     """Return every conclusion as plain values; what does not exist is null.
 
     `place` is the study's folder as sentences name it; it is taken out of them.
     """
     study, analysis = result.study, result.study.analysis
-    light = traffic_light(study, result.concluded)
+    light = traffic_light(study, result.comparisons)
     again = result_table(result, "without_deviating")
     subjects = {session.subject for session in study.sessions}
     of_study = ("title", "source", "by", "reference", "other")
@@ -397,16 +343,16 @@ def comparison_document(result: Result, place: str = "") -> dict[str, Any]:
         "method_reason": analysis.method_reason,
         "inertia_kg_m2": analysis.inertia_kg_m2,
         "inertia_by_subject": len(subjects) > 1,
-        "lead": lead(study, result.concluded),
+        "lead": lead(study, result.comparisons),
         "statements": [
             {"reference": study.reference, "other": other, **one._asdict()}
-            for other, one in statements(study, result.concluded).items()
+            for other, one in statements(study, result.comparisons).items()
         ],
         "primary": study.primary.row(measures_of(study.rows)),
         "conclusion": tables["conclusion"],
         "reasons": [
             reason.row() | {"measures": measures}
-            for reason, _, measures in reasons(result.concluded)
+            for reason, _, measures in reasons(result.comparisons)
         ],
         "quality": light,
         "comparisons": comparison_values(result),

@@ -7,10 +7,11 @@ the analysis of all. Methods of the sensitivity analysis run once each.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -31,7 +32,6 @@ from rigidimeter.analysis.study_anew.session_checks import deviations, exclusion
 from rigidimeter.analysis.study_anew.study import (
     GROUP,
     Naming,
-    SessionEntry,
     Study,
     naming,
     no_such_group,
@@ -70,6 +70,10 @@ class Loaded:
     further : tuple of str
         Conditions with epochs that are compared with the reference beside those of `names.pair`.
     primary : Primary
+    again : partial
+        Reads it again, in the same way: by the folder, and what was asked as keywords.
+    as_read : Settings
+        Those that the folder was read with, whatever `settings` were made of them.
     """
 
     folder: StudyFolder
@@ -82,6 +86,8 @@ class Loaded:
     notices: tuple[Notice, ...]
     further: tuple[str, ...]
     primary: Primary
+    again: partial[Loaded] = field(repr=False, compare=False)
+    as_read: Settings = field(default_factory=Settings, repr=False)
 
 
 def load_study(
@@ -117,6 +123,8 @@ def load_study(
     UserError
         If there is nothing to analyse, or an option names what does not exist.
     """
+    options: dict[str, Any] = {"key": key, "settings": settings, "method": method}
+    again = partial(load_study, folder, **options, pair=pair, group=group)
     read = read_study_folder(folder, key)
     if group is not None:
         read = _of_group(read, group)
@@ -148,6 +156,8 @@ def load_study(
         (*read.notices, *notices, *recordings.notices, *excluded, *primary.notices),
         tuple(name for name in names.known if name in there) if pair[1] is None else (),
         primary,
+        again,
+        settings,
     )
 
 
@@ -190,12 +200,50 @@ def _date(day: str) -> date | None:
         return None
 
 
-def analyse(loaded: Loaded, *, progress: Progress = lambda _: None) -> Study:
+def prepare_study(loaded: Loaded, progress: Progress = lambda _: None) -> dict[str, Recorded]:
+    """Return the epochs of a study as they are estimated, by subject.
+
+    Parameters
+    ----------
+    loaded : Loaded
+    progress : callable
+        Called with the share of the work that was done since, 1 in all.
+    """
+    own: dict[str, list[Epoch]] = {}
+    for epoch in loaded.epochs:
+        own.setdefault(loaded.recordings.entries[epoch.source].subject, []).append(epoch)
+    part = partial(_part, progress, len(own))
+    return {subject: prepare(each, loaded.settings, progress=part) for subject, each in own.items()}
+
+
+def estimate_study(
+    loaded: Loaded, progress: Progress = lambda _: None
+) -> tuple[Analysis, list[Notice]]:
+    """Estimate and score every epoch of a study, by one method, without comparing anything.
+
+    Parameters
+    ----------
+    loaded : Loaded
+    progress : callable
+        Called with the share of the work that was done since, 1 in all.
+    """
+    half = partial(_part, progress, 2)
+    return _estimated(prepare_study(loaded, half), loaded.method, half)
+
+
+def analyse(
+    loaded: Loaded,
+    prepared: Mapping[str, Recorded] | None = None,
+    *,
+    progress: Progress = lambda _: None,
+) -> Study:
     """Estimate every epoch of a study, by each method, and return it as rows.
 
     Parameters
     ----------
     loaded : Loaded
+    prepared : mapping of str to Recorded, optional
+        As `prepare_study`, where that is needed for more than this.
     progress : callable
         Called with the share of the work that was done since, 1 in all.
     """
@@ -204,8 +252,8 @@ def analyse(loaded: Loaded, *, progress: Progress = lambda _: None) -> Study:
     fitted = any(epoch.task == "prbs" for epoch in epochs)
     others = sensitivity_methods() if fitted and all(pair) else ()
     again = len(others) - (loaded.method in ("auto", *others)) if others else 0
-    share = partial(_part, progress, 2 + again)
-    subjects = _by_subject(epochs, sessions, loaded.settings, share)
+    share = partial(_part, progress, 1 + again + (prepared is None))
+    subjects = prepare_study(loaded, share) if prepared is None else prepared
     main, notices = _estimated(subjects, loaded.method, share)
     analyses = {main.method: main}
     for method in others:
@@ -238,20 +286,8 @@ def analyse(loaded: Loaded, *, progress: Progress = lambda _: None) -> Study:
         virtual=all(epoch.virtual for epoch in epochs),
         partly_virtual=any(epoch.virtual for epoch in epochs),
         digests={**loaded.folder.digests, **loaded.recordings.digests},
+        folder_read=loaded.again,
     )
-
-
-def _by_subject(
-    epochs: Sequence[Epoch],
-    sessions: Mapping[str, SessionEntry],
-    settings: Settings,
-    progress: Progress,
-) -> dict[str, Recorded]:
-    own: dict[str, list[Epoch]] = {}
-    for epoch in epochs:
-        own.setdefault(sessions[epoch.source].subject, []).append(epoch)
-    part = partial(_part, progress, len(own))
-    return {subject: prepare(each, settings, progress=part) for subject, each in own.items()}
 
 
 def _part(progress: Progress, parts: int, share: float) -> None:

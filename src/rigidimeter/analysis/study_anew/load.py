@@ -46,12 +46,15 @@ class Recordings:
         SHA-256 of every file of every recording in the table, as it was read, by its path below the
         study.
     notices : tuple of Notice
+    outside : bool
+        Whether anything was read that is not below the study.
     """
 
     sessions: tuple[Session, ...]
     left_out: tuple[LeftOut, ...]
     digests: Mapping[str, str]
     notices: tuple[Notice, ...]
+    outside: bool = False
 
     @property
     def epochs(self) -> tuple[Epoch, ...]:
@@ -76,6 +79,7 @@ class _Seen:
     rows_at: dict[Path, list[TableRow]] = field(default_factory=dict)
     samples: dict[str, TableRow] = field(default_factory=dict)
     digests: dict[str, str] = field(default_factory=dict)
+    outside: bool = False
 
 
 class _Refused(Exception):
@@ -147,6 +151,7 @@ def load(
         tuple(left_out),
         seen.digests,
         tuple(dict.fromkeys(notices)),
+        seen.outside,
     )
 
 
@@ -164,6 +169,7 @@ def _read(
             return f"{row['path']}: cannot be read ({error.strerror or error})"
         finally:
             below = [path for path in noted if path.is_relative_to(read.folder)]
+            seen.outside |= len(below) < len(noted)
             for path in below:
                 seen.digests[path.relative_to(read.folder).as_posix()] = noted[path]
 

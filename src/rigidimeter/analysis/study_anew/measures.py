@@ -57,6 +57,11 @@ class Measure(NamedTuple):
     origin: Origin
 
     @property
+    def label(self) -> str:
+        """Title and unit, for axes and headings."""
+        return f"{self.title} ({self.unit})" if self.unit else self.title
+
+    @property
     def short(self) -> str:
         """A word for tables and lists: ``K``, ``impulse``, ``rating``."""
         if self.origin == "column":

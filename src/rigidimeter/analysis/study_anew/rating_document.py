@@ -202,8 +202,9 @@ def relations(rows: pd.DataFrame) -> tuple[Relation, ...]:
 
 
 def _by_visit(rows: pd.DataFrame) -> pd.Series:
+    """Return means, rounded once: visits with the same scores are equal, which ranks depend on."""
     days = rows[rows["day"] != ""].groupby(_VISIT, sort=False)
-    return days["value"].mean().rename("rating")
+    return days["value"].agg(lambda own: math.fsum(own) / len(own)).rename("rating")
 
 
 class Agreement(NamedTuple):

@@ -114,12 +114,12 @@ def groupings(rows: pd.DataFrame, random: Iterable[str]) -> dict[str, list[str]]
 
 def day_grouping(rows: pd.DataFrame) -> str:
     """Return ``day``, or ``day/condition`` where days have several conditions."""
-    return "day/condition" if visits(rows) > _distinct(rows, "subject", "day") else "day"
+    return "day/condition" if visits(rows) > distinct(rows, "subject", "day") else "day"
 
 
 def visits(rows: pd.DataFrame) -> int:
     """Return how many days of a subject in a condition were rated."""
-    return _distinct(rows, "subject", "day", "condition")
+    return distinct(rows, "subject", "day", "condition")
 
 
 def corrected(ratings: Ratings) -> pd.DataFrame:
@@ -143,8 +143,7 @@ def corrected(ratings: Ratings) -> pd.DataFrame:
 def rating_test(ratings: Ratings, pair: Pair) -> DayDifference:
     """Return the contrast with an offset for every day as a test by days."""
     counts = [
-        _distinct(ratings.rows[ratings.rows["condition"] == name], "subject", "day")
-        for name in pair
+        distinct(ratings.rows[ratings.rows["condition"] == name], "subject", "day") for name in pair
     ]
     fit = ratings.by_day
     if fit is None:
@@ -190,7 +189,8 @@ def without_raters(ratings: Ratings, raters: Sequence[str], pair: Pair) -> DayDi
     return rating_test(ratings._replace(rows=rows, fit=fit, by_day=by_day), pair)
 
 
-def _distinct(rows: pd.DataFrame, *columns: str) -> int:
+def distinct(rows: pd.DataFrame, *columns: str) -> int:
+    """Return how many different cells, or combinations of cells, some columns have."""
     return int(rows[list(columns)].drop_duplicates().shape[0]) if len(rows) else 0
 
 

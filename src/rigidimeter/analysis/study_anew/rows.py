@@ -21,7 +21,7 @@ import scipy
 from rigidimeter.analysis.study_anew.measures import MEASURES, Measure, measure_of
 from rigidimeter.analysis.study_anew.study import Condition, SessionEntry
 from rigidimeter.core.errors import UserError, refused
-from rigidimeter.core.files import TextTable, csv_text, in_place, read_text_table, write_text
+from rigidimeter.core.files import TextTable, csv_text, read_text_table, replace_file, write_text
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import PARAMETERS, Analysis, Epoch, Fit, Score
 
@@ -84,9 +84,9 @@ _WHO = (
     *("subject", "group", "day", "session", "block", "epoch", "rater", "unit", "condition"),
     *("outcome", "findings"),
 )
-_WHAT = ("value", "low", "high", "bias")
+_WHAT = ("value", "se", "low", "high", "bias")
 _EMPTY = {str: "", float: np.nan, bool: True}
-_DTYPE = {str: "category", float: "float64", bool: "bool"}
+_DTYPE: Mapping[type, str] = {float: "float64", bool: "bool"}
 
 
 def as_rows(records: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
@@ -112,7 +112,18 @@ def as_rows(records: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
 
 def typed(rows: pd.DataFrame) -> pd.DataFrame:
     """Return rows whose text is plain as the table has them: columns in order, each of its type."""
-    return rows[list(FIELDS)].astype({name: _DTYPE[field.kind] for name, field in FIELDS.items()})
+    found = rows[list(FIELDS)].astype(
+        {name: _DTYPE[field.kind] for name, field in FIELDS.items() if name not in TEXT}
+    )
+    return found.assign(**{name: _text(rows[name]) for name in TEXT})
+
+
+def _text(cells: pd.Series) -> pd.Series:
+    """Return text as categories; as it is where names of files are not UTF-8: pandas refuses it."""
+    try:
+        return cells.astype("category")
+    except UnicodeEncodeError:
+        return cells.astype(object)
 
 
 def together(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
@@ -125,11 +136,17 @@ def together(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
         return as_rows(())
     joined = {
         name: pd.Series(pd.api.types.union_categoricals([part[name] for part in parts]))
-        if name in TEXT
+        if all(isinstance(part[name].dtype, pd.CategoricalDtype) for part in parts)
         else pd.concat([part[name] for part in parts], ignore_index=True)
         for name in FIELDS
     }
     return pd.DataFrame(joined)
+
+
+def grouped(rows: pd.DataFrame, *columns: str) -> Any:
+    """Return rows by the labels in some columns: as `groupby`, which refuses names not in UTF-8."""
+    codes = [pd.factorize(rows[name].to_numpy(dtype=object))[0] for name in columns]
+    return rows.groupby(codes, sort=False)
 
 
 def recorded(rows: pd.DataFrame, measure: str) -> pd.DataFrame:
@@ -179,14 +196,21 @@ def write_rows(path: Path, rows: pd.DataFrame) -> None:
     """
     if _ending(path) == ".csv":
         write_text(path, csv_text(list(FIELDS), rows[list(FIELDS)].astype(object).to_numpy()))
-        return
+    else:
+        with refused(path, "cannot be written"):
+            replace_file(path, parquet_bytes(rows))
+
+
+def parquet_bytes(rows: pd.DataFrame, beside: str = "") -> bytes:
+    """Return the table as a Parquet file has it, with a text that `read_with_beside` gives back."""
     import pyarrow as pa
     from pyarrow import parquet
 
     table = pa.Table.from_pandas(rows[list(FIELDS)], preserve_index=False)
-    table = table.replace_schema_metadata((table.schema.metadata or {}) | {"schema": ROWS_SCHEMA})
-    with refused(path, "cannot be written"), in_place(path) as beside:
-        parquet.write_table(table, beside)
+    about = {"schema": ROWS_SCHEMA} | ({"beside": beside} if beside else {})
+    sink = pa.BufferOutputStream()
+    parquet.write_table(table.replace_schema_metadata((table.schema.metadata or {}) | about), sink)
+    return bytes(sink.getvalue())
 
 
 def read_rows(path: Path) -> pd.DataFrame:
@@ -199,6 +223,17 @@ def read_rows(path: Path) -> pd.DataFrame:
     """
     if _ending(path) == ".csv":
         return _from_text(read_text_table(path))
+    return read_with_beside(path)[0]
+
+
+def read_with_beside(path: Path) -> tuple[pd.DataFrame, str]:
+    """Return the table of a Parquet file, and the text that was stored with it.
+
+    Raises
+    ------
+    UserError
+        If it is another file.
+    """
     from pyarrow import ArrowInvalid, parquet
 
     with refused(path, "cannot be read"):
@@ -206,10 +241,11 @@ def read_rows(path: Path) -> pd.DataFrame:
             table = parquet.read_table(path)
         except ArrowInvalid as error:
             raise UserError(f"{path}: is no Parquet file ({error})") from None
-    found = (table.schema.metadata or {}).get(b"schema", b"nothing").decode()
+    about = table.schema.metadata or {}
+    found = about.get(b"schema", b"nothing").decode()
     if found != ROWS_SCHEMA:
         raise UserError(f"{path}: its schema is {found}, where {ROWS_SCHEMA} is expected")
-    return pd.DataFrame(table.to_pandas()[list(FIELDS)])
+    return pd.DataFrame(table.to_pandas()[list(FIELDS)]), about.get(b"beside", b"").decode()
 
 
 def _ending(path: Path) -> str:
@@ -388,10 +424,9 @@ def _of_pooled(
     The latter has no condition, as recordings without a name for theirs have none: it comes last.
     """
     known = {fit.condition for fit in analysis.fits}
-    seen: set[str] = set()
     for fit in analysis.pooled:
-        of_one = fit.condition in known and fit.condition not in seen
-        seen.add(fit.condition)
+        of_one = fit.condition in known
+        known.discard(fit.condition)
         cells = {
             **place.condition(fit.condition),
             **made_by,

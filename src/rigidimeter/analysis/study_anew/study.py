@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import pandas as pd
 
@@ -20,6 +20,9 @@ from rigidimeter.analysis.study_anew.measures import Primary
 from rigidimeter.core.records import Analysis, Notice
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.study_files import ConditionTable, StudyFolder
+
+if TYPE_CHECKING:
+    from rigidimeter.analysis.study_anew.from_folder import Loaded
 
 NO_ESTIMATES = Analysis("", (), (), math.nan, ())
 
@@ -206,6 +209,8 @@ class Study:
     analysis : Analysis
         The estimates that are concluded from, with everything that is known of each fit; empty for
         columns of a table.
+    folder_read : callable or None
+        Reads the study folder once more, with its recordings, which are not kept; None without one.
     """
 
     rows: pd.DataFrame = field(repr=False)
@@ -229,6 +234,7 @@ class Study:
     partly_virtual: bool = False
     digests: Mapping[str, str] = field(default_factory=dict, repr=False)
     analysis: Analysis = field(default=NO_ESTIMATES, repr=False)
+    folder_read: Callable[[], Loaded] | None = field(default=None, repr=False, compare=False)
 
     @property
     def pair(self) -> tuple[str, str]:

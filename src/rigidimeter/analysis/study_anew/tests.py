@@ -24,6 +24,7 @@ import scipy
 from rigidimeter.analysis.statistics import DayDifference, day_difference, ranksum
 from rigidimeter.analysis.study_anew.compared import By, Compared, Weights
 from rigidimeter.analysis.study_anew.measures import Measure
+from rigidimeter.analysis.study_anew.rows import grouped
 from rigidimeter.core.errors import UserError
 
 FEWEST_FOR_TEST = 3
@@ -161,7 +162,7 @@ def of_difference(
     first, second = found.mean_x, found.mean_y
     if not known:
         first, second = (
-            float(each["weight"] @ each["value"]) if len(each) else math.nan for each in weighed
+            math.fsum(each["weight"] * each["value"]) if len(each) else math.nan for each in weighed
         )
     counts = [_units(of_days, found.unit) for of_days in found.weights]
     return Compared(
@@ -246,7 +247,7 @@ def _weighed(rows: pd.DataFrame, of_days: Weights) -> pd.DataFrame:
     """Return the rows of days that have a weight, each with its own as `weight`."""
     keys = list(zip(rows["subject"], rows["day"], strict=True))
     weights = pd.Series([of_days.get(key, math.nan) for key in keys], rows.index, dtype=float)
-    counts = rows.groupby(["subject", "day"])["value"].transform("size")
+    counts = grouped(rows, "subject", "day")["value"].transform("size")
     return rows.assign(weight=weights / counts)[weights.notna()]
 
 
@@ -256,5 +257,5 @@ def _measured_half(weighed: pd.DataFrame, measure: Measure) -> float:
     weight, value, low, high = (
         weighed[name].to_numpy() for name in ("weight", "value", "low", "high")
     )
-    half = math.sqrt(float(np.sum((weight * (high - low) / 2) ** 2)))
-    return max(half, ACCURACY * float(weight @ np.abs(value)) / 2)
+    half = math.sqrt(math.fsum((weight * (high - low) / 2) ** 2))
+    return max(half, ACCURACY * math.fsum(weight * np.abs(value)) / 2)

@@ -36,7 +36,7 @@ from rigidimeter.analysis.study_anew.caveats import (
 from rigidimeter.analysis.study_anew.compared import Compared, Needed, Verdict
 from rigidimeter.analysis.study_anew.comparisons import OfMethod
 from rigidimeter.analysis.study_anew.measures import CHECK, LEVEL, PValue, adjusted
-from rigidimeter.analysis.study_anew.rows import ALIKE_IN_BOTH, counting
+from rigidimeter.analysis.study_anew.rows import ALIKE_IN_BOTH, counting, grouped
 from rigidimeter.analysis.study_anew.study import Study
 from rigidimeter.analysis.study_anew.tests import half_width
 from rigidimeter.core.findings import Finding, found_between
@@ -53,7 +53,7 @@ _FEW_DF = 3.0
 GOOD_SHARE, POOR_SHARE = 0.9, 0.5
 """At least the first share of epochs is sound in good data; less than the second in poor data."""
 
-_DAY = ["subject", "day", "session"]
+_DAY = ("subject", "day", "session")
 
 
 def conclude(
@@ -234,12 +234,12 @@ def _assumed_sd(x: pd.DataFrame, y: pd.DataFrame, test: Compared) -> float | Non
 
 
 def _days(rows: pd.DataFrame) -> int:
-    return int(rows.groupby(_DAY).ngroups)
+    return int(grouped(rows, *_DAY).ngroups)
 
 
 def _within_days(rows: pd.DataFrame) -> tuple[float, int]:
     """Return the SD of epochs about the mean of their day, and its degrees of freedom."""
-    days = rows.groupby(_DAY)["value"]
+    days = grouped(rows, *_DAY)["value"]
     degrees = len(rows) - _days(rows)
     squares = float(((rows["value"] - days.transform("mean")) ** 2).sum())
     return (math.sqrt(squares / degrees) if degrees else math.nan), degrees

@@ -9,7 +9,7 @@ from tests.small_study import record
 
 from rigidimeter.analysis.export import ExportedSession, sessions_of_recording
 from rigidimeter.analysis.reading import read
-from rigidimeter.analysis.study import estimate
+from rigidimeter.analysis.recording import estimate
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.analysis.export import export_sessions, sessions_of_study
-from rigidimeter.analysis.study import read_study
+from rigidimeter.analysis.study_anew import load_study
 
 VALIDATOR = Path(sys.executable).with_name("bids-validator-deno")
 
@@ -76,7 +76,7 @@ def test_a_study_with_ratings_and_stimulation(fitted_study: Path, tmp_path: Path
         file.write(f'[subjects.M1]\n{about}\n[archive]\nauthors = ["A. Bee"]\n')
     (study / "exclusions.csv").write_text("path,epoch,reason,by\nsessions/2-DBS,1,cough,A\n")
     out = tmp_path / "bids"
-    export_sessions(sessions_of_study(read_study(study), None), "bids", out)
+    export_sessions(sessions_of_study(load_study(study), None), "bids", out)
     assert errors(out) == []
     assert rows(out / "participants.tsv") == [
         {

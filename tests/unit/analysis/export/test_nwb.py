@@ -16,7 +16,7 @@ from rigidimeter.analysis.export import (
     sessions_of_study,
 )
 from rigidimeter.analysis.reading import read
-from rigidimeter.analysis.study import read_study
+from rigidimeter.analysis.study_anew import load_study
 
 pynwb = pytest.importorskip("pynwb", reason="pip install 'rigidimeter[nwb]'")
 
@@ -93,7 +93,7 @@ def test_tables_of_a_study(fitted_study: Path, tmp_path: Path) -> None:
     (study / "exclusions.csv").write_text("path,epoch,reason,by\nsessions/2-DBS,1,cough,A\n")
     session = next(
         each
-        for each in sessions_of_study(read_study(study), None)
+        for each in sessions_of_study(load_study(study), None)
         if (each.about["day"], each.about["condition"]) == ("2", "DBS")
     )
     path = written(session, tmp_path / "dbs.nwb")

@@ -11,7 +11,7 @@ from tests.small_study import record
 
 from rigidimeter.analysis.export import FORMATS, export_sessions, sessions_of_recording
 from rigidimeter.analysis.reading import Recording, read
-from rigidimeter.analysis.study import estimate
+from rigidimeter.analysis.recording import estimate
 from rigidimeter.core.records import PARAMETERS, Channel, Outcome
 
 NAMES = {"nwb": "s.nwb", "mat": "s.mat"}

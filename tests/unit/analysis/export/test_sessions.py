@@ -10,7 +10,7 @@ import pytest
 
 from rigidimeter.analysis.export import sessions_of_recording, sessions_of_study
 from rigidimeter.analysis.reading import read
-from rigidimeter.analysis.study import estimate_study, read_study
+from rigidimeter.analysis.study_anew import estimate_study, load_study
 from rigidimeter.core.files import json_text
 from rigidimeter.core.session import read_session_files
 from rigidimeter.core.settings import parse_settings
@@ -69,7 +69,7 @@ def study(fitted_study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_study_gives_stimulation_ratings_and_exclusions(study: Path) -> None:
-    read_one = read_study(study, method="bandlimited")
+    read_one = load_study(study, method="bandlimited")
     analysis, _ = estimate_study(read_one)
     sessions = sessions_of_study(read_one, analysis)
     assert len(sessions) == 6
@@ -97,7 +97,7 @@ def test_a_blinded_study_gives_nothing_that_tells_the_condition(study: Path) -> 
         table = (study / name).read_text().splitlines()
         coded = [line.replace(",OFF", ",blue").replace(",DBS", ",red") for line in table]
         (study / name).write_text("\n".join(coded) + "\n")
-    sessions = sessions_of_study(read_study(study), None)
+    sessions = sessions_of_study(load_study(study), None)
     for session in sessions:
         text = json_text(session.about)
         assert session.about["blinded"] is True

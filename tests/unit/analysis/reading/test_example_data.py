@@ -13,7 +13,7 @@ from tests.replayed import assert_folder_replayed
 
 import rigidimeter as rm
 from rigidimeter.analysis.reading import example_data
-from rigidimeter.analysis.study import read_study
+from rigidimeter.analysis.study_anew import load_study
 from rigidimeter.core.errors import UserError
 from rigidimeter.virtual import plan_study, run_virtual_session
 
@@ -40,7 +40,7 @@ def test_a_recording_is_read_without_a_remark_and_is_virtual(name: str) -> None:
 
 
 def test_the_study_is_a_folder_of_virtual_recordings_on_eight_days() -> None:
-    found = read_study(rm.data("study"))
+    found = load_study(rm.data("study"))
     assert all(epoch.virtual for epoch in found.epochs)
     sessions = (rm.data("study") / "sessions.csv").read_text("utf-8").splitlines()[1:]
     assert len({line.split(",")[2] for line in sessions}) == 8

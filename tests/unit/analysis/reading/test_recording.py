@@ -8,7 +8,7 @@ import pytest
 from tests.replayed import assert_folder_replayed
 
 from rigidimeter.analysis.reading import read
-from rigidimeter.analysis.study import provenance
+from rigidimeter.analysis.recording import provenance
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.settings import parse_settings
 from rigidimeter.virtual import run_virtual_session

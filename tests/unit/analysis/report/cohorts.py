@@ -2,36 +2,27 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigidimeter.analysis.statistics import (
-    TwoGroups,
-    day_difference,
-    fit_mixed,
-    holm,
-    ranksum,
-    two_groups,
-)
-from rigidimeter.analysis.study import (
-    RATING,
-    Comparison,
+from rigidimeter.analysis.report import Shown
+from rigidimeter.analysis.study_anew import (
+    SCORE,
+    Compared,
     Condition,
     Exclusion,
-    Measure,
-    RatingsFound,
-    SensitivityRow,
+    Ratings,
     SessionEntry,
-    StudyResult,
-    compare_measures,
+    Study,
+    as_rows,
+    conclude_study,
+    corrected,
+    estimate_rows,
+    ratings_of,
+    together,
 )
-from rigidimeter.analysis.study.comparison import day_tests, gathered, no_days
-from rigidimeter.analysis.study.rating_table import Rating
-from rigidimeter.analysis.study.ratings_found import fit_ratings, with_days
-from rigidimeter.analysis.study.ratings_model import ratings_comparison, ratings_days
 from rigidimeter.core.records import Analysis, Channel, Epoch, Fit, Motion, Notice, Outcome, Score
 
 JOINT = {"inertia_kg_m2": 0.0045, "damping_nm_s_rad": 0.137, "stiffness_nm_rad": 1.75}
@@ -90,8 +81,8 @@ class Design:
     both_on_a_day: bool = False
 
 
-def made_study(design: Design | None = None, **parts: object) -> StudyResult:
-    """Return the result of a study folder; `parts` replace its fields."""
+def made_study(design: Design | None = None, **parts: object) -> Shown:
+    """Return what a page shows of a study folder; `parts` replace fields of the study."""
     design = design or Design()
     rng = np.random.default_rng(design.seed)
     sessions = _sessions(design)
@@ -101,40 +92,56 @@ def made_study(design: Design | None = None, **parts: object) -> StudyResult:
     for session in sessions:
         _fill(design, session, rng, fits, scores, epochs)
     analysis = Analysis("iv", tuple(fits), tuple(fits), JOINT["inertia_kg_m2"], tuple(scores))
-    by_source = {session.source: session for session in sessions}
-    ratings = _ratings(design, sessions, rng)
-    comparisons = (*gathered(analysis, design.names, by_source), ratings_comparison(ratings))
-    comparisons, differences = compare_measures(comparisons, resamples=199)
-    comparisons = day_tests(comparisons, ready={RATING.name: ratings_days(ratings)})
-    result = StudyResult(
-        title="Elbow rigidity",
-        reference=design.names[0],
-        other=design.names[1],
-        comparisons=comparisons,
-        differences=differences,
-        notices=(Notice("warning", "one column was empty"),),
-        resamples=199,
-        analysis=analysis,
-        epochs=tuple(epochs),
-        provenance={"rigidimeter": "0"},
-        conditions=(
-            Condition(design.names[0], "stimulation off"),
-            Condition(design.names[1], "stimulation on", 130.0, 0.32, "mA", 60.0, "C+ 1-", 15.0),
-        ),
-        sessions=sessions,
-        ratings=ratings,
-        sensitivity=tuple(_sensitivity(comparisons)),
-        exclusions=tuple(
-            Exclusion(
-                s.subject, s.day, s.condition, s.source, fit.epoch, "prbs", by, fit.outcome.reason
-            )
-            for s in sessions
-            for fit in fits
-            if fit.source == s.source and not fit.outcome.included
-            for by in ["operator" if "moved" in fit.outcome.reason else "protocol"]
-        ),
+    conditions = (
+        Condition(design.names[0], "stimulation off"),
+        Condition(design.names[1], "stimulation on", 130.0, 0.32, "mA", 60.0, "C+ 1-", 15.0),
     )
-    return replace(result, **parts)
+    by_source = {session.source: session for session in sessions}
+    analyses = {"iv": analysis} | {
+        method: _pulled(analysis, method, design.names[1])
+        for method in ("published", "bandlimited")
+    }
+    ratings = _ratings(design, sessions, rng)
+    study = Study(
+        together([estimate_rows(analyses, by_source, epochs, conditions), corrected(ratings)]),
+        *design.names,
+        title="Elbow rigidity",
+        conditions=conditions,
+        sessions=sessions,
+        exclusions=tuple(_exclusions(sessions, fits)),
+        notices=(Notice("warning", "one column was empty"),),
+        ratings=ratings,
+        analysis=analysis,
+    )
+    return Shown(
+        conclude_study(replace(study, **parts), resamples=199),
+        tuple(epochs),
+        title="Elbow rigidity",
+        provenance={"rigidimeter": "0"},
+    )
+
+
+def of_study(shown: Shown, **parts: object) -> Shown:
+    """Return the same conclusions on a study some of whose fields are others."""
+    return of_result(shown, study=replace(shown.study, **parts))
+
+
+def of_result(shown: Shown, **parts: object) -> Shown:
+    """Return the same study with other conclusions."""
+    return replace(shown, result=replace(shown.result, **parts))
+
+
+def altered(shown: Shown, change: Callable[[Compared], Compared]) -> Shown:
+    """Return the study with every comparison changed."""
+    return of_result(shown, comparisons=tuple(map(change, shown.result.comparisons)))
+
+
+def bare(shown: Shown) -> Shown:
+    """Return a study without ratings, other methods, exclusions and differences of effects."""
+    rows = shown.study.rows[shown.study.rows["measure"] != "rating"]
+    study = replace(shown.study, rows=rows, ratings=None, exclusions=())
+    of_fits = replace(conclude_study(study, resamples=0), methods=())
+    return replace(shown, result=of_fits)
 
 
 def _sessions(design: Design) -> tuple[SessionEntry, ...]:
@@ -235,9 +242,36 @@ def _fill(
         )
 
 
-def _ratings(
-    design: Design, sessions: Sequence[SessionEntry], rng: np.random.Generator
-) -> RatingsFound:
+def _exclusions(sessions: Sequence[SessionEntry], fits: Iterable[Fit]) -> Iterable[Exclusion]:
+    by_source = {session.source: session for session in sessions}
+    for fit in fits:
+        if not fit.outcome.included:
+            s, reason = by_source[fit.source], fit.outcome.reason
+            by = "operator" if "moved" in reason else "protocol"
+            who = (s.subject, s.day, s.condition, s.source)
+            yield Exclusion(*who, fit.epoch, "prbs", by, reason)
+
+
+PULL = {
+    "published": (0.7, 0.75),
+    "bandlimited": (0.88, 0.9),
+}
+"""How far voluntary torque pulls the joint down by other methods, with J free and held."""
+
+
+def _pulled(analysis: Analysis, method: str, condition: str) -> Analysis:
+    """Return the estimates of another method, in one condition multiplied by a factor."""
+    free, held = (
+        tuple(
+            replace(fit, method=method, value=fit.value * factor ** (fit.condition == condition))
+            for fit in fits
+        )
+        for fits, factor in zip((analysis.fits, analysis.fixed_inertia), PULL[method], strict=True)
+    )
+    return replace(analysis, method=method, fits=free, fixed_inertia=held)
+
+
+def _ratings(design: Design, sessions: Sequence[SessionEntry], rng: np.random.Generator) -> Ratings:
     bias = {e: b for e, b in zip(design.examiners, (0.35, -0.1, -0.3), strict=False)}
     rows = []
     for s in sessions:
@@ -245,100 +279,19 @@ def _ratings(
         for examiner in design.examiners:
             score = level + bias[examiner] + 0.3 * float(rng.standard_normal())
             rows.append((s.condition, examiner, s.subject, s.day, _rounded(score)))
-    return ratings_found(tuple(rows), design.names)
+    return made_ratings(rows)
 
 
 def _rounded(score: float) -> float:
     return min(max(round(2 * score) / 2, 0.0), 3.0)
 
 
-def ratings_found(
-    rows: tuple[tuple[str, str, str, str, float], ...], names: tuple[str, str]
-) -> RatingsFound:
-    """Return the mixed model of ratings (condition, examiner, subject, day, score)."""
-    ratings = [
-        Rating(line, condition, score, examiner, subject, day)
-        for line, (condition, examiner, subject, day, score) in enumerate(rows, start=2)
-    ]
-    by_day = fit_mixed(
-        [r.score for r in ratings],
-        [r.condition for r in ratings],
-        {
-            "examiner": [r.examiner for r in ratings],
-            "day": [f"{r.subject}/{r.day}" for r in ratings],
-        },
+def made_ratings(rows: Iterable[tuple[str, str, str, str, float]]) -> Ratings:
+    """Return the mixed models of ratings (condition, examiner, subject, day, score)."""
+    names = ("condition", "rater", "subject", "day", "value")
+    scores = as_rows(
+        dict(zip(names, row, strict=True))
+        | {"epoch": f"line {line}", "measure": SCORE, "chosen": False}
+        for line, row in enumerate(rows, start=2)
     )
-    found = fit_ratings("ratings.csv", ratings, ["examiner"], names)
-    return with_days(found, by_day)
-
-
-PULL = {
-    ("published", "fixed"): 0.75,
-    ("published", "free"): 0.7,
-    ("bandlimited", "fixed"): 0.9,
-    ("bandlimited", "free"): 0.88,
-    ("iv", "fixed"): 1.0,
-    ("iv", "free"): 1.0,
-}
-
-
-def _sensitivity(comparisons: Sequence[Comparison]) -> list[SensitivityRow]:
-    """Let voluntary torque pull the joint down, and here in the other condition alone."""
-    rows = []
-    for c in comparisons:
-        if c.measure.name not in JOINT:
-            continue
-        x, y = (c.of(name) for name in c.pair)
-        group = two_groups(
-            [o.value for o in x], [o.value for o in y], [o.unit for o in x], [o.unit for o in y]
-        )
-        for (method, inertia), factor in PULL.items():
-            if c.measure.name != "inertia_kg_m2" or inertia != "fixed":
-                rows.append(sensitivity_row(c.measure, method, inertia, group, factor))
-    return rows
-
-
-def sensitivity_row(
-    measure: Measure, method: str, inertia: str, group: TwoGroups, factor: float
-) -> SensitivityRow:
-    """Return the conclusion with the other condition multiplied by a factor."""
-    x, y = group.x, group.y * factor
-    test = ranksum(x, y)
-    p_day = day_difference(x, y, group.x_units, group.y_units).p
-    return SensitivityRow(
-        measure,
-        method,
-        inertia,  # type: ignore[arg-type]
-        test.n_x,
-        test.n_y,
-        test.shift,
-        test.shift_low,
-        test.shift_high,
-        test.p,
-        test.r,
-        p_day,
-        method == "iv" and inertia == "free",
-    )
-
-
-def altered(study: StudyResult, change: Callable[[Comparison], Comparison]) -> StudyResult:
-    """Return the study with every comparison changed, its tests by days adjusted anew."""
-    changed = [change(c) for c in study.comparisons]
-    adjusted = holm([c.days.p if c.days is not None else math.nan for c in changed])
-    return replace(
-        study,
-        comparisons=tuple(
-            replace(c, days_p_holm=p) for c, p in zip(changed, adjusted, strict=True)
-        ),
-    )
-
-
-def untested(study: StudyResult, measure: str, remark: str) -> StudyResult:
-    """Return the study with one measure that days could not test."""
-
-    def change(c: Comparison) -> Comparison:
-        if c.measure.name != measure or c.days is None:
-            return c
-        return replace(c, days=no_days(c.days.n_days_x, c.days.n_days_y, remark))
-
-    return altered(study, change)
+    return ratings_of("ratings.csv", scores, ["examiner"])

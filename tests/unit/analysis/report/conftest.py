@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from rigidimeter.analysis.study import StudyResult, compare_analysis, estimate
+from rigidimeter.analysis.recording import estimate
+from rigidimeter.analysis.report import Shown
+from rigidimeter.analysis.study_anew import analysis_study, conclude_study
 from rigidimeter.core.records import Analysis, Channel, Epoch, Fit, Motion, Notice, Outcome, Score
 from rigidimeter.core.settings import Settings
 from rigidimeter.model import JointDynamics
@@ -23,6 +25,12 @@ def channels(time_s: np.ndarray, **values: np.ndarray) -> dict[str, Channel]:
     return {name: Channel(name, time_s, samples) for name, samples in values.items()}
 
 
+def driven(joint: JointDynamics) -> signal.StateSpace:
+    """Return the joint in the admittance loop, from the perturbation to the angle."""
+    inertia, damping = joint.inertia_kg_m2 + INERTIA_C, joint.damping_nm_s_rad + DAMPING_C
+    return signal.lti([1.0], [inertia, damping, joint.stiffness_nm_rad]).to_ss()
+
+
 def prbs_epoch(
     joint: JointDynamics, label: str, condition: str, source: str, rng: np.random.Generator
 ) -> Epoch:
@@ -30,14 +38,7 @@ def prbs_epoch(
     time_s = 100.0 + np.arange(int(20 * RATE_HZ)) / RATE_HZ
     levels = np.random.default_rng(0).choice([-1.0, 1.0], size=400)
     perturbation = levels[np.minimum((20 * (time_s - 100)).astype(int), 399)]
-    loop = signal.lti(
-        [1.0],
-        [
-            joint.inertia_kg_m2 + INERTIA_C,
-            joint.damping_nm_s_rad + DAMPING_C,
-            joint.stiffness_nm_rad,
-        ],
-    ).to_ss()
+    loop = driven(joint)
     _, _, states = signal.lsim(loop, perturbation, time_s - 100)
     velocity, angle = states[:, 0], states[:, 1] * loop.C[0, 1]
     velocity = velocity * loop.C[0, 1]
@@ -71,14 +72,7 @@ def periodic_epoch(
     levels, per_chip, periods = prbs_levels(6), 25, 3
     held = np.repeat(np.roll(np.tile(levels, periods + 1), -first_chip), per_chip)
     time_s = np.arange(held.size) / RATE_HZ
-    loop = signal.lti(
-        [1.0],
-        [
-            joint.inertia_kg_m2 + INERTIA_C,
-            joint.damping_nm_s_rad + DAMPING_C,
-            joint.stiffness_nm_rad,
-        ],
-    ).to_ss()
+    loop = driven(joint)
     _, angle, states = signal.lsim(loop, held, time_s, interp=False)
     velocity = states[:, 0] * loop.C[0, 1]
     acceleration = (states @ loop.A[0] + loop.B[0, 0] * held) * loop.C[0, 1]
@@ -115,23 +109,25 @@ def scaled(joint: JointDynamics, by: float) -> JointDynamics:
     )
 
 
-MakeStudy = Callable[..., StudyResult]
+MakeStudy = Callable[..., Shown]
 
 
 @pytest.fixture(scope="session")
 def make_study() -> MakeStudy:
-    """Return a function that makes a study from epochs: all of it, or with parts replaced."""
+    """Return a function that makes what a page shows of epochs: all of it, or parts replaced."""
 
-    def make(epochs: list[Epoch], **parts: object) -> StudyResult:
+    def make(
+        epochs: list[Epoch],
+        analysis: Analysis | None = None,
+        notices: tuple[Notice, ...] = (),
+        **parts: object,
+    ) -> Shown:
         settings = Settings()
-        analysis = parts.pop("analysis", None) or estimate(epochs, settings=settings)
-        fields = {
-            "settings": settings,
-            "epochs": tuple(epochs),
-            "provenance": {"program": "rigidimeter 0"},
-        }
-        found = compare_analysis(analysis, title="A study", resamples=199)
-        return replace(found, **{**fields, **parts})
+        analysis = analysis or estimate(epochs, settings=settings)
+        study = analysis_study(analysis, epochs=epochs, settings=settings)
+        result = conclude_study(replace(study, notices=notices), resamples=199)
+        facts = {"title": "A study", "provenance": {"program": "rigidimeter 0"}}
+        return Shown(result, tuple(epochs), **{**facts, **parts})
 
     return make
 
@@ -149,20 +145,12 @@ def epochs() -> list[Epoch]:
         for i in range(4):
             by = float(rng.lognormal(0, 0.08))
             made.append(sinusoid_epoch(scaled(joint, by), f"s{i}", condition, source))
-    first = made[0]
-    made[0] = Epoch(
-        first.source,
-        first.label,
-        first.channels,
-        first.condition,
-        first.task,
-        closed=Outcome("excluded", "the arm touched the position limit"),
-    )
-    return made
+    touched = Outcome("excluded", "the arm touched the position limit")
+    return [replace(made[0], excitation_hz=None, closed=touched), *made[1:]]
 
 
 @pytest.fixture(scope="session")
-def periodic_study(make_study: MakeStudy) -> StudyResult:
+def periodic_study(make_study: MakeStudy) -> Shown:
     """Return two epochs of each condition, each begun elsewhere in the sequence."""
     rng = np.random.default_rng(11)
     return make_study(
@@ -175,7 +163,7 @@ def periodic_study(make_study: MakeStudy) -> StudyResult:
 
 
 @pytest.fixture(scope="session")
-def study(epochs: list[Epoch], make_study: MakeStudy) -> StudyResult:
+def study(epochs: list[Epoch], make_study: MakeStudy) -> Shown:
     return make_study(epochs, notices=(Notice("warning", "one column was empty"),))
 
 

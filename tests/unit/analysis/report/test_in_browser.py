@@ -2,17 +2,15 @@
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page
 from tests.unit.analysis.report.cohorts import Design, made_study
+from tests.unit.analysis.report.parsed_page import sections_without
 
-from rigidimeter.analysis.report import SECTIONS
-from rigidimeter.analysis.report import page as page_module
-from rigidimeter.analysis.report.page import write_report
-from rigidimeter.analysis.study import StudyResult, compare_analysis
+from rigidimeter.analysis.report import Shown, report
+from rigidimeter.analysis.study_anew import analysis_study, conclude_study
 
 DESKTOP, PHONE = (1280, 800), (390, 844)
 SCREENS = Path(__file__).parents[4] / "build" / "screens"
@@ -26,16 +24,11 @@ LONG = ("perturbation", "torque", "voluntary", "loops", "impedance", "recorded")
 def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Return the pages of a study and of one condition."""
     study = made_study(Design(days=(9, 4), epochs=(3, 3), scores=(2, 2)))
-    one = compare_analysis(study.analysis, "OFF", "", resamples=0)
-    results: dict[str, StudyResult] = {
-        "study": study,
-        "one": replace(one, epochs=study.epochs, title="One recording"),
-    }
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(page_module, "SECTIONS", [s for s in SECTIONS if s.name not in LONG])
+    one = conclude_study(analysis_study(study.analysis, ("OFF", "")), resamples=0)
+    results = {"study": study, "one": Shown(one, study.epochs, title="One recording")}
+    with sections_without(LONG):
         return {
-            name: write_report(result, tmp_path_factory.mktemp(name))
-            for name, result in results.items()
+            name: report(result, tmp_path_factory.mktemp(name)) for name, result in results.items()
         }
 
 

@@ -1,5 +1,6 @@
 """`report` takes a result, estimates, a recording or its path, and gives one page."""
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +9,8 @@ import pandas as pd
 import pytest
 
 from rigidimeter.analysis.reading import read
-from rigidimeter.analysis.report import report
-from rigidimeter.analysis.study import StudyResult, compare
+from rigidimeter.analysis.report import Shown, report
+from rigidimeter.analysis.study_anew import compare
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import Epoch
 
@@ -25,9 +26,7 @@ def csv_file(epochs: list[Epoch], tmp_path_factory: pytest.TempPathFactory) -> P
     return path
 
 
-def test_estimates_give_a_page_without_figures_of_signals(
-    study: StudyResult, tmp_path: Path
-) -> None:
+def test_estimates_give_a_page_without_figures_of_signals(study: Shown, tmp_path: Path) -> None:
     page = report(study.analysis, tmp_path, "Estimates alone")
     text = page.read_text(encoding="utf-8")
     assert "<h1>Estimates alone</h1>" in text
@@ -51,15 +50,25 @@ def test_a_path_and_what_is_read_from_it_give_the_same_page(csv_file: Path, tmp_
         assert [x for x in a if "made (UTC)" not in x] == [x for x in b if "made (UTC)" not in x]
 
 
-def test_a_folder_that_cannot_be_written_says_so(study: StudyResult, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("no_figures")
+def test_the_recordings_of_a_compared_study_are_read_again(
+    scored_study: Path, tmp_path: Path
+) -> None:
+    folder = Path(shutil.copytree(scored_study, tmp_path / "study"))
+    result = compare(folder, resamples=0)
+    page = report(result, tmp_path / "report")
+    assert (page.parent / "figures" / "loops.svg").exists()
+    assert "<h1>Small study</h1>" in page.read_text(encoding="utf-8")
+    with (folder / "sessions.csv").open("a") as file:
+        file.write("# seen again\n")
+    with pytest.raises(UserError, match=r"sessions\.csv has changed since the study was compared"):
+        report(result, tmp_path / "report")
+
+
+def test_a_folder_that_cannot_be_written_says_so(study: Shown, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UserError, match="the report cannot be written"):
         report(study.analysis, tmp_path / "file")
-
-
-def test_a_path_that_does_not_exist_says_so(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match=r"nothing\.csv"):
-        report(tmp_path / "nothing.csv", tmp_path / "out")
 
 
 def test_what_cannot_be_reported_is_refused(tmp_path: Path) -> None:

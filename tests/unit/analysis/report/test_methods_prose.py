@@ -3,19 +3,18 @@
 import dataclasses
 
 import pytest
-from tests.unit.analysis.report.cohorts import Design, made_study
+from tests.unit.analysis.report.cohorts import Design, bare, made_study, of_result, of_study
 
 from rigidimeter.analysis.estimation import METHODS, Method
-from rigidimeter.analysis.report.methods_prose import methods_prose
-from rigidimeter.analysis.study import StudyResult
+from rigidimeter.analysis.report import Shown, methods_prose
 
 
 @pytest.fixture(scope="module")
-def study() -> StudyResult:
+def study() -> Shown:
     return made_study(Design(days=(5, 4), epochs=(5, 5), scores=(4, 4)))
 
 
-def test_methods_hold_the_facts_of_the_study(study: StudyResult) -> None:
+def test_methods_hold_the_facts_of_the_study(study: Shown) -> None:
     prose = methods_prose(study)
     text = prose.text
     assert text.startswith(
@@ -41,11 +40,11 @@ def test_methods_hold_the_facts_of_the_study(study: StudyResult) -> None:
 
 
 def test_methods_state_the_torque_that_was_commanded_to_the_epochs_that_count(
-    study: StudyResult,
+    study: Shown,
 ) -> None:
-    out = {(one.source, one.epoch) for one in study.exclusions}
+    out = {(one.source, one.epoch) for one in study.study.exclusions}
 
-    def shifted(by_nm: float) -> StudyResult:
+    def shifted(by_nm: float) -> Shown:
         epochs = []
         for k, epoch in enumerate(study.epochs):
             given = epoch.channels["perturbation_nm"]
@@ -70,9 +69,9 @@ def test_methods_state_the_torque_that_was_commanded_to_the_epochs_that_count(
     assert "binary torque of ±1 N·m (as set) for 20 s" in unknown
 
 
-def test_methods_take_the_text_of_an_estimator_from_outside(study: StudyResult) -> None:
+def test_methods_take_the_text_of_an_estimator_from_outside(study: Shown) -> None:
     toy = Method("toy", "a guess", (), "by a guess of ours", METHODS[0].fit, references=("bca",))
-    by_toy = dataclasses.replace(study, analysis=dataclasses.replace(study.analysis, method="toy"))
+    by_toy = of_study(study, analysis=dataclasses.replace(study.analysis, method="toy"))
     METHODS.append(toy)
     try:
         text = methods_prose(by_toy).text
@@ -82,24 +81,18 @@ def test_methods_take_the_text_of_an_estimator_from_outside(study: StudyResult) 
     assert "by the method “toy”" in methods_prose(by_toy).text
 
 
-def test_methods_leave_out_what_was_not(study: StudyResult) -> None:
+def test_methods_leave_out_what_was_not(study: Shown) -> None:
     foreign = tuple(
         dataclasses.replace(epoch, excitation_hz=None, motion=None) for epoch in study.epochs
     )
     analysis = dataclasses.replace(study.analysis, method="bandlimited")
-    other = dataclasses.replace(
-        study,
-        epochs=foreign,
-        analysis=analysis,
-        comparisons=(),
-        differences=(),
-        ratings=None,
-        sensitivity=(),
-    )
+    compared = {"comparisons": (), "values": (), "effects": {}}
+    other = of_result(of_study(bare(study), analysis=analysis), **compared)
+    other = dataclasses.replace(other, epochs=foreign)
     text = " ".join(methods_prose(other).paragraphs)
     for absent in ("guard", "admittance", "examiner", "Kenward", "Efron", "Young", "Holm", "rank"):
         assert absent not in text
     assert "least squares in which each frequency counts by its noise" in text
-    blind = methods_prose(dataclasses.replace(study, blinded=True)).text
+    blind = methods_prose(of_study(study, blinded=True)).text
     assert "130 Hz" not in blind
     assert "The analysis was blinded: conditions are codes" in blind

@@ -11,20 +11,26 @@ from xml.etree import ElementTree as ET
 import pytest
 from matplotlib.figure import Figure as Drawing
 
-from rigidimeter.analysis.report import SECTIONS, Figure, Section, paragraph, report
-from rigidimeter.analysis.report.contents import Block
-from rigidimeter.analysis.report.page import contents
-from rigidimeter.analysis.study import StudyResult
+from rigidimeter.analysis.report import (
+    SECTIONS,
+    Block,
+    Figure,
+    Section,
+    Shown,
+    paragraph,
+    report,
+    sections_of,
+)
 from rigidimeter.core.records import Delay, Outcome, Ticks
 from rigidimeter.core.words import Column, Table
 
 
-def tables_of(result: StudyResult, name: str) -> list[Table]:
-    blocks = (block for _, blocks in contents(result) for block in blocks)
+def tables_of(result: Shown, name: str) -> list[Table]:
+    blocks = (block for _, blocks in sections_of(result) for block in blocks)
     return [block for block in blocks if isinstance(block, Table) and block.name == name]
 
 
-def rows_of(result: StudyResult, name: str) -> list[dict[str, Any]]:
+def rows_of(result: Shown, name: str) -> list[dict[str, Any]]:
     return [dict(row) for row in tables_of(result, name)[0].rows]
 
 
@@ -36,7 +42,7 @@ def test_a_section_from_outside_is_in_the_page_and_its_files(
         figure.add_subplot().plot([0.0, 1.0], [2.0, 3.0])
         return figure
 
-    def blocks(result: StudyResult) -> Iterator[Block]:
+    def blocks(result: Shown) -> Iterator[Block]:
         yield paragraph(f"Of {len(result.analysis.fits)} <fits>.")
         columns = (Column("toy_nm", "Toy (N·m)"), Column("condition", "Condition", "condition"))
         rows = [{"toy_nm": 1 / 3, "condition": "OFF", "only_in_file_s": 0.1}]
@@ -64,39 +70,11 @@ def test_a_section_from_outside_is_in_the_page_and_its_files(
     ET.parse(tmp_path / "figures" / "toy_figure.svg")
 
 
-def test_a_section_that_is_not_shown_is_absent(study: StudyResult) -> None:
-    names = [section.name for section, _ in contents(study)]
+def test_a_section_that_is_not_shown_is_absent(study: Shown) -> None:
+    names = [section.name for section, _ in sections_of(study)]
     assert {"about", "results", "exclusions", "provenance"} <= set(names)
     assert not {"study", "comparison", "days", "ratings", "methods"} & set(names)
     assert len(names) == len(set(names))
-
-
-def test_stored_names_carry_units(study: StudyResult) -> None:
-    tables = (b for _, blocks in contents(study) for b in blocks if isinstance(b, Table))
-    names = {name for table in tables for row in table.rows for name in row}
-    assert {
-        "inertia_kg_m2",
-        "inertia_kg_m2_se",
-        "damping_nm_s_rad",
-        "stiffness_nm_rad",
-        "fixed_inertia_stiffness_nm_rad_low",
-        "residual_sd_nm",
-        "impulse_nm_s",
-        "work_j",
-        "duration_s",
-    } <= names
-
-
-def test_estimates_hold_what_the_analysis_holds(study: StudyResult) -> None:
-    rows = rows_of(study, "estimates")
-    for row, fit in zip(rows, study.analysis.fits, strict=True):
-        assert row["epoch"] == fit.epoch
-        assert row["outcome"] == fit.outcome.kind
-        assert row["n_samples"] == fit.n_samples
-        assert (row["band_low_hz"], row["band_high_hz"]) == fit.band_hz
-        assert row["findings"] == ", ".join(finding.name for finding in fit.findings)
-        assert row["n_findings"] == len(fit.findings)
-        assert row["cautions"] == ", ".join(fit.cautions)
 
 
 def test_the_band_is_a_column_where_it_differs(make_study, make_analysis) -> None:
@@ -142,7 +120,7 @@ def test_an_epoch_of_which_nothing_was_made_is_listed(study, make_study, make_an
     assert row["reason"]
 
 
-def test_controller_is_given_per_radian_and_per_degree(study: StudyResult) -> None:
+def test_controller_is_given_per_radian_and_per_degree(study: Shown) -> None:
     own = dataclasses.replace(study, own_rig=True)
     numbers = {row["unit"]: row["value"] for row in rows_of(own, "design")}
     assert numbers["kg·m²/deg"] == pytest.approx(0.0008, rel=1e-12)
@@ -150,7 +128,7 @@ def test_controller_is_given_per_radian_and_per_degree(study: StudyResult) -> No
     assert numbers["N·m·s/deg"] == pytest.approx(0.028, rel=1e-12)
 
 
-def test_every_setting_has_its_key_and_unit(study: StudyResult) -> None:
+def test_every_setting_has_its_key_and_unit(study: Shown) -> None:
     rows = {row["key"]: (row["value"], row["unit"]) for row in rows_of(study, "settings")}
     assert rows["prbs.clock_hz"] == ("20.0", "Hz")
     assert rows["rig.torque.noise_sd_nm"] == ("0.005", "N·m")
@@ -159,7 +137,7 @@ def test_every_setting_has_its_key_and_unit(study: StudyResult) -> None:
     assert rows["protocol.rests_s[0]"] == ("10.0", "s")
 
 
-def test_counts_add_up(study: StudyResult) -> None:
+def test_counts_add_up(study: Shown) -> None:
     rows = rows_of(study, "counts")
     assert sum(row["epochs"] for row in rows) == len(study.epochs)
     assert {(row["task"], row["condition"], row["epochs"]) for row in rows} == {
@@ -170,7 +148,7 @@ def test_counts_add_up(study: StudyResult) -> None:
     }
 
 
-def test_late_and_missed_ticks_are_counted_epoch_by_epoch(study: StudyResult) -> None:
+def test_late_and_missed_ticks_are_counted_epoch_by_epoch(study: Shown) -> None:
     late = dataclasses.replace(study.epochs[0], ticks=Ticks(19_000, 200, 1000, 50))
     unknown = [dataclasses.replace(epoch, ticks=None) for epoch in study.epochs[1:]]
     rows = rows_of(dataclasses.replace(study, epochs=(late, *unknown)), "ticks")

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import scipy
-from tests.unit.analysis.report.cohorts import Design, made_study, ratings_found
+from tests.study_anew.old_cohorts import Design, made_study, ratings_found
 
 from rigidimeter.analysis.statistics import holm, summarise
 from rigidimeter.analysis.study import (

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from scipy.stats import t as t_distribution
 from scipy.stats import ttest_ind
-from tests.unit.analysis.report.cohorts import Design, altered, made_study
+from tests.study_anew.old_cohorts import Design, altered, made_study
 
 from rigidimeter.analysis.report.page import contents, render_page
 from rigidimeter.analysis.statistics import summarise

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 from scipy.stats import spearmanr
-from tests.unit.analysis.report.cohorts import Design, made_study, ratings_found
+from tests.study_anew.old_cohorts import Design, made_study, ratings_found
 
 from rigidimeter.analysis.study import StudyResult, agreement, relations, result_tables
 

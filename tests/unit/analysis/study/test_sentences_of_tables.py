@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from tests.unit.analysis.report.cohorts import Design, made_study
+from tests.study_anew.old_cohorts import Design, made_study
 
 from rigidimeter.analysis.study import Primary, StudyResult, compare, conclude, lead, statements
 from rigidimeter.analysis.study.differences import signed

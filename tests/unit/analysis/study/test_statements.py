@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from tests.unit.analysis.report.cohorts import (
+from tests.study_anew.old_cohorts import (
     Design,
     altered,
     made_study,

@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from functools import partial
 
 from markupsafe import Markup
 
+from rigidimeter.analysis.figures import (
+    Values,
+    condition_colours,
+    distribution_size,
+    draw_effects,
+    draw_values,
+    drawn,
+    drawn_values,
+    effect_rows,
+    effect_words,
+    effects_label,
+    effects_size,
+    epoch_keys,
+)
 from rigidimeter.analysis.report.contents import (
     Block,
     Figure,
@@ -16,21 +30,14 @@ from rigidimeter.analysis.report.contents import (
     paragraph,
     part,
 )
-from rigidimeter.analysis.report.interval_rows import (
-    draw_effects,
-    effect_words,
-    effects_label,
-    effects_size,
-)
-from rigidimeter.analysis.report.methods_prose import (
-    day_tests_in_words,
+from rigidimeter.analysis.report.methods import (
     method_of,
 )
-from rigidimeter.analysis.report.points import distribution_size, draw_comparison
 from rigidimeter.analysis.report.sections.every_epoch import pooled_table
 from rigidimeter.analysis.report.sections.examiners import RATINGS, RELATION
-from rigidimeter.analysis.report.style import condition_colours, drawn
-from rigidimeter.analysis.study import Comparison, StudyResult, comparison_rows
+from rigidimeter.analysis.report.shown import Shown
+from rigidimeter.analysis.statistics import summarise
+from rigidimeter.analysis.study_anew import RATING, Rows, result_table
 from rigidimeter.core.words import (
     INTERVAL,
     TURNED,
@@ -58,65 +65,66 @@ _DAYS_NOTE = Markup(
 )
 
 
-def _comparison(result: StudyResult) -> Iterator[Block]:
-    if not any(c.paired for c in result.comparisons):
+def _comparison(shown: Shown) -> Iterator[Block]:
+    every = result_table(shown.result, "comparisons")
+    if not every or not shown.study.other:
         yield paragraph("No two conditions were compared.")
         return
-    pairs = (result, *result.further_pairs)
-    for place, pair in enumerate(pairs, start=1):
-        yield from _epochs(pair, _table_name(place))
-    for place, pair in enumerate(pairs, start=1):
-        if any(c.days for c in pair.comparisons):
-            yield from _by_days(pair, _table_name(place))
+    pairs = []
+    for place, other in enumerate(shown.study.others, start=1):
+        name = "comparisons" if place == 1 else f"comparisons_{place}"
+        pairs.append((name, [row for row in every if row["other"] == other]))
+    for name, rows in pairs:
+        yield from _epochs(name, rows)
+    for name, rows in pairs:
+        if any("days_estimate" in row for row in rows):
+            yield from _by_days(shown, name, rows)
 
 
-def _table_name(place: int) -> str:
-    return "comparisons" if place == 1 else f"comparisons_{place}"
-
-
-def _by_days(result: StudyResult, name: str) -> Iterator[Block]:
-    used = dict.fromkeys(day_tests_in_words(result)) or ("No test by days could be made",)
+def _by_days(shown: Shown, name: str, rows: Rows) -> Iterator[Block]:
+    tests = [row.get("days_test") for row in rows if row["measure"] != RATING.name]
+    used = dict.fromkeys(filter(None, tests)) or ("No test by days could be made",)
     ratings = (
         " Ratings are those less the examiners’ offsets; their model has an offset for each "
         "examiner too."
-        if result.ratings is not None
+        if shown.study.ratings is not None
         else ""
     )
-    percent = _percent(c.days.confidence for c in result.comparisons if c.days)
+    signs = _signs(rows)
     yield Table(
         name,
-        f"{_signs(result)['pair']}: days counted",
+        f"{signs['pair']}: days counted",
         (
             Column("title", "Measure", "text", below="unit"),
             Column(
                 "days_estimate",
-                f"Difference [{percent} interval]",
+                f"Difference [{_percent(rows, 'days_confidence')} interval]",
                 ends=("days_low", "days_high"),
                 page_factor=TURNED,
             ),
-            Column("days_reference", f"Days {condition_name(result.reference)}", "count"),
-            Column("days_other", f"Days {condition_name(result.other)}", "count"),
+            Column("days_reference", f"Days {signs['reference']}", "count"),
+            Column("days_other", f"Days {signs['other']}", "count"),
             Column("days_df", "df"),
             Column("days_p", "p (adjusted)", "p", below="days_p_holm"),
             Column("days_p_days", "p of day medians", "p"),
             Column("days_day_share", "Between days", "percent"),
             Column("days_remark", "Remark", "reason"),
         ),
-        comparison_rows(result.comparisons),
+        rows,
         note=_DAYS_NOTE.format(
             tests="; ".join(text[:1].upper() + text[1:] for text in used),
             ratings=ratings,
-            **_signs(result),
+            **signs,
         ),
     )
 
 
-def _epochs(result: StudyResult, table: str) -> Iterator[Block]:
+def _epochs(table: str, rows: Rows) -> Iterator[Block]:
     """Yield the comparison over epochs, as it is in every report."""
-    percent = _percent(c.test.confidence for c in result.comparisons if c.test)
-    sides = {"reference": condition_name(result.reference), "other": condition_name(result.other)}
+    signs = _signs(rows)
     columns = [Column("title", "Measure", "text", below="unit")]
-    for side, name in sides.items():
+    for side in ("reference", "other"):
+        name = signs[side]
         columns += [
             Column(f"n_{side}", "n (excluded)", "count", group=name, below=f"excluded_{side}"),
             Column(
@@ -131,7 +139,7 @@ def _epochs(result: StudyResult, table: str) -> Iterator[Block]:
     columns += [
         Column(
             "shift",
-            f"Shift [{percent} interval]",
+            f"Shift [{_percent(rows, 'confidence')} interval]",
             ends=("shift_low", "shift_high"),
             page_factor=TURNED,
             digits=3,
@@ -143,17 +151,17 @@ def _epochs(result: StudyResult, table: str) -> Iterator[Block]:
     ]
     yield Table(
         table,
-        f"{_signs(result)['pair']}: each epoch counted",
+        f"{signs['pair']}: each epoch counted",
         tuple(columns),
-        comparison_rows(result.comparisons),
-        note=_EPOCHS_NOTE.format(**_signs(result)),
+        rows,
+        note=_EPOCHS_NOTE.format(**signs),
     )
     yield paragraph(
         "This test treats every epoch as an independent observation. Epochs of one day are not, so "
         "where days differ its p is too small.",
         "remark",
     )
-    unbounded = [c.measure.title for c in result.comparisons if c.test and not c.test.shift_bounded]
+    unbounded = [row["title"] for row in rows if row["shift_bounded"] is False]
     if unbounded:
         yield paragraph(
             f"{series(unbounded)}: too few values for an interval at this confidence. The interval "
@@ -162,26 +170,28 @@ def _epochs(result: StudyResult, table: str) -> Iterator[Block]:
         )
 
 
-def _signs(result: StudyResult) -> dict[str, str]:
-    """Return what differences are on the page, and in the file."""
-    reference, other = condition_name(result.reference), condition_name(result.other)
-    return {"pair": f"{other} − {reference}", "turned": f"{reference} − {other}"}
+def _signs(rows: Rows) -> dict[str, str]:
+    """Return the two conditions, and what differences are on the page and in the file."""
+    reference, other = (condition_name(rows[0][side]) for side in ("reference", "other"))
+    signs = {"pair": f"{other} − {reference}", "turned": f"{reference} − {other}"}
+    return {"reference": reference, "other": other} | signs
 
 
-def _percent(confidences: Iterable[float]) -> str:
-    return " and ".join(dict.fromkeys(f"{100 * each:g} %" for each in confidences)) or "95 %"
+def _percent(rows: Rows, name: str) -> str:
+    known = [row[name] for row in rows if row.get(name) is not None]
+    return " and ".join(dict.fromkeys(f"{100 * each:g} %" for each in known)) or "95 %"
 
 
-def _results(result: StudyResult) -> Iterator[Block]:
+def _results(shown: Shown) -> Iterator[Block]:
     """Yield the results of recordings that are no study folder."""
-    yield from _comparison(result)
-    yield from _all_epochs(result)
+    yield from _comparison(shown)
+    yield from _all_epochs(shown)
 
 
-def _all_epochs(result: StudyResult) -> Iterator[Block]:
+def _all_epochs(shown: Shown) -> Iterator[Block]:
     """Yield medians where not all conditions are compared, and the fits to all epochs."""
     columns: tuple[Column, ...] = ()
-    if not result.other or len(result.condition_names) > 2:
+    if not shown.study.other or len(shown.condition_names) > 2:
         columns = (
             Column("title", "Measure", "text"),
             Column("unit", "Unit", "check"),
@@ -193,10 +203,10 @@ def _all_epochs(result: StudyResult) -> Iterator[Block]:
             Column("q3", "Upper quartile"),
             Column("sd_percent", "SD (% of the mean)", digits=2),
         )
-    yield from_result(result, "summaries", "Medians and quartiles by condition", *columns)
-    method = method_of(result.analysis.method)
+    yield from_result(shown, "summaries", "Medians and quartiles by condition", *columns)
+    method = method_of(shown.analysis.method)
     yield pooled_table(
-        result,
+        shown,
         note=(
             "One J, B and K fitted to all epochs of a condition at once. "
             f"{method.intervals_text}. {method.pooled_text}. The file also has standard errors "
@@ -205,21 +215,21 @@ def _all_epochs(result: StudyResult) -> Iterator[Block]:
     )
 
 
-def _effects(result: StudyResult) -> Iterator[Block]:
-    found = [(c, c.effects) for c in result.comparisons if c.effects is not None]
+def _effects(shown: Shown) -> Iterator[Block]:
+    found = effect_rows(shown.result)
     if not found:
         return
-    percent = f"{100 * found[0][1].confidence:g} %"
+    percent = _percent(found[:1], "confidence")
+    words = "; ".join(f"{row['title']} {effect_words(row)}" for row in found)
     yield Figure(
         "effects",
-        f"Effect sizes r with {percent} intervals from resampling {result.resampled}. Dotted "
+        f"Effect sizes r with {percent} intervals from resampling {shown.result.resampled}. Dotted "
         "lines: small (0.1), medium (0.3) and large (0.5) effects. Grey ticks: the largest r that "
         "these group sizes allow, which differs between measures.",
-        f"Effect sizes r with {percent} intervals. "
-        f"{'; '.join(f'{c.measure.title} {effect_words(effects)}' for c, effects in found)}.",
-        partial(drawn, effects_size(len(found)), draw_effects, found, effects_label(result)),
+        f"Effect sizes r with {percent} intervals. {words}.",
+        partial(drawn, effects_size(len(found)), draw_effects, found, effects_label(shown.result)),
     )
-    without_overlap = [c.measure.title for c, effects in found if effects.method == "Newcombe"]
+    without_overlap = [row["title"] for row in found if row["interval_method"] == "Newcombe"]
     if without_overlap:
         yield paragraph(
             f"{', '.join(without_overlap)}: the two conditions do not overlap, so resampling would "
@@ -227,7 +237,7 @@ def _effects(result: StudyResult) -> Iterator[Block]:
             "independent.",
             "remark",
         )
-    if result.differences:
+    if shown.result.effect_pairs:
         yield paragraph(
             "Does one measure separate the conditions better than another? r cannot answer that, "
             "because the group sizes limit it. The rank-biserial correlation can: it is the share "
@@ -235,7 +245,7 @@ def _effects(result: StudyResult) -> Iterator[Block]:
             "other. Its size is compared here."
         )
     yield from_result(
-        result,
+        shown,
         "effect_differences",
         "Differences between effect sizes (sizes of the rank-biserial correlations)",
         Column("first_title", "Effect size of", "text"),
@@ -248,9 +258,9 @@ def _effects(result: StudyResult) -> Iterator[Block]:
     )
 
 
-def _distributions(result: StudyResult) -> Iterator[Block]:
-    shown = [c for c in result.comparisons if c.measure.origin != "ratings" and c.observations]
-    if not shown:
+def _distributions(shown: Shown) -> Iterator[Block]:
+    found = drawn_values(shown.result)
+    if not found:
         return
     yield paragraph(
         "Each point is an included epoch; the thin line through it is its 95 % interval. The bar "
@@ -258,44 +268,37 @@ def _distributions(result: StudyResult) -> Iterator[Block]:
         "is the estimate from all epochs of the condition together, with its 95 % interval. "
         "J, B and K were estimated together, in the points and in the squares."
     )
-    colours = condition_colours(result.condition_names)
-    for c in shown:
+    colours = condition_colours(shown.condition_names)
+    for v in found:
+        size = distribution_size(len(v.names), pooled=bool(v.pooled))
         yield Figure(
-            f"distribution_{c.measure.name}",
-            f"{c.measure.title}.",
-            f"{c.measure.title}, every included epoch a point. {_values(c)}",
-            partial(
-                drawn,
-                distribution_size(len(c.summaries), pooled=bool(c.pooled)),
-                draw_comparison,
-                c,
-                colours,
-            ),
+            f"distribution_{v.measure.name}",
+            f"{v.measure.title}.",
+            f"{v.measure.title}, every included epoch a point. {_in_words(v)}",
+            partial(drawn, size, draw_values, v, colours),
             "small",
-            marks={
-                f"epochs-{place}": [(o.source, o.epoch) for o in c.of(key)]
-                for place, key in enumerate(c.summaries)
-            },
+            marks={f"epochs-{k}": epoch_keys(v.of(name)) for k, name in enumerate(v.names)},
         )
 
 
-def _values(c: Comparison) -> str:
+def _in_words(v: Values) -> str:
     parts = []
-    for condition, s in c.summaries.items():
+    for condition in v.names:
+        s = summarise(v.of(condition)["value"].to_numpy())
         text = f"{condition_name(condition)}: n = {s.n}"
         if s.n:
             text += f", median {number(s.median)}, quartiles {number(s.q1)} to {number(s.q3)}"
-        if condition in c.pooled:
-            pooled = c.pooled[condition]
-            text += f", all epochs {number(pooled.value)} {interval(pooled.low, pooled.high)}"
+        if condition in v.pooled:
+            value, low, high = v.pooled[condition]
+            text += f", all epochs {number(value)} {interval(low, high)}"
         parts.append(text)
-    return f"{'; '.join(parts)} ({c.measure.unit})."
+    return f"{'; '.join(parts)} ({v.measure.unit})."
 
 
 SECTIONS = part(
     "All tests",
     Section("comparison", "Comparison", _comparison, from_study_folder),
-    Section("results", "Results", _results, lambda result: not from_study_folder(result)),
+    Section("results", "Results", _results, lambda shown: not from_study_folder(shown)),
     Section("effects", "Effect sizes", _effects, from_study_folder),
     Section("distributions", "Every epoch", _distributions),
     Section("results", "All epochs together", _all_epochs, from_study_folder),

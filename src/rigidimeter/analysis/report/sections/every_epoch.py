@@ -8,11 +8,11 @@ from typing import Any
 
 from markupsafe import Markup
 
+from rigidimeter.analysis.recording import split_pooled
 from rigidimeter.analysis.report.contents import Block, Section, from_result, paragraph, part
-from rigidimeter.analysis.report.methods_prose import method_of
+from rigidimeter.analysis.report.methods import method_of
 from rigidimeter.analysis.report.sections.what_was_done import longest_s
-from rigidimeter.analysis.study import StudyResult, split_pooled
-from rigidimeter.analysis.study.drawing import channel_facts
+from rigidimeter.analysis.report.shown import Shown
 from rigidimeter.core.records import AMPLITUDE, PARAMETER_VECTORS, PARAMETERS, Fit
 from rigidimeter.core.units import deg_from_rad
 from rigidimeter.core.words import INTERVAL, Column, Table, number
@@ -74,11 +74,11 @@ def _band(fits: Sequence[Fit]) -> tuple[tuple[Column, ...], str]:
     return (), f", band {number(low_hz, 3)} to {number(high_hz, 3)} Hz"
 
 
-def pooled_table(result: StudyResult, note: str) -> Table:
+def pooled_table(shown: Shown, note: str) -> Table:
     """Return the fits to all epochs of each condition together, and to all of them."""
-    by_condition, overall = split_pooled(result.analysis)
-    band, in_which = _band(result.analysis.pooled)
-    ordered = [name for name in result.condition_names if name in by_condition]
+    by_condition, overall = split_pooled(shown.analysis)
+    band, in_which = _band(shown.analysis.pooled)
+    ordered = [name for name in shown.condition_names if name in by_condition]
     named = [(name, by_condition[name]) for name in ordered] + (
         [(ALL_CONDITIONS, overall)] if overall else []
     )
@@ -103,8 +103,8 @@ def _pooled_row(fit: Fit) -> dict[str, Any]:
     )
 
 
-def _epochs(result: StudyResult) -> Iterator[Block]:
-    analysis = result.analysis
+def _epochs(shown: Shown) -> Iterator[Block]:
+    analysis = shown.analysis
     yield paragraph(
         Markup(
             "In brackets: 95 % intervals. {}. With the inertia fixed, the intervals of B and K do "
@@ -119,7 +119,7 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
     cautions = Column("cautions", "Caution", "reason")
     emg = _ACTIVITY if any(fit.activity for fit in analysis.fits) else ()
     yield from_result(
-        result,
+        shown,
         "estimates",
         f"Inertia, damping and stiffness, epoch by epoch{in_which}",
         *(
@@ -137,10 +137,10 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
         folding=True,
     )
     prefix = "fixed_inertia_"
-    several, value = result.several_subjects, number(analysis.inertia_kg_m2)
+    several, value = shown.result.several_subjects, number(analysis.inertia_kg_m2)
     held = "of the subject" if several else f"{value} kg·m²"
     yield from_result(
-        result,
+        shown,
         "estimates",
         f"Damping and stiffness with the inertia fixed at its median ({held}), epoch by epoch",
         *WHO,
@@ -153,7 +153,7 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
         folding=True,
     )
     yield from_result(
-        result,
+        shown,
         "scores",
         "Scores of the epochs with an imposed sinusoid",
         *WHO,
@@ -174,7 +174,7 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
             Column("duration_s", "Duration (s)"),
             *(
                 [Column("since_change_min", "Since the stimulation changed (min)")]
-                if any(epoch.since_change_min is not None for epoch in result.epochs)
+                if any(epoch.since_change_min is not None for epoch in shown.epochs)
                 else []
             ),
             Column("virtual", "Virtual", "label"),
@@ -182,13 +182,13 @@ def _epochs(result: StudyResult) -> Iterator[Block]:
             Column("reason", "Reason", "reason"),
             Column("channels", "Channels", "reason"),
         ),
-        _recorded(result),
+        _recorded(shown),
         empty="There are no epochs.",
         folding=True,
     )
 
 
-def _recorded(result: StudyResult) -> list[dict[str, Any]]:
+def _recorded(shown: Shown) -> list[dict[str, Any]]:
     return [
         {
             "source": epoch.source,
@@ -202,7 +202,7 @@ def _recorded(result: StudyResult) -> list[dict[str, Any]]:
             "reason": epoch.closed.reason,
             "channels": ", ".join(f"{c.name} at {c.rate_hz:.4g} Hz" for c in channels),
         }
-        for epoch, channels in zip(result.epochs, channel_facts(result), strict=True)
+        for epoch, channels in zip(shown.epochs, shown.channels, strict=True)
     ]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
+from rigidimeter.analysis.figures import draw_ratings, draw_relations, drawn, relation_words
 from rigidimeter.analysis.report.contents import (
     Block,
     Figure,
@@ -13,9 +14,9 @@ from rigidimeter.analysis.report.contents import (
     from_study_folder,
     paragraph,
 )
-from rigidimeter.analysis.report.points import draw_ratings, draw_relations, relation_words
-from rigidimeter.analysis.report.style import drawn
-from rigidimeter.analysis.study import StudyResult, agreement, relations
+from rigidimeter.analysis.report.shown import Shown
+from rigidimeter.analysis.statistics import contrast, interval_of
+from rigidimeter.analysis.study_anew import Ratings, agreement, relations
 from rigidimeter.core.words import (
     INTERVAL,
     SESSION,
@@ -27,28 +28,29 @@ from rigidimeter.core.words import (
 )
 
 
-def _ratings(result: StudyResult) -> Iterator[Block]:
-    found = result.ratings
+def _ratings(shown: Shown) -> Iterator[Block]:
+    found = shown.study.ratings
     if found is None:
         return
+    means = dict(_means(found))
     words = "; ".join(
-        f"{condition_name(m.condition)} {number(m.mean, 3)} {interval(m.low, m.high, 3)}"
-        for m in found.means
+        f"{name} {number(mean, 3)} {interval(low, high, 3)}"
+        for name, (mean, low, high) in means.items()
     )
-    order = [condition_name(name) for name in (*result.condition_names, *found.fit.conditions)]
+    order = [condition_name(name) for name in (*shown.condition_names, *found.fit.conditions)]
     yield Figure(
         "ratings",
         f"All {len(found.rows)} scores: as given (left) and less each examiner’s predicted offset "
         "(right). Equal scores are drawn side by side. Bars: means of the model with 95 % "
         "intervals.",
         f"Examiners' scores as given and corrected. Means of the model: {words}.",
-        partial(drawn, (7.4, 3.3), draw_ratings, found, order, columns=2, sharey=True),
+        partial(drawn, (7.4, 3.3), draw_ratings, found, means, order, columns=2, sharey=True),
     )
     yield paragraph(f"Means of the model with 95 % Kenward–Roger intervals: {words}.")
     yield from_result(
-        result,
+        shown,
         "rating_contrast",
-        f"Contrast of the ratings, {found.other} − {found.reference}",
+        f"Contrast of the ratings, {shown.study.other} − {shown.study.reference}",
         Column("freedom", "Degrees of freedom by", "text"),
         Column("estimate", f"Difference {INTERVAL}", ends=("low", "high")),
         Column("se", "SE"),
@@ -57,7 +59,7 @@ def _ratings(result: StudyResult) -> Iterator[Block]:
         Column("p", "p", "p"),
     )
     yield from_result(
-        result,
+        shown,
         "rating_offsets",
         "Predicted offsets (shrunk toward zero)",
         Column("grouping", "Offset of", "label"),
@@ -69,7 +71,7 @@ def _ratings(result: StudyResult) -> Iterator[Block]:
     for text in (*found.notices, *found.model_notices):
         yield paragraph(f"{text}.", "remark")
     yield from_result(
-        result,
+        shown,
         "ratings",
         "Ratings as given, and less the offsets",
         *SESSION,
@@ -80,11 +82,20 @@ def _ratings(result: StudyResult) -> Iterator[Block]:
     )
 
 
-def _relation(result: StudyResult) -> Iterator[Block]:
-    found = relations(result)
-    if not found or result.ratings is None:
+def _means(found: Ratings) -> Iterator[tuple[str, tuple[float, float, float]]]:
+    """Yield the mean of each condition in the model, with its interval."""
+    names = found.fit.conditions
+    for name in names:
+        one = contrast(found.fit, [float(each == name) for each in names])
+        low, high = interval_of(one.estimate, one.se_kenward_roger, one.df_kenward_roger)
+        yield condition_name(name), (one.estimate, low, high)
+
+
+def _relation(shown: Shown) -> Iterator[Block]:
+    found = relations(shown.study.rows)
+    if not found or shown.study.ratings is None:
         return
-    order = [condition_name(name) for name in result.condition_names]
+    order = [condition_name(name) for name in shown.condition_names]
     words = "; ".join(f"{one.measure.title} {relation_words(one)}" for one in found)
     yield Figure(
         "rating_relation",
@@ -94,7 +105,7 @@ def _relation(result: StudyResult) -> Iterator[Block]:
         partial(drawn, (7.4, 2.9), draw_relations, found, order, columns=len(found), sharey=True),
     )
     yield from_result(
-        result,
+        shown,
         "rating_relation",
         "Rank correlation of the ratings with what was measured",
         Column("title", "Measure", "text", below="unit"),
@@ -109,7 +120,7 @@ def _relation(result: StudyResult) -> Iterator[Block]:
         note="Over all: ratings and measures may go together because the conditions change both. "
         "Within conditions: only what differs between days of one condition counts.",
     )
-    agree = agreement(result.ratings)
+    agree = agreement(shown.study.ratings)
     if agree.pairs:
         share = 100 * agree.equal / agree.pairs
         yield paragraph(

@@ -7,21 +7,27 @@ from functools import partial
 
 from markupsafe import Markup
 
+from rigidimeter.analysis.figures import (
+    day_groups,
+    day_rows,
+    draw_days,
+    drawn,
+    longest_day,
+    values_of,
+)
 from rigidimeter.analysis.report.contents import (
     Block,
     Figure,
     Section,
     bullets,
-    from_result,
     from_study_folder,
     paragraph,
     part,
 )
-from rigidimeter.analysis.report.points import day_groups, day_rows, draw_days, longest_day
-from rigidimeter.analysis.report.style import drawn
-from rigidimeter.analysis.study import StudyResult, result_table, traffic_light
+from rigidimeter.analysis.report.shown import Shown
+from rigidimeter.analysis.study_anew import Rows, measures_of, result_table, traffic_light
 from rigidimeter.core.findings import Finding
-from rigidimeter.core.records import FindingGroup, Fit, notes_text
+from rigidimeter.core.records import Analysis, FindingGroup, Fit, notes_text
 from rigidimeter.core.words import (
     Column,
     Kind,
@@ -55,52 +61,57 @@ _STIMULATION: tuple[tuple[str, str, Kind], ...] = (
 )
 
 
-def _numbers(result: StudyResult) -> Iterator[Block]:
+def _numbers(shown: Shown) -> Iterator[Block]:
     """Yield the numbers of the first screen as files."""
     for name, title in (
         ("conclusion", "What is concluded of each measure"),
         ("precision", "Precision of each measure"),
     ):
-        if rows := result_table(result, name):
+        if rows := result_table(shown.result, name):
             yield Table(name, title, (), rows)
-    light = traffic_light(result)
+    light = traffic_light(shown.study, shown.result.comparisons)
     if light is not None:
-        yield Table("quality", "Quality of the data", (), [light.row()])
+        yield Table("quality", "Quality of the data", (), [light])
 
 
-def _days(result: StudyResult) -> Iterator[Block]:
-    yield from_result(result, "days", "Medians of the days")
-    shown = sorted((c for c in result.comparisons if c.day_medians), key=lambda c: c.measure.place)
-    if not shown:
+def _days(shown: Shown) -> Iterator[Block]:
+    result = shown.result
+    medians = result_table(result, "days")
+    yield Table("days", "Medians of the days", (), medians)
+    if not medians:
         return
     yield paragraph(
         "Each small point is an included epoch. Beside the points of a day are their median and, "
         "as a bar, their quartiles; a line joins the medians of a day that has both conditions."
     )
-    order = [condition_name(name) for name in result.condition_names]
-    for c in shown:
+    order = [condition_name(name) for name in shown.condition_names]
+    for measure in sorted(measures_of(result.study.rows), key=lambda one: one.place):
+        own = [row for row in medians if row["measure"] == measure.name]
+        if not own:
+            continue
         words = "; ".join(
-            f"{m.subject} day {m.day} {condition_name(m.condition)}: median {number(m.median)}, "
-            f"n = {m.n}"
-            for m in c.day_medians
+            f"{row['subject']} day {row['day']} {condition_name(row['condition'])}: median "
+            f"{number(row['median'])}, n = {row['n']}"
+            for row in own
         )
-        groups = day_groups(c)
+        values = values_of(result, measure)
+        groups = day_groups(values)
         count = sum(map(len, groups.values()))
-        n_days = len({(m.subject, m.day) for m in c.day_medians})
-        rows = len(day_rows(c))
-        size = DAYS_WIDTH, 0.35 + (2.1 + 0.5 * (longest_day(c) > 3)) * rows
+        n_days = len({(row["subject"], row["day"]) for row in own})
+        rows = len(day_rows(values))
+        size = DAYS_WIDTH, 0.35 + (2.1 + 0.5 * (longest_day(values) > 3)) * rows
         yield Figure(
-            f"days_{c.measure.name}",
-            f"{c.measure.title}: {plural(count, 'included epoch')} of {plural(n_days, 'day')}.",
-            f"{c.measure.title} by day. {words} ({c.measure.unit}).",
-            partial(drawn, size, draw_days, c, order, rows=rows, sharey=True),
+            f"days_{measure.name}",
+            f"{measure.title}: {plural(count, 'included epoch')} of {plural(n_days, 'day')}.",
+            f"{measure.title} by day. {words} ({measure.unit}).",
+            partial(drawn, size, draw_days, values, order, rows=rows, sharey=True),
             "page",
             marks=groups,
         )
 
 
-def _findings(result: StudyResult) -> Iterator[Block]:
-    groups, n_fitted = result.analysis.findings, len(result.analysis.fits)
+def _findings(shown: Shown) -> Iterator[Block]:
+    groups, n_fitted = shown.analysis.findings, len(shown.analysis.fits)
     if groups:
         yield paragraph(
             Markup(
@@ -112,9 +123,9 @@ def _findings(result: StudyResult) -> Iterator[Block]:
         )
     else:
         yield paragraph("The checks found nothing." if n_fitted else "No epoch was fitted.")
-    shown = [group for group in result.findings if not group.finding.harmless]
-    yield from map(_unfolding, shown)
-    if quiet := [group for group in result.findings if group.finding.harmless]:
+    found = shown.result.findings
+    yield from (_unfolding(group) for group in found if not group.finding.harmless)
+    if quiet := [group for group in found if group.finding.harmless]:
         inner = Markup("\n").join(map(_unfolding, quiet))
         text = notes_text(group.finding.name for group in quiet)
         yield QUIET.format(text) + inner + Markup("\n</details>")
@@ -141,7 +152,7 @@ def _findings(result: StudyResult) -> Iterator[Block]:
             for i, name in enumerate("JBK")
         }
         | finding.words._asdict()
-        for fit, finding in _of_fits(result)
+        for fit, finding in _of_fits(shown.analysis)
     ]
     yield Table("findings", "Findings, epoch by epoch", (), rows)
 
@@ -154,21 +165,20 @@ def _unfolding(group: FindingGroup) -> Markup:
     return UNFOLDING.format(**shown, details=one.details, todo=todo)
 
 
-def _of_fits(result: StudyResult) -> list[tuple[Fit, Finding]]:
+def _of_fits(analysis: Analysis) -> list[tuple[Fit, Finding]]:
     """Return every finding of an epoch, and of epochs together what no epoch carries."""
-    fits, pooled = result.analysis.fits, result.analysis.pooled
-    found = [(fit, finding) for fit in fits for finding in fit.findings]
+    found = [(fit, finding) for fit in analysis.fits for finding in fit.findings]
     carried = {finding for _, finding in found}
-    together = [(fit, finding) for fit in pooled for finding in fit.findings]
+    together = [(fit, finding) for fit in analysis.pooled for finding in fit.findings]
     return found + [(fit, finding) for fit, finding in together if finding not in carried]
 
 
-def _overview(result: StudyResult) -> Iterator[Block]:
+def _overview(shown: Shown) -> Iterator[Block]:
+    rows = result_table(shown.result, "conditions")
     items = Markup("\n").join(
-        Markup("<dt>{}</dt><dd>{}</dd>").format(name, value) for name, value in _facts(result)
+        Markup("<dt>{}</dt><dd>{}</dd>").format(name, value) for name, value in _facts(shown, rows)
     )
     yield Markup('<dl class="facts">\n{}\n</dl>').format(items)
-    rows = result_table(result, "conditions")
     known = [row for row in _STIMULATION if any(cells[row[0]] not in (None, "") for cells in rows)]
     yield Table(
         "conditions",
@@ -183,27 +193,28 @@ def _overview(result: StudyResult) -> Iterator[Block]:
     )
 
 
-def _facts(result: StudyResult) -> Iterator[tuple[str, str]]:
-    subjects = list(dict.fromkeys(s.subject for s in result.sessions))
-    days = {(s.subject, s.day) for s in result.sessions}
-    counts = {row["name"]: row["days"] for row in result_table(result, "conditions")}
+def _facts(shown: Shown, conditions: Rows) -> Iterator[tuple[str, str]]:
+    study, n_epochs = shown.study, len(shown.epochs)
+    subjects = list(dict.fromkeys(s.subject for s in study.sessions))
+    days = {(s.subject, s.day) for s in study.sessions}
+    counts = {row["name"]: row["days"] for row in conditions}
     both = sum(counts.values()) - len(days)
     split = series([f"{count} in {condition_name(name)}" for name, count in counts.items()])
     named = f": {', '.join(subjects)}" if any(subjects) and len(subjects) <= 24 else ""
-    partly = ", some of it virtual" if any(e.virtual for e in result.epochs) else ""
+    partly = ", some of it virtual" if study.partly_virtual else ""
     blinded = "blinded: conditions are codes, and no key was given"
     virtual = "virtual: every session was recorded on the virtual rig"
     yield "Subjects", f"{len(subjects)}{named}"
     yield "Days", f"{len(days)}: {split}" + (f", {both} in both" if both > 0 else "")
-    yield "Sessions", f"{len(result.sessions)}, with {plural(len(result.epochs), 'epoch')}"
-    yield "Blinding", blinded if result.blinded else "not blinded"
-    yield "Data", virtual if result.virtual else f"recorded{partly}"
+    yield "Sessions", f"{len(study.sessions)}, with {plural(n_epochs, 'epoch')}"
+    yield "Blinding", blinded if study.blinded else "not blinded"
+    yield "Data", virtual if study.virtual else f"recorded{partly}"
 
 
-def _changes(result: StudyResult) -> Iterator[Block]:
-    yield Table("changes", "Changes", (), [{"change": text} for text in result.changes])
-    if result.changes:
-        yield bullets(result.changes)
+def _changes(shown: Shown) -> Iterator[Block]:
+    yield Table("changes", "Changes", (), [{"change": text} for text in shown.changes])
+    if shown.changes:
+        yield bullets(shown.changes)
 
 
 SECTIONS = part(

@@ -10,38 +10,42 @@ import numpy as np
 from markupsafe import Markup
 
 from rigidimeter.analysis.estimation import Signals, epoch_signals, scoring_cycles
-from rigidimeter.analysis.report.contents import Block, Figure, Section, named, paragraph, part
-from rigidimeter.analysis.report.curves import (
+from rigidimeter.analysis.figures import (
     TORQUE_HEIGHTS,
     TORQUE_SIZE,
     WINDOW_S,
+    Look,
+    condition_colours,
     draw_impedance,
     draw_loops,
     draw_torque,
     draw_unexplained,
+    drawn,
     origin_s,
     torque_limit_nm,
 )
-from rigidimeter.analysis.report.methods_prose import method_of
-from rigidimeter.analysis.report.style import Look, condition_colours, drawn
-from rigidimeter.analysis.study import StudyResult, split_pooled
-from rigidimeter.analysis.study.examples import (
+from rigidimeter.analysis.recording import split_pooled
+from rigidimeter.analysis.report.contents import Block, Figure, Section, named, paragraph, part
+from rigidimeter.analysis.report.methods import method_of
+from rigidimeter.analysis.report.shown import Shown
+from rigidimeter.analysis.traces import (
     analysed_epoch,
     representative_fits,
     representative_scores,
+    responses,
+    unexplained_spectra,
 )
-from rigidimeter.analysis.study.over_frequency import responses, unexplained_spectra
 from rigidimeter.core.records import Fit
 from rigidimeter.core.words import amount, condition_name, number
 from rigidimeter.model import JointDynamics
 
 
-def _torque(result: StudyResult) -> Iterator[Block]:
-    colours = condition_colours(result.condition_names)
+def _torque(shown: Shown) -> Iterator[Block]:
+    colours = condition_colours(shown.condition_names)
     found = [
-        (fit, epoch, epoch_signals(epoch, result.settings, fit.method))
-        for fit in representative_fits(result)
-        if (epoch := analysed_epoch(result, fit)) is not None
+        (fit, epoch, epoch_signals(epoch, shown.study.settings, fit.method))
+        for fit in representative_fits(shown.analysis, shown.condition_names)
+        if (epoch := analysed_epoch(shown.as_analysed, fit)) is not None
     ]
     if not found:
         return
@@ -50,7 +54,7 @@ def _torque(result: StudyResult) -> Iterator[Block]:
         "damping and stiffness show, in grey, what is left for that term to explain: the measured "
         "torque less the other two terms. These panels have the same axis in all conditions."
     )
-    if method_of(result.analysis.method).uses_perturbation:
+    if method_of(shown.analysis.method).uses_perturbation:
         text += (
             " The estimate ignores torque that does not follow the perturbation. What the model "
             "leaves here is noise and torque not from the robot, so a low VAF does not "
@@ -63,15 +67,15 @@ def _torque(result: StudyResult) -> Iterator[Block]:
         name = condition_name(fit.condition)
         stiffness = amount(fit.stiffness_nm_rad, "N·m/rad", 3)
         vaf = f"{number(fit.vaf_percent)} %"
-        shown = signals, fit, colours[fit.condition], origin_s(epoch), limit_nm
+        drawing = signals, fit, colours[fit.condition], origin_s(epoch), limit_nm
         yield Figure(
             f"torque_{position}_{_file_name(fit.condition)}",
-            f"{name}: {named(result, fit)}, the included epoch with the median stiffness "
+            f"{name}: {named(shown, fit)}, the included epoch with the median stiffness "
             f"({stiffness}); its first {WINDOW_S:g} s in the band {_hz(signals.band_hz)}"
             f"{_fitted_elsewhere(signals, fit)}.",
-            f"{name}: measured and modelled torque of {named(result, fit)}, what the model leaves, "
+            f"{name}: measured and modelled torque of {named(shown, fit)}, what the model leaves, "
             f"and the terms of inertia, damping and stiffness. K {stiffness}, VAF {vaf}.",
-            partial(drawn, TORQUE_SIZE, draw_torque, *shown, rows=5, **below),
+            partial(drawn, TORQUE_SIZE, draw_torque, *drawing, rows=5, **below),
             "tall",
         )
 
@@ -92,10 +96,11 @@ def _fitted_elsewhere(signals: Signals, fit: Fit) -> str:
     return f"; fit and VAF use the band {_hz(fit.band_hz)}"
 
 
-def _impedance(result: StudyResult) -> Iterator[Block]:
-    shown = {condition_name(key): response for key, response in responses(result).items()}
-    if not shown:
+def _impedance(shown: Shown) -> Iterator[Block]:
+    found = responses(shown.analysis, shown.condition_names, shown.as_analysed)
+    if not found:
         return
+    measured = {condition_name(key): response for key, response in found.items()}
     yield paragraph(
         Markup(
             "Torque over angle at the frequencies of the perturbation, without any model, averaged "
@@ -108,8 +113,8 @@ def _impedance(result: StudyResult) -> Iterator[Block]:
             "0.99, a third at 0.9."
         )
     )
-    colours = condition_colours(map(condition_name, result.condition_names))
-    fits, _ = split_pooled(result.analysis)
+    colours = condition_colours(map(condition_name, shown.condition_names))
+    fits, _ = split_pooled(shown.analysis)
     joints = {
         condition_name(key): JointDynamics(*fit.value)
         for key, fit in fits.items()
@@ -117,15 +122,15 @@ def _impedance(result: StudyResult) -> Iterator[Block]:
     }
     counts = "; ".join(
         f"{name}: {response.observed} of {response.included} included epochs"
-        for name, response in shown.items()
+        for name, response in measured.items()
     )
     medians = "; ".join(
         f"{name} {number(float(np.median(response.coherence)), 3)}"
-        for name, response in shown.items()
+        for name, response in measured.items()
     )
-    drawing = shown, colours, joints
+    drawing = measured, colours, joints
     below: Look = {"sharex": True, "height_ratios": (1.5, 1.1, 0.8)}
-    lines_hz = next(iter(shown.values())).frequency_hz
+    lines_hz = next(iter(measured.values())).frequency_hz
     yield Figure(
         "impedance",
         f"{counts}. Median coherence: {medians}.",
@@ -138,8 +143,8 @@ def _impedance(result: StudyResult) -> Iterator[Block]:
     )
 
 
-def _unexplained(result: StudyResult) -> Iterator[Block]:
-    spectra = unexplained_spectra(result)
+def _unexplained(shown: Shown) -> Iterator[Block]:
+    spectra = unexplained_spectra(shown.analysis, shown.as_analysed)
     if not spectra:
         return
     text = Markup(
@@ -148,12 +153,12 @@ def _unexplained(result: StudyResult) -> Iterator[Block]:
         "sensor noise, and whatever the model lacks. Voluntary movement is below 4 Hz; a tremor is "
         "a peak."
     )
-    if not method_of(result.analysis.method).by_noise:
+    if not method_of(shown.analysis.method).by_noise:
         text += " Least squares makes this torque as small as it can, and so hides part of it."
     yield paragraph(text)
     sizes_nm = {
         key: own
-        for key in result.condition_names
+        for key in shown.condition_names
         if (own := [one.sd_nm for one in spectra if one.condition == key])
     }
     labels = {
@@ -166,7 +171,7 @@ def _unexplained(result: StudyResult) -> Iterator[Block]:
         for key, own in sizes_nm.items()
     )
     band_hz = max(one.band_hz[0] for one in spectra), min(one.band_hz[1] for one in spectra)
-    colours = condition_colours(result.condition_names)
+    colours = condition_colours(shown.condition_names)
     yield Figure(
         "voluntary_spectrum",
         "Thin: every included epoch. Thick: the mean of each condition. SD of the epochs, in N·m: "
@@ -177,12 +182,12 @@ def _unexplained(result: StudyResult) -> Iterator[Block]:
     )
 
 
-def _loops(result: StudyResult) -> Iterator[Block]:
-    colours = condition_colours(result.condition_names)
+def _loops(shown: Shown) -> Iterator[Block]:
+    colours = condition_colours(shown.condition_names)
     found = [
-        (score, scoring_cycles(epoch, result.settings.scores))
-        for score in representative_scores(result)
-        if (epoch := analysed_epoch(result, score)) is not None
+        (score, scoring_cycles(epoch, shown.study.settings.scores))
+        for score in representative_scores(shown.analysis, shown.condition_names)
+        if (epoch := analysed_epoch(shown.as_analysed, score)) is not None
     ]
     if not found:
         return
@@ -195,11 +200,11 @@ def _loops(result: StudyResult) -> Iterator[Block]:
         for score, _ in found
     ]
     epochs = "; ".join(
-        f"{condition_name(score.condition)}: {named(result, score)}, {cycles.n_cycles} cycles at "
+        f"{condition_name(score.condition)}: {named(shown, score)}, {cycles.n_cycles} cycles at "
         f"{number(cycles.frequency_hz, 3)} Hz"
         for score, cycles in found
     )
-    shown = [
+    drawing = [
         (words, cycles, colours[score.condition])
         for words, (score, cycles) in zip(works, found, strict=True)
     ]
@@ -207,7 +212,7 @@ def _loops(result: StudyResult) -> Iterator[Block]:
         "loops",
         f"The included epochs with the median work. {epochs}.",
         f"Torque against angle. {'; '.join(works)}. {epochs}.",
-        partial(drawn, (5.2, 3.6), draw_loops, shown),
+        partial(drawn, (5.2, 3.6), draw_loops, drawing),
     )
 
 

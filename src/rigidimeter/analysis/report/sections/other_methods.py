@@ -8,6 +8,17 @@ from functools import partial
 
 import numpy as np
 
+from rigidimeter.analysis.figures import (
+    band_label,
+    band_percent,
+    by_measure,
+    draw_bands,
+    draw_methods,
+    drawn,
+    methods_in,
+    shift,
+)
+from rigidimeter.analysis.recording import split_pooled
 from rigidimeter.analysis.report.contents import (
     Block,
     Figure,
@@ -17,47 +28,42 @@ from rigidimeter.analysis.report.contents import (
     paragraph,
     part,
 )
-from rigidimeter.analysis.report.interval_rows import (
-    band_label,
-    band_percent,
-    by_measure,
-    draw_bands,
-    draw_methods,
-    methods_in,
-)
-from rigidimeter.analysis.report.style import drawn
-from rigidimeter.analysis.study import StudyResult, method_caveats, result_table, split_pooled
+from rigidimeter.analysis.report.shown import Shown
+from rigidimeter.analysis.study_anew import method_caveats, result_table
 from rigidimeter.core.records import PARAMETERS
 from rigidimeter.core.words import INTERVAL, TURNED, Column, Table, condition_name, interval, number
 
 MOST_BESIDE = 3
 
 
-def _methods(result: StudyResult) -> Iterator[Block]:
-    found = result.sensitivity
+def _methods(shown: Shown) -> Iterator[Block]:
+    found = result_table(shown.result, "sensitivity")
     if not found:
         return
-    reference, other = condition_name(result.reference), condition_name(result.other)
-    words = "; ".join(
-        f"{row.measure.title}, {row.method}, J {row.inertia}: {number(-row.shift, 3)} "
-        f"{interval(-row.shift_high, -row.shift_low, 3)} {row.measure.unit}"
-        for row in found
-    )
+    reference, other = map(condition_name, shown.study.pair)
+    words = []
+    for row in found:
+        of, (estimate, low, high) = row["title"], shift(row)
+        words.append(
+            f"{of}, {row['method']}, J {row['inertia']}: {number(estimate, 3)} "
+            f"{interval(low, high, 3)} {row['unit']}"
+        )
     across = min(len(by_measure(found)), MOST_BESIDE)
     rows = math.ceil(len(by_measure(found)) / across)
     size = 7.4, 0.5 + (1.0 + 0.26 * len(methods_in(found))) * rows
-    shown = found, f"Shift, {other} − {reference}"
+    drawing = found, f"Shift, {other} − {reference}"
     yield Figure(
         "sensitivity",
         "The Hodges–Lehmann shift with its interval by each method, in the unit above the "
         "panel. At the top, black: the method of this report. Open circles: J estimated in each "
         "epoch; filled squares: J held at its median, as in the second stage of the paper.",
-        f"Shifts by method. {words}.",
-        partial(drawn, size, draw_methods, *shown, rows=rows, columns=across, sharey=True),
+        f"Shifts by method. {'; '.join(words)}.",
+        partial(drawn, size, draw_methods, *drawing, rows=rows, columns=across, sharey=True),
         "tall",
     )
-    titles = {row.measure.name: row.measure.title for row in found}
-    caveats = [f"{titles[name]}: {text}." for name, text in method_caveats(found).items() if text]
+    titles = {row["measure"]: row["title"] for row in found}
+    of_each = method_caveats(shown.result.methods).items()
+    caveats = [f"{titles[name]}: {text}." for name, text in of_each if text]
     if caveats:
         yield bullets(caveats)
         yield paragraph(
@@ -76,7 +82,6 @@ def _methods(result: StudyResult) -> Iterator[Block]:
         Column("p_day", "p, days", "p"),
         Column("chosen", "Used here", "label"),
     )
-    every = result_table(result, "sensitivity")
     for inertia, title in (
         ("free", f"The shift by each method, {other} − {reference}"),
         (
@@ -84,15 +89,14 @@ def _methods(result: StudyResult) -> Iterator[Block]:
             f"The shift with J held at its median, {other} − {reference}: the paper’s second stage",
         ),
     ):
-        yield Table(
-            "sensitivity", title, columns, [row for row in every if row["inertia"] == inertia]
-        )
-    yield Table("sensitivity", "The shift by each method", (), every)
+        of_stage = [row for row in found if row["inertia"] == inertia]
+        yield Table("sensitivity", title, columns, of_stage)
+    yield Table("sensitivity", "The shift by each method", (), found)
 
 
-def _bands(result: StudyResult) -> Iterator[Block]:
-    found = result.analysis.sensitivity
-    of_conditions, _ = split_pooled(result.analysis)
+def _bands(shown: Shown) -> Iterator[Block]:
+    found = shown.analysis.sensitivity
+    of_conditions, _ = split_pooled(shown.analysis)
     half = {
         name: 50 * (fit.high - fit.low) / np.abs(fit.value) for name, fit in of_conditions.items()
     }
@@ -136,7 +140,7 @@ SECTIONS = part(
     "Sensitivity",
     Section("sensitivity", "Other methods", _methods, from_study_folder),
     Section(
-        "band_sensitivity", "Other bands", _bands, lambda result: bool(result.analysis.sensitivity)
+        "band_sensitivity", "Other bands", _bands, lambda shown: bool(shown.analysis.sensitivity)
     ),
     printed=1,
 )

@@ -8,47 +8,49 @@ from typing import Any
 
 from markupsafe import Markup
 
+from rigidimeter.analysis.figures import (
+    CHANNELS,
+    WINDOW_S,
+    draw_recorded,
+    drawn,
+    origin_s,
+    recorded_size,
+    shown_channels,
+)
 from rigidimeter.analysis.report.contents import (
     Block,
     Figure,
     Section,
+    deviations_in_words,
     from_result,
     from_study_folder,
     named,
     paragraph,
     part,
 )
-from rigidimeter.analysis.report.curves import (
-    CHANNELS,
-    WINDOW_S,
-    draw_recorded,
-    origin_s,
-    recorded_size,
-    shown_channels,
-)
-from rigidimeter.analysis.report.methods_prose import method_of
+from rigidimeter.analysis.report.methods import method_of
 from rigidimeter.analysis.report.sections.every_epoch import HOW, WHO
-from rigidimeter.analysis.report.style import drawn
-from rigidimeter.analysis.study import StudyResult, deviation_words, result_table
-from rigidimeter.analysis.study.examples import analysed_epoch, representative_fits
+from rigidimeter.analysis.report.shown import Shown
+from rigidimeter.analysis.study_anew import result_table
+from rigidimeter.analysis.traces import analysed_epoch, representative_fits
 from rigidimeter.core.records import Delay, Fit, Score
 from rigidimeter.core.words import SESSION, Column, Table, condition_name, plural, series
 
 BY = ("protocol", "check", "estimate", "operator")
 
 
-def _notices(result: StudyResult) -> Iterator[Block]:
+def _notices(shown: Shown) -> Iterator[Block]:
     yield Table(
         "notices",
         "Messages while reading and analysing",
         (Column("level", "Level", "outcome"), Column("text", "Message", "reason")),
-        [{"level": notice.level, "text": notice.text} for notice in result.notices],
+        [{"level": notice.level, "text": notice.text} for notice in shown.result.notices],
         empty="None.",
     )
 
 
-def _estimation(result: StudyResult) -> Iterator[Block]:
-    analysis = result.analysis
+def _estimation(shown: Shown) -> Iterator[Block]:
+    analysis = shown.analysis
     chosen = (
         f"Chosen automatically: {analysis.method_reason}."
         if analysis.method_reason
@@ -88,22 +90,22 @@ def _done(delay: Delay) -> str:
     return f"{moved}; {delay.remark}" if delay.remark else moved
 
 
-def _exclusions(result: StudyResult) -> Iterator[Block]:
+def _exclusions(shown: Shown) -> Iterator[Block]:
     """Yield whatever is excluded or failed, once for each reason; of a study as a file only."""
     columns = (*WHO, Column("stage", "Stage", "text"), *HOW)
     yield Table(
         "exclusions",
         "Excluded epochs by stage of the analysis",
-        () if from_study_folder(result) else columns,
-        _by_stage(result),
-        empty="" if from_study_folder(result) else "No epoch was excluded.",
+        () if from_study_folder(shown) else columns,
+        _by_stage(shown),
+        empty="" if from_study_folder(shown) else "No epoch was excluded.",
         folding=True,
     )
 
 
-def _by_stage(result: StudyResult) -> list[dict[str, Any]]:
+def _by_stage(shown: Shown) -> list[dict[str, Any]]:
     """Return what each stage excluded, and the epochs from which nothing was estimated."""
-    analysis = result.analysis
+    analysis = shown.analysis
     stages: dict[str, Sequence[Fit | Score]] = {
         "fit": analysis.fits,
         "fit at fixed inertia": analysis.fixed_inertia,
@@ -117,7 +119,7 @@ def _by_stage(result: StudyResult) -> list[dict[str, Any]]:
             analysed.add(who[:2])
             if not one.outcome.included:
                 first.setdefault((who, one.outcome.kind, one.outcome.reason), stage)
-    for epoch in result.epochs:
+    for epoch in shown.epochs:
         who = (epoch.source, epoch.label, epoch.condition)
         if who[:2] not in analysed:
             reason = epoch.closed.reason or "nothing was estimated from it"
@@ -129,9 +131,9 @@ def _by_stage(result: StudyResult) -> list[dict[str, Any]]:
     ]
 
 
-def _study_exclusions(result: StudyResult) -> Iterator[Block]:
+def _study_exclusions(shown: Shown) -> Iterator[Block]:
     yield from_result(
-        result,
+        shown,
         "account",
         "All recorded epochs",
         Column("task", "Task", "check"),
@@ -141,7 +143,7 @@ def _study_exclusions(result: StudyResult) -> Iterator[Block]:
         *(Column(f"by_{by}", f"Excluded by {by}", "count") for by in BY),
         Column("unlisted", "Not accounted for", "count"),
     )
-    unlisted = sum(row["unlisted"] for row in result_table(result, "account"))
+    unlisted = sum(row["unlisted"] for row in result_table(shown.result, "account"))
     if unlisted:
         yield paragraph(
             Markup(
@@ -150,9 +152,9 @@ def _study_exclusions(result: StudyResult) -> Iterator[Block]:
             ).format(plural(unlisted, "recorded epoch"), "is" if unlisted == 1 else "are"),
             "banner",
         )
-    named = any(e.who for e in result.exclusions)
+    named = any(e.who for e in shown.study.exclusions)
     yield from_result(
-        result,
+        shown,
         "excluded_epochs",
         "Excluded epochs: by whom and why",
         *SESSION,
@@ -166,23 +168,23 @@ def _study_exclusions(result: StudyResult) -> Iterator[Block]:
         folding=True,
     )
     yield from_result(
-        result,
+        shown,
         "left_out",
         "Recordings left out completely",
         Column("path", "Path", "text"),
         *SESSION,
         Column("reason", "Reason", "reason"),
     )
-    yield from _exclusions(result)
-    yield from _plan(result)
+    yield from _exclusions(shown)
+    yield from _plan(shown)
 
 
-def _plan(result: StudyResult) -> Iterator[Block]:
+def _plan(shown: Shown) -> Iterator[Block]:
     """Yield where the study was not carried out as planned."""
-    if words := deviation_words(result):
+    if words := deviations_in_words(shown):
         yield paragraph(words)
     yield from_result(
-        result,
+        shown,
         "deviations",
         "Deviations from the plan",
         *SESSION,
@@ -193,38 +195,38 @@ def _plan(result: StudyResult) -> Iterator[Block]:
     )
 
 
-def _recorded(result: StudyResult) -> Iterator[Block]:
-    for fit in representative_fits(result):
-        epoch = analysed_epoch(result, fit)
+def _recorded(shown: Shown) -> Iterator[Block]:
+    for fit in representative_fits(shown.analysis, shown.condition_names):
+        epoch = analysed_epoch(shown.as_analysed, fit)
         if epoch is None:
             continue
-        shown = shown_channels(epoch)
-        names = series([CHANNELS[name][0] for name in shown])
+        channels = shown_channels(epoch)
+        names = series([CHANNELS[name][0] for name in channels])
         names = names[:1].upper() + names[1:]
-        which = f"{condition_name(fit.condition)}, {named(result, fit)}"
+        which = f"{condition_name(fit.condition)}, {named(shown, fit)}"
         yield Figure(
             "recorded",
             f"{names} as recorded, not filtered; the first {WINDOW_S:g} s of {which}.",
             f"{names} over the first {WINDOW_S:g} s of {which}.",
             partial(
                 drawn,
-                recorded_size(len(shown)),
+                recorded_size(len(channels)),
                 draw_recorded,
-                shown,
+                channels,
                 origin_s(epoch),
-                rows=len(shown),
+                rows=len(channels),
                 sharex=True,
             ),
         )
         return
 
 
-def _provenance(result: StudyResult) -> Iterator[Block]:
+def _provenance(shown: Shown) -> Iterator[Block]:
     yield Table(
         "provenance",
         "Software, settings and files",
         (Column("key", "What", "text"), Column("value", "Value", "reason")),
-        [{"key": key, "value": value} for key, value in result.provenance.items()],
+        [{"key": key, "value": value} for key, value in shown.provenance.items()],
         empty="Not recorded.",
     )
 
@@ -238,7 +240,7 @@ RIG = part(
 EPOCHS = part(
     "Epoch quality",
     Section("exclusions", "Exclusions", _study_exclusions, from_study_folder),
-    Section("exclusions", "Exclusions", _exclusions, lambda result: not from_study_folder(result)),
+    Section("exclusions", "Exclusions", _exclusions, lambda shown: not from_study_folder(shown)),
     Section("recorded", "As recorded", _recorded),
     printed=1,
 )

@@ -12,6 +12,13 @@ import numpy as np
 from markupsafe import Markup
 from pydantic import BaseModel
 
+from rigidimeter.analysis.figures import (
+    EXCITATION_HEIGHTS,
+    EXCITATION_SIZE,
+    draw_excitation,
+    drawn,
+    origin_s,
+)
 from rigidimeter.analysis.report.contents import (
     Block,
     Figure,
@@ -22,18 +29,9 @@ from rigidimeter.analysis.report.contents import (
     paragraph,
     part,
 )
-from rigidimeter.analysis.report.curves import (
-    EXCITATION_HEIGHTS,
-    EXCITATION_SIZE,
-    draw_excitation,
-    origin_s,
-)
-from rigidimeter.analysis.report.methods_prose import methods_prose
-from rigidimeter.analysis.report.style import drawn
-from rigidimeter.analysis.study import StudyResult
-from rigidimeter.analysis.study.drawing import channel_facts
-from rigidimeter.analysis.study.drawn_signals import ChannelFacts
-from rigidimeter.analysis.study.examples import perturbed_epoch
+from rigidimeter.analysis.report.methods import methods_prose
+from rigidimeter.analysis.report.shown import Shown
+from rigidimeter.analysis.traces import ChannelFacts, perturbed_epoch
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.units import rad_from_deg
 from rigidimeter.core.words import (
@@ -56,8 +54,8 @@ def longest_s(channels: Iterable[ChannelFacts]) -> float:
     return max((c.span_s for c in channels if math.isfinite(c.span_s)), default=math.nan)
 
 
-def _methods(result: StudyResult) -> Iterator[Block]:
-    prose = methods_prose(result)
+def _methods(shown: Shown) -> Iterator[Block]:
+    prose = methods_prose(shown)
     yield paragraph(
         Markup(
             "Made from the recordings, settings and tests of this study; also in "
@@ -72,11 +70,11 @@ def _methods(result: StudyResult) -> Iterator[Block]:
     yield Markup('<div class="copy">\n{}\n</div>').format(Markup("\n").join(lines))
 
 
-def _about(result: StudyResult) -> Iterator[Block]:
+def _about(shown: Shown) -> Iterator[Block]:
     median = (
         "the median of the same subject"
-        if result.several_subjects
-        else f"the median ({number(result.analysis.inertia_kg_m2)} kg·m²)"
+        if shown.result.several_subjects
+        else f"the median ({number(shown.analysis.inertia_kg_m2)} kg·m²)"
     )
     yield paragraph(
         Markup(
@@ -97,11 +95,11 @@ def _about(result: StudyResult) -> Iterator[Block]:
     )
 
 
-def _design(result: StudyResult) -> Iterator[Block]:
-    if result.sessions:
-        coded = any(s.code != s.condition for s in result.sessions)
+def _design(shown: Shown) -> Iterator[Block]:
+    if sessions := shown.study.sessions:
+        coded = any(s.code != s.condition for s in sessions)
         yield from_result(
-            result,
+            shown,
             "sessions",
             "Sessions, in the order of the study’s table",
             *SESSION,
@@ -109,12 +107,12 @@ def _design(result: StudyResult) -> Iterator[Block]:
             Column("path", "Path", "text"),
             folding=True,
         )
-    elif result.epochs:
+    elif shown.epochs:
         items = Markup("\n").join(
             Markup('<li><span class="path">{}</span> ({})</li>').format(
                 source, plural(count, "epoch")
             )
-            for source, count in Counter(epoch.source for epoch in result.epochs).items()
+            for source, count in Counter(epoch.source for epoch in shown.epochs).items()
         )
         yield Markup('<p>Sources:</p>\n<ol class="sources">\n{}\n</ol>').format(items)
     yield Table(
@@ -129,7 +127,7 @@ def _design(result: StudyResult) -> Iterator[Block]:
             Column("shortest_s", "Shortest (s)"),
             Column("longest_s", "Longest (s)"),
         ),
-        list(_counts(result)),
+        list(_counts(shown)),
         empty="There are no epochs.",
     )
     yield Table(
@@ -147,7 +145,7 @@ def _design(result: StudyResult) -> Iterator[Block]:
         [
             {"source": epoch.source, "epoch": epoch.label, **epoch.ticks._asdict()}
             | {"missed_percent": epoch.ticks.missed_percent}
-            for epoch in result.epochs
+            for epoch in shown.epochs
             if epoch.ticks is not None
         ],
         note="A tick that began more than half a tick after it was due was late; one that never "
@@ -166,19 +164,18 @@ def _design(result: StudyResult) -> Iterator[Block]:
         ),
         [
             dict(zip(names, row, strict=True))
-            for row in _main_settings(result.settings)
-            if result.own_rig or row[0] not in _OF_THE_RIG
+            for row in _main_settings(shown.study.settings)
+            if shown.own_rig or row[0] not in _OF_THE_RIG
         ],
         note=Markup('Every setting is in <a href="tables/settings.csv">tables/settings.csv</a>.'),
     )
-    yield Table("settings", "Every setting", (), list(_flat("", result.settings)))
+    yield Table("settings", "Every setting", (), list(_flat("", shown.study.settings)))
 
 
-def _counts(result: StudyResult) -> Iterator[dict[str, Any]]:
-    lengths_s = [longest_s(channels) for channels in channel_facts(result)]
-    recorded = list(zip(result.epochs, lengths_s, strict=True))
+def _counts(shown: Shown) -> Iterator[dict[str, Any]]:
+    recorded = list(zip(shown.epochs, map(longest_s, shown.channels), strict=True))
     for task, title in _TASKS.items():
-        for condition in result.condition_names:
+        for condition in shown.condition_names:
             group = [(e, s) for e, s in recorded if e.task == task and e.condition == condition]
             if not group:
                 continue
@@ -252,16 +249,17 @@ def _flat(prefix: str, value: object, unit: str = "") -> Iterator[dict[str, str]
         yield {"key": prefix, "value": text, "unit": unit}
 
 
-def _perturbation(result: StudyResult) -> Iterator[Block]:
-    epoch = perturbed_epoch(result)
+def _perturbation(shown: Shown) -> Iterator[Block]:
+    names = shown.condition_names
+    epoch = perturbed_epoch(shown.analysis, names, shown.as_analysed, shown.epochs)
     if epoch is None:
         return
     channel = epoch.channels["perturbation_nm"]
-    prbs = result.settings.prbs
+    prbs = shown.study.settings.prbs
     low, high = epoch.excitation_hz or (prbs.wanted_low_hz, prbs.wanted_high_hz)
-    whose = f"of {named(result, epoch)} ({condition_name(epoch.condition)})"
+    whose = f"of {named(shown, epoch)} ({condition_name(epoch.condition)})"
     size_nm = float(np.max(np.abs(channel.values)))
-    shown = channel, origin_s(epoch), (low, high)
+    drawn_of = channel, origin_s(epoch), (low, high)
     heights = EXCITATION_HEIGHTS
     yield Figure(
         "perturbation",
@@ -271,7 +269,7 @@ def _perturbation(result: StudyResult) -> Iterator[Block]:
         f"Torque perturbation {whose}: it switches between levels up to {number(size_nm)} N·m "
         f"for {number(channel.time_s[-1] - channel.time_s[0])} s. Below, its power spectral "
         f"density, with the intended band, {low:g} to {high:g} Hz, marked.",
-        partial(drawn, EXCITATION_SIZE, draw_excitation, *shown, rows=3, height_ratios=heights),
+        partial(drawn, EXCITATION_SIZE, draw_excitation, *drawn_of, rows=3, height_ratios=heights),
     )
 
 
