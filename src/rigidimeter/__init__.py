@@ -67,8 +67,7 @@ _ROOMS = {
 def __getattr__(name: str) -> Any:
     if name not in _ROOMS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    function = _for_python(getattr(import_module(_ROOMS[name]), name))
-    globals()[name] = function
+    globals()[name] = function = _for_python(getattr(import_module(_ROOMS[name]), name))
     return function
 
 

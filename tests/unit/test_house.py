@@ -233,7 +233,7 @@ class TestEndOfStudy:
         [
             pytest.param("compare modules", 100, marks=NOT_REACHED),
             pytest.param("compare functions", 800, marks=NOT_REACHED),
-            pytest.param("estimate modules of study", 0, marks=NOT_REACHED),
+            ("estimate modules of study", 0),
         ],
     )
     def test_ways_by_their_ceilings(self, way: str, most: int) -> None:
