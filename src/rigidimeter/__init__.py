@@ -83,10 +83,9 @@ def _for_python(function: Callable[..., Any]) -> Callable[..., Any]:
             found = function(*values, **named)
         except UserError as error:
             raise UserError(*map(arguments_named, error.lines)) from error.__cause__
-        if not (notices := getattr(found, "notices", ())):
-            return found
+        notices = getattr(found, "notices", ())
         told = tuple(replace(one, text=arguments_named(one.text)) for one in notices)
-        return replace(found, notices=told)
+        return replace(found, notices=told) if told else found
 
     return called
 
