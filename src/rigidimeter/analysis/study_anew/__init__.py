@@ -13,17 +13,15 @@ from rigidimeter.analysis.study_anew.compare_input import (
 )
 from rigidimeter.analysis.study_anew.compared import Compared
 from rigidimeter.analysis.study_anew.comparisons import (
-    EffectPair,
     OfMethod,
     compare_values,
     day_tests,
     method_caveats,
     precisions,
-    precisions_of_each,
     sensitivity,
     without_deviating,
 )
-from rigidimeter.analysis.study_anew.day_scatter import DayScatter, day_scatter
+from rigidimeter.analysis.study_anew.day_scatter import day_scatter
 from rigidimeter.analysis.study_anew.difference_rows import (
     DifferenceRow,
     difference_cells,
@@ -32,11 +30,9 @@ from rigidimeter.analysis.study_anew.difference_rows import (
 )
 from rigidimeter.analysis.study_anew.document import (
     TABLES,
-    TEST,
     Rows,
     columns_of_rows,
     comparison_document,
-    comparison_rows,
     conclusion_rows,
     result_table,
     table_csv,
@@ -59,12 +55,10 @@ from rigidimeter.analysis.study_anew.measures import (
     Primary,
 )
 from rigidimeter.analysis.study_anew.rating_document import (
-    Agreement,
     Relation,
     agreement,
     rating_contrast,
     rating_offsets,
-    rating_rows,
     ratings_document,
     relations,
 )
@@ -73,7 +67,6 @@ from rigidimeter.analysis.study_anew.ratings import (
     corrected,
     fit_scores,
     ratings_of,
-    study_ratings,
 )
 from rigidimeter.analysis.study_anew.results import TESTS_SHARE, StudyResult, conclude_study
 from rigidimeter.analysis.study_anew.rows import (
@@ -86,7 +79,6 @@ from rigidimeter.analysis.study_anew.rows import (
     pooled,
     read_rows,
     recorded,
-    split_pooled,
     together,
     write_rows,
 )

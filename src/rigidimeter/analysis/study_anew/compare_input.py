@@ -163,10 +163,8 @@ def estimates_study(
     if group is not None:
         raise UserError(f"group {group}: estimates name no group; give a study folder or a table")
     analysis = x if isinstance(x, Analysis) else read_estimates(x)
-    known = conditions(analysis)
-    pair = chosen_pair(known, wanted)
-    further = () if wanted[1] is not None else [name for name in known if name not in pair]
-    return analysis_study(analysis, pair, further, epochs=epochs, settings=settings)
+    reference, _ = chosen_pair(conditions(analysis), wanted)
+    return analysis_study(analysis, (reference, wanted[1]), epochs=epochs, settings=settings)
 
 
 def conditions(analysis: Analysis) -> tuple[str, ...]:
@@ -178,11 +176,9 @@ def conditions(analysis: Analysis) -> tuple[str, ...]:
 def analysis_study(
     analysis: Analysis,
     pair: tuple[str | None, str | None] = (None, None),
-    further: Iterable[str] = (),
     *,
     epochs: Sequence[Epoch] = (),
     settings: Settings | None = None,
-    title: str = "",
 ) -> Study:
     """Return the study of estimates that are of no study folder: each epoch is one value.
 
@@ -191,26 +187,20 @@ def analysis_study(
     analysis : Analysis
     pair : (str or None, str or None)
         Reference and other; an `other` of ``""`` is one condition alone. Where not given, the first
-        of `conditions` with each other one.
-    further : iterable of str
-        Conditions that are compared with the reference, too, where both are given.
+        of `conditions`, and each other one.
     epochs : sequence of Epoch, optional
         That were analysed, for their order in time.
     settings : Settings, optional
         That they were analysed with.
-    title : str
     """
     names = conditions(analysis) or ("",)
     first = names[0] if pair[0] is None else pair[0]
-    second = pair[1]
-    if second is None:
-        second, *further = [*(name for name in names if name != first), ""]
+    others = [name for name in names if name != first] if pair[1] is None else [pair[1]]
     return Study(
         estimate_rows({analysis.method or "none": analysis}, epochs=epochs),
         first,
-        second,
-        tuple(filter(None, further)),
-        title=title,
+        "".join(others[:1]),
+        tuple(others[1:]),
         settings=settings or Settings(),
         partly_virtual=any(epoch.virtual for epoch in epochs),
         analysis=analysis,

@@ -10,8 +10,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
-import pandas as pd
-
 from rigidimeter.analysis.statistics import DayDifference, RankSum, Summary, summarise
 from rigidimeter.analysis.study_anew.compared import Compared
 from rigidimeter.analysis.study_anew.comparisons import (
@@ -107,7 +105,11 @@ def comparison_values(result: StudyResult) -> list[dict[str, Any]]:
             **one.measure.names,
             "reference": one.reference,
             "other": one.other,
-            "groups": _groups(result, one),
+            "groups": {
+                name: asdict(own) | {"excluded": excluded}
+                for name, (own, excluded) in summaries_of(result.study, one.measure.name).items()
+                if name in (one.reference, one.other)
+            },
             "test": TEST,
             **_tested(result, one),
             "remark": one.remark,
@@ -135,18 +137,20 @@ def comparison_rows(result: StudyResult) -> list[dict[str, Any]]:
     return rows
 
 
-def _groups(result: StudyResult, one: Compared) -> dict[str, dict[str, Any]]:
-    every = recorded(result.study.rows, one.measure.name)
-    names = one.pair if one.other else (one.reference,)
-    of_each = {name: summary_of(every, name) for name in names}
-    return {name: asdict(own) | {"excluded": out} for name, (own, out) in of_each.items()}
+def summaries_of(study: Study, measure: str) -> dict[str, tuple[Summary, int]]:
+    """Return the summary of the values that count, and how many do not, by condition.
 
-
-def summary_of(every: pd.DataFrame, condition: str) -> tuple[Summary, int]:
-    """Return the summary of a condition's values that count, and how many do not."""
-    own = every[every["condition"] == condition]
-    included = own["outcome"] == "included"
-    return summarise(own.loc[included, "value"].to_numpy()), int((~included).sum())
+    The compared conditions come first.
+    """
+    every = recorded(study.rows, measure)
+    compared = study.pair if study.other else (study.reference,)
+    found = {}
+    for name in dict.fromkeys([*compared, *every["condition"]]):
+        own = every[every["condition"] == name]
+        included = own["outcome"] == "included"
+        summary = summarise(own.loc[included, "value"].to_numpy())
+        found[name] = summary, int((~included).sum())
+    return found
 
 
 def _tested(result: StudyResult, one: Compared) -> dict[str, Any]:
@@ -178,17 +182,16 @@ def condition_names(study: Study) -> tuple[str, ...]:
     order = [each.name for each in study.conditions]
     order = order or [block.condition for block in study.settings.protocol.blocks]
     of_epochs = study.rows[study.rows["scope"] != "all"]  # that of all epochs has no condition
-    names = dict.fromkeys([*filter(None, study.pair), *map(str, of_epochs["condition"])])
+    names = dict.fromkeys([*filter(None, study.pair), *map(str, of_epochs["condition"].unique())])
     return tuple(sorted(names, key=lambda n: order.index(n) if n in order else len(order)))
 
 
 def _summaries(result: StudyResult) -> Iterator[dict[str, Any]]:
-    study = result.study
-    for measure in measures_of(study.rows):
-        every = recorded(study.rows, measure.name)
-        there = {*every["condition"], *study.pair}
-        for name in filter(there.__contains__, condition_names(study)):
-            summary, excluded = summary_of(every, name)
+    names = condition_names(result.study)
+    for measure in measures_of(result.study.rows):
+        of_each = summaries_of(result.study, measure.name)
+        for name in filter(of_each.__contains__, names):
+            summary, excluded = of_each[name]
             if summary.n or excluded:
                 counts = {"condition": name, "n": summary.n, "excluded": excluded}
                 yield measure.names | counts | asdict(summary)

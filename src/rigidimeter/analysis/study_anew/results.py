@@ -27,9 +27,9 @@ from rigidimeter.analysis.study_anew.document import (
     comparison_rows,
     conclusion_rows,
     condition_names,
-    summary_of,
+    summaries_of,
 )
-from rigidimeter.analysis.study_anew.rows import measures_of, recorded
+from rigidimeter.analysis.study_anew.rows import measures_of
 from rigidimeter.analysis.study_anew.sentences import Statement, statement
 from rigidimeter.analysis.study_anew.study import Study
 from rigidimeter.analysis.study_anew.verdicts import conclude, reasons
@@ -102,10 +102,7 @@ class StudyResult:
 
     def summaries(self, measure: str) -> dict[str, Summary]:
         """Return the summary of the values of a measure by condition; the compared ones first."""
-        every = recorded(self.study.rows, measure)
-        compared = self.study.pair if self.study.other else (self.study.reference,)
-        names = dict.fromkeys([*compared, *every["condition"]])
-        return {name: summary_of(every, name)[0] for name in names}
+        return {name: own for name, (own, _) in summaries_of(self.study, measure).items()}
 
     @property
     def condition_names(self) -> tuple[str, ...]:

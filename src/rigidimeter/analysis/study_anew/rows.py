@@ -419,13 +419,18 @@ def _of_scores(
 def _of_pooled(
     analysis: Analysis, place: _Place, made_by: Mapping[str, Any]
 ) -> Iterator[dict[str, Any]]:
-    """Yield the fits to all epochs of each condition, and the one to all epochs."""
-    of_each, _ = split_pooled(analysis)
+    """Yield the fits to all epochs of each condition, and the one to all epochs.
+
+    The latter has no condition, as recordings without a name for theirs have none: it comes last.
+    """
+    known = {fit.condition for fit in analysis.fits}
     for fit in analysis.pooled:
+        of_one = fit.condition in known
+        known.discard(fit.condition)
         cells = {
             **place.condition(fit.condition),
             **made_by,
-            "scope": "condition" if of_each.get(fit.condition) is fit else "all",
+            "scope": "condition" if of_one else "all",
             "session": fit.source,
             "epoch": fit.epoch,
             "task": "prbs",
@@ -434,22 +439,6 @@ def _of_pooled(
         }
         for row in _of_fit(fit, cells):
             yield row | {"bias": _bias(fit.findings, (row["high"] - row["low"]) / 2.0)}
-
-
-def split_pooled(analysis: Analysis) -> tuple[dict[str, Fit], Fit | None]:
-    """Return the fit to all epochs of each condition, and the one to all epochs if there is one.
-
-    The latter has no condition, as recordings without a name for theirs have none: it comes last.
-    """
-    recorded = {fit.condition for fit in analysis.fits}
-    of_each: dict[str, Fit] = {}
-    overall = None
-    for fit in analysis.pooled:
-        if fit.condition in of_each or fit.condition not in recorded:
-            overall = fit
-        else:
-            of_each[fit.condition] = fit
-    return of_each, overall
 
 
 def _bias(findings: Iterable[Finding], half: float) -> float:

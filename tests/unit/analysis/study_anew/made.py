@@ -31,6 +31,7 @@ JOINT = np.array([0.0045, 0.137, 1.75])
 LOWER = np.array([1.0, 0.84, 0.81])
 SCATTER = np.array([0.03, 0.09, 0.12])
 NAMES = ("OFF", "DBS")
+CONDITIONS = (Condition("OFF", "off"), Condition("DBS", "on", 130.0, 0.32, "mA", 60.0))
 LEFT_OUT = Outcome("excluded", "the arm touched the position limit")
 PULL = {"published": (0.7, 0.75), "bandlimited": (0.88, 0.9)}
 """What other methods find of DBS, with J free and held: voluntary torque pulls the joint down."""
@@ -87,14 +88,14 @@ def made(
         held = tuple(_pulled(one, factors[1]) for one in fits)
         analyses[method] = replace(analyses[method], fixed_inertia=held)
     entries = {one.source: entry(one) for one in sessions}
-    rows = [estimate_rows(analyses, entries if days_known else None)]
+    rows = [estimate_rows(analyses, entries if days_known else None, (), CONDITIONS)]
     ratings = None
     if rated and days_known:
         ratings = ratings_of("ratings.csv", _scores(design, sessions, rng), ["examiner"])
         rows.append(corrected(ratings))
     given: dict[str, Any] = {
         "title": "Elbow rigidity",
-        "conditions": (Condition("OFF", "off"), Condition("DBS", "on", 130.0, 0.32, "mA", 60.0)),
+        "conditions": CONDITIONS,
         "sessions": tuple(entries.values()) if days_known else (),
         "analysis": analyses["iv"],
         "ratings": ratings,

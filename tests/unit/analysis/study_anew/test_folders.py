@@ -191,6 +191,11 @@ def third_condition(study: Path) -> None:
     sessions(study, *(f"sessions/{day}-A-LOW,M1,{day},LOW" for day in days), *rows[1:])
 
 
+def one_condition_lost(study: Path) -> None:
+    for path in study.glob("sessions/*-DBS"):
+        shutil.rmtree(path)
+
+
 def no_change(_: Path) -> None:
     return None
 
@@ -208,6 +213,7 @@ FOLDERS: dict[str, tuple[Callable[[Path], object], dict[str, Any]]] = {
     "excluded epochs": (excluded, {}),
     "unusable sessions": (unusable, {}),
     "no session": (lambda study: shutil.rmtree(study / "sessions"), {}),
+    "all sessions of a condition lost": (one_condition_lost, {}),
     "odd ratings": (odd_ratings, {}),
     "one rating": (one_rating, {}),
     "one condition": (one_condition, {}),

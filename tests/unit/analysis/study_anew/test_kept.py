@@ -5,10 +5,10 @@ import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from pkgutil import resolve_name
 
 import pytest
 
-import rigidimeter.analysis.study_anew.store
 from rigidimeter.analysis.study_anew import (
     TABLES,
     UNCHANGED,
@@ -21,6 +21,9 @@ from rigidimeter.analysis.study_anew import (
     result_table,
 )
 from rigidimeter.core.settings import changed_settings, dump_settings, parse_settings
+
+WRITES = "rigidimeter.analysis.study_anew.store._write_new"
+"""What a run that is cut off calls for each file."""
 
 
 def kept(folder: Path, *, seed: int = 1, between: Callable[[Path], object] = str, **options):
@@ -170,7 +173,7 @@ def test_a_run_that_was_cut_off_is_made_up_for(
 ) -> None:
     edit(study / "ratings.csv", "M1,1,OFF,A,2.0", "M1,1,OFF,A,2.5")
     left = iter(range(written))
-    whole = rigidimeter.analysis.study_anew.store._write_new
+    whole = resolve_name(WRITES)
 
     def cut_off(path: Path, text: str) -> None:
         if next(left, None) is None:
@@ -178,7 +181,7 @@ def test_a_run_that_was_cut_off_is_made_up_for(
         whole(path, text)
 
     with monkeypatch.context() as patched:
-        patched.setattr(rigidimeter.analysis.study_anew.store, "_write_new", cut_off)
+        patched.setattr(WRITES, cut_off)
         with pytest.raises(KeyboardInterrupt):
             kept(study)
     said = kept(study)

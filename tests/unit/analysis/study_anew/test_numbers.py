@@ -16,11 +16,13 @@ from tests.unit.analysis.study_anew.made import (
     Design,
     alike,
     concluded,
+    doubted,
     in_dbs,
     made,
     score_rows,
 )
 
+from rigidimeter.analysis.statistics import day_difference
 from rigidimeter.analysis.study_anew import (
     MEASURES,
     Columns,
@@ -31,16 +33,22 @@ from rigidimeter.analysis.study_anew import (
     analysis_study,
     as_rows,
     by_units,
+    compare_values,
+    conclude,
     conclude_study,
+    conclusion_rows,
     corrected,
     counting,
     day_tests,
     ratings_of,
+    read_rows,
     relations,
     result_table,
     table_study,
     traffic_light,
+    write_rows,
 )
+from rigidimeter.core.errors import UserError
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Fit, Outcome
 
@@ -90,6 +98,51 @@ class TestDifference:
         )
         assert found.p == pytest.approx(expected.pvalue, rel=0.1)
         assert 0 < 2 * found.measured_half < 0.3 * (found.high - found.low)
+
+    @pytest.mark.parametrize(
+        ("by", "test"),
+        [
+            ("days", "Welch's t-test of 5 days of OFF and 4 days of DBS"),
+            ("recordings", "Welch's t-test of 5 recordings of OFF and 4 recordings of DBS"),
+            ("blocks", "Welch's t-test of 10 blocks of OFF and 8 blocks of DBS"),
+        ],
+    )
+    def test_what_counts_as_one_is_tested(self, study: Study, by: str, test: str) -> None:
+        rows = counting(study.rows, K)
+        rows = rows.assign(block=np.where(rows["epoch"] < "p03", "1", "2"))
+        one = by_units(rows, STIFFNESS, NAMES, by)
+        assert one.test == test
+        if by == "days":
+            x, y = (rows[rows["condition"] == name] for name in NAMES)
+            found = day_difference(x["value"], y["value"], [*x["day"]], [*y["day"]], names=NAMES)
+            assert one.of_test == (-found.estimate, -found.high, -found.low)
+            assert (one.p, one.df, one.se, one.units) == (found.p, found.df, found.se, (5, 4))
+
+    def test_too_many_values_are_refused_alone_and_a_remark_beside_days(self) -> None:
+        many = as_rows(
+            {"day": day, "session": day, "unit": day, "condition": name, "method": "iv",
+             "measure": K, "value": value}
+            for day in "12" for name in NAMES for value in np.linspace(1.0, 2.0, 3600)
+        )  # fmt: skip
+        (one,) = compare_values(Study(many, *NAMES))
+        assert "make 5.2e+07 pairs" in one.remark
+        with pytest.raises(UserError, match=r"make 5\.2e\+07 pairs"):
+            day_tests(Study(many.assign(day="", method=""), *NAMES))
+
+    def test_one_condition_alone_is_not_concluded(self, study: Study) -> None:
+        alone = replace(study, other="", ratings=None)
+        tests = day_tests(alone)
+        assert {one.remark for one in tests} == {"only one condition was recorded"}
+        assert conclude(alone, tests) == ()
+
+    @pytest.mark.parametrize("ending", [".parquet", ".csv"])
+    def test_rows_of_a_file_are_concluded_alike(self, tmp_path: Path, ending: str) -> None:
+        study = made(fit=doubted("tremor"), rated=False)
+        write_rows(tmp_path / f"rows{ending}", study.rows)
+        again = replace(study, rows=read_rows(tmp_path / f"rows{ending}"))
+        found, expected = (conclusion_rows(concluded(one).values()) for one in (again, study))
+        assert str(found) == str(expected)
+        assert found[0]["finding"] == "flagged_epochs"
 
     @pytest.mark.parametrize("design", [Design(), Design(effect=0.0), Design(both_on_a_day=True)])
     def test_the_interval_excludes_zero_where_p_is_below_the_level(self, design: Design) -> None:

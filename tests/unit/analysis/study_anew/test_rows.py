@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
-from tests.unit.analysis.report.cohorts import made_study
+from tests.unit.analysis.study_anew.made import made
 
 from rigidimeter.analysis.study_anew import (
     FIELDS,
-    Condition,
     as_rows,
     blocks,
     counting,
@@ -38,10 +37,7 @@ def analysis(*fits: Fit, **parts) -> Analysis:
 
 @pytest.fixture(scope="module")
 def study_rows() -> pd.DataFrame:
-    made = made_study()
-    sessions = {one.source: one for one in made.study.sessions}
-    conditions = [Condition("DBS", "on", 130.0, 0.32, "mA", 60.0)]
-    return estimate_rows({"iv": made.analysis}, sessions, made.epochs, conditions)
+    return made(rated=False).rows
 
 
 def test_columns_and_their_types(study_rows: pd.DataFrame) -> None:
@@ -126,14 +122,6 @@ def test_a_block_is_an_unbroken_stretch_of_one_condition() -> None:
         ("a", "3"): "2",
         ("a", "4"): "3",
     }
-
-
-def test_time_since_the_change_of_stimulation() -> None:
-    epochs = [epoch("p1", "OFF", 0.0, since_change_min=12.5), epoch("p2", "OFF", 9.0)]
-    rows = estimate_rows({"iv": analysis(fit("p1"), fit("p2"))}, epochs=epochs)
-    since = rows[rows["measure"] == "stiffness_nm_rad"]["since_change_min"]
-    assert since.iloc[0] == 12.5
-    assert math.isnan(since.iloc[1])
 
 
 @pytest.mark.parametrize("ending", [".parquet", ".csv"])

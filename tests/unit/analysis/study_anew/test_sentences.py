@@ -142,6 +142,33 @@ STUDIES: dict[str, tuple[dict[str, Any], Callable[[Compared], Compared | None] |
 }  # fmt: skip
 
 
+def random(seed: int) -> dict[str, Any]:
+    """Return a study that is unbalanced in every way."""
+    rng = np.random.default_rng(seed)
+    checks = ("tremor", "lack_of_fit", "between_samples", "emg_activity")
+    often = float(rng.choice([0.0, 0.1, 0.6]))
+
+    def fit(one: Fit) -> Fit | None:
+        found = Finding(str(rng.choice(checks)), "caution", 2.0, 1.0)
+        flagged = rng.random() < (often if in_dbs(one) else 0.05)
+        kept = replace(one, findings=(found,)) if flagged else one
+        return kept if rng.random() < 0.7 else None
+
+    def entry(one: Any) -> Any:
+        return one._replace(group=groups[one.subject])
+
+    names = tuple(f"S{k}" for k in range(rng.integers(1, 5)))
+    groups = dict(zip(names, rng.choice(["", "patients", "controls"], len(names)), strict=True))
+    days = tuple(int(n) for n in rng.integers(1, 7, 2))
+    design = Design(days, int(rng.integers(1, 6)), int(rng.integers(0, 4)), names,
+                    float(rng.choice([-1.0, 0.0, 0.5, 1.5])),
+                    float(rng.choice([0.001, 0.05, 0.2])), bool(rng.random() < 0.5))  # fmt: skip
+    return {"design": design, "fit": fit, "entry": entry, "rated": bool(rng.random() < 0.5)}
+
+
+STUDIES |= {f"random {seed:02d}": (random(seed), None) for seed in range(16)}
+
+
 @pytest.mark.parametrize("name", STUDIES)
 def test_all_that_is_said(name: str) -> None:
     given, change = STUDIES[name]

@@ -229,6 +229,22 @@ class TestFamilies:
             assert second.reason == "in the declared sequence it comes after B, which is not shown"
         assert "p adjusted in the declared sequence of B and K" in statement(study, found).tested
 
+    @pytest.mark.parametrize(
+        ("p", "finding"),
+        [(0.02, "earlier_in_sequence"), (0.03, "wide_interval"), (0.2, "wide_interval")],
+    )
+    def test_in_a_sequence_the_level_is_divided_by_the_conditions(self, p, finding) -> None:
+        """Two conditions beside the reference: alone it would be found below 0.025."""
+        study = made(further=("LOW",), **declared(B, K, rule="sequence"))
+        damping, stiffness = (o for o in day_tests(study) if o.other == "DBS"
+                              and o.measure.name in (B, K))  # fmt: skip
+        wide = {"low": -9.0, "high": 9.0, "se": 3.0}
+        tests = [replace(stiffness, p=p, **wide), replace(damping, p=0.5, **wide),
+                 replace(stiffness, p=0.5, other="LOW", **wide)]  # fmt: skip
+        one = conclude(study, tests)[0]
+        assert (one.measure.name, one.other) == (K, "DBS")
+        assert (one.finding.name, one.family.level) == (finding, 0.025)
+
     @pytest.mark.parametrize(("rule", "verdict"), [("sequence", OPEN), ("holm", LOWER)])
     def test_nothing_is_claimed_behind_what_is_within_the_accuracy(self, rule, verdict) -> None:
         found = concluded(made(fit=alike([1.0, 0.995, 0.82], 1e-4), **declared(B, K, rule=rule)))
