@@ -94,7 +94,8 @@ def keep(loaded: Loaded, result: StudyResult) -> list[str]:
         DICTIONARY: dictionary_text({name: columns_of_rows(rows) for name, rows in tables.items()}),
         COMPARISON: json_text(document),
     }
-    stored = rows_file(loaded, result.study)
+    with refused(loaded.folder.folder, "cannot be read"):
+        stored = rows_file(loaded, result.study)
     contents = {} if stored is None else {ROWS: stored}
     contents |= {name: text_bytes(text) for name, text in texts.items()}
     inputs = _inputs(loaded, result)
