@@ -66,8 +66,7 @@ def model(
         advance = meter.advance
         found = fit_terms(read, terms, compare=compare, high_hz=high_hz, progress=advance).epochs
     for each in found:
-        problems = () if compare else each.unfitted
-        for problem in problems or ((each.problem,) if each.problem else ()):
+        for problem in filter(None, (each.problem, *(() if compare else each.unfitted))):
             echo(f"error: {each.epoch.name}: {problem}", err=True)
     if json_out is not None:
         write_json(json_out, model_document(found))

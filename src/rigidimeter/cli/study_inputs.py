@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
+from rigidimeter.analysis.recording import study_provenance
 from rigidimeter.analysis.report import Shown
 from rigidimeter.analysis.study_anew import (
     TESTS_SHARE,
@@ -96,7 +96,11 @@ def analyse_study_folder(
         before = kept_study(folder, adjust=recordings.adjust, **asked)
     loaded = before[0] if before else read_study_inputs(folder, recordings, key, pair, group)
     with Meter("study", 1.0) as meter:
-        work, shares = partial(_part, meter.advance), (_PREPARED_SHARE, TESTS_SHARE)
+        shares = _PREPARED_SHARE, TESTS_SHARE
+
+        def work(share: float) -> Callable[[float], None]:
+            return lambda done: meter.advance(share * done)
+
         prepared = {} if before else prepare_study(loaded, work(shares[0]))
         study = before[1] if before else analyse(loaded, prepared, progress=work(1.0 - sum(shares)))
         result = conclude_study(study, seed=seed, resamples=resamples, progress=work(shares[1]))
@@ -105,14 +109,12 @@ def analyse_study_folder(
         changes = keep(loaded, result) if group is None else []
     except UserError as error:
         not_kept = str(error)
-    shown = Shown.of_study(result, loaded, prepared, command_line())
-    shown = replace(shown, changes=tuple(changes))
+    known = [session.path for session in study.sessions], loaded.recordings.digests
+    facts = study_provenance(loaded.folder, *known, study.settings, command_line())
+    shown = Shown.of_study(result, loaded, prepared)
     bad = any(notice.level == "error" for notice in result.notices)
     # The screen says what could not be tested.
-    main = [one for one in result.values if one.other and one.other == study.other]
-    bad |= any(one.remark and not one.tested for one in main)
+    untested = [one for one in result.values if one.remark and not one.tested]
+    bad |= any(one.other == study.other for one in untested if one.other)
+    shown = replace(shown, changes=tuple(changes), provenance=facts)
     return shown, Analysed(study.analysis, result.notices, bad, not_kept)
-
-
-def _part(progress: Callable[[float], None], share: float) -> Callable[[float], None]:
-    return lambda done: progress(share * done)

@@ -6,7 +6,7 @@ installed.
 
 from rigidimeter.analysis.recording.estimates import estimate
 from rigidimeter.analysis.recording.fitted_terms import FittedTerms, fit_terms
-from rigidimeter.analysis.recording.origin import provenance
+from rigidimeter.analysis.recording.origin import provenance, study_provenance
 from rigidimeter.analysis.recording.precision import (
     OF_SCORES,
     condition_precisions,

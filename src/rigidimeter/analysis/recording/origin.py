@@ -12,6 +12,7 @@ from pathlib import Path
 
 from rigidimeter.core.session import SAMPLES, is_session, read_manifest
 from rigidimeter.core.settings import Settings, dump_settings
+from rigidimeter.core.study_files import StudyFolder
 from rigidimeter.core.version import __version__
 
 
@@ -51,3 +52,29 @@ def provenance(
         elif path in digests:
             facts[f"{path}"] = f"SHA-256 {digests[path]}"
     return facts
+
+
+def study_provenance(
+    read: StudyFolder,
+    sessions: Iterable[str],
+    digests: Mapping[str, str],
+    settings: Settings,
+    command: str,
+) -> dict[str, str]:
+    """Return the same of a study folder: its tables, and the sessions that count.
+
+    Parameters
+    ----------
+    read : StudyFolder
+    sessions : iterable of str
+        Their paths below the folder.
+    digests : mapping of str to str
+        SHA-256 of every file of the recordings, by its path below the folder.
+    settings : Settings
+    command : str
+    """
+    tables = [path for name, path in read.files.items() if name != "key"]
+    known = {path: read.digests[name] for name, path in read.files.items()}
+    known |= {read.folder / name: digest for name, digest in digests.items()}
+    paths = [*tables, *(read.folder / session for session in sessions)]
+    return provenance(paths, known, settings, command)

@@ -57,11 +57,7 @@ class Shown:
 
     @classmethod
     def of_study(
-        cls,
-        result: StudyResult,
-        loaded: Loaded,
-        prepared: Mapping[str, Recorded],
-        command: str = "",
+        cls, result: StudyResult, loaded: Loaded, prepared: Mapping[str, Recorded]
     ) -> Self:
         """Return what is concluded of a study folder beside its recordings.
 
@@ -72,20 +68,12 @@ class Shown:
             The folder, as it was read for this result.
         prepared : mapping of str to Recorded
             As `prepare_study`.
-        command : str
-            By which it was analysed, for the provenance; without it there is none.
         """
         as_recorded = method_named(result.study.analysis.method).as_recorded
         ready = tuple(
             one for own in prepared.values() for one in own.analysed(as_recorded=as_recorded)
         )
-        return cls(
-            result,
-            loaded.epochs,
-            ready,
-            provenance=_provenance(result.study, loaded, command) if command else {},
-            own_rig=loaded.recordings.settings is not None,
-        )
+        return cls(result, loaded.epochs, ready, own_rig=loaded.recordings.settings is not None)
 
     @classmethod
     def of_recording(cls, recording: Recording, analysis: Analysis, command: str = "") -> Self:
@@ -157,13 +145,3 @@ class Shown:
         recorded = [epoch.condition for epoch in self.epochs]
         names = dict.fromkeys([*filter(None, study.pair), *recorded, *self.result.condition_names])
         return tuple(sorted(names, key=lambda n: order.index(n) if n in order else len(order)))
-
-
-def _provenance(study: Study, loaded: Loaded, command: str) -> dict[str, str]:
-    """Return where a result comes from: the tables of a study, and the sessions that count."""
-    folder, read = loaded.folder.folder, loaded.folder
-    tables = [path for name, path in read.files.items() if name != "key"]
-    sessions = [folder / session.path for session in study.sessions]
-    known = {path: read.digests[name] for name, path in read.files.items()}
-    known |= {folder / name: digest for name, digest in loaded.recordings.digests.items()}
-    return provenance((*tables, *sessions), known, study.settings, command)
