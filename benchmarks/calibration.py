@@ -27,7 +27,7 @@ from rigidimeter.analysis.statistics import (
     rank_biserial_interval,
     two_groups,
 )
-from rigidimeter.analysis.study_anew import table_ratings
+from rigidimeter.analysis.study import table_ratings
 from rigidimeter.core.files import TextTable
 
 EXAMINERS = "ABC"

@@ -42,9 +42,9 @@ import numpy as np
 from tests.traps.recorded_studies import ALL, AT_REST, MOTION, Session, write_study
 
 import rigidimeter as rm
-from rigidimeter.analysis.study_anew import LEVEL, as_rows, conclude, day_tests
-from rigidimeter.analysis.study_anew import MEASURES as TESTED
-from rigidimeter.analysis.study_anew import Study as Rows
+from rigidimeter.analysis.study import LEVEL, as_rows, conclude, day_tests
+from rigidimeter.analysis.study import MEASURES as TESTED
+from rigidimeter.analysis.study import Study as Rows
 from rigidimeter.core.study_files import PrimaryTable
 from rigidimeter.planning import Scatter, day_difference_sd, paired_power
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rigidimeter.analysis.reading import data, identify, read
     from rigidimeter.analysis.recording import estimate, fit_terms
     from rigidimeter.analysis.report import report
-    from rigidimeter.analysis.study_anew import compare
+    from rigidimeter.analysis.study import compare
     from rigidimeter.planning import design
     from rigidimeter.virtual import simulate
 
@@ -54,7 +54,7 @@ _ROOMS = {
     "read": "rigidimeter.analysis.reading",
     "data": "rigidimeter.analysis.reading",
     "estimate": "rigidimeter.analysis.recording",
-    "compare": "rigidimeter.analysis.study_anew",
+    "compare": "rigidimeter.analysis.study",
     "fit_terms": "rigidimeter.analysis.recording",
     "simulate": "rigidimeter.virtual",
     "design": "rigidimeter.planning",

@@ -15,7 +15,7 @@ from tests.docs.files_tables import analysis
 
 from rigidimeter.analysis.reading import estimates_document
 from rigidimeter.analysis.reading.channels.mapping_file import MappingToml
-from rigidimeter.analysis.study_anew import compare, comparison_document
+from rigidimeter.analysis.study import compare, comparison_document
 from rigidimeter.core.files import meaning_of
 from rigidimeter.core.settings import Settings
 from rigidimeter.core.study_files import PlanToml, StudyToml

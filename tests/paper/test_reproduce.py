@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from tests.unit.virtual.tiny import tiny
 
-from rigidimeter.analysis.study_anew import counting
+from rigidimeter.analysis.study import counting
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.words import number
 from rigidimeter.model import JointDynamics

@@ -22,7 +22,7 @@ from tests.traps.recorded_studies import (
 )
 
 import rigidimeter as rm
-from rigidimeter.analysis.study_anew import StudyResult, comparison_document, lead
+from rigidimeter.analysis.study import StudyResult, comparison_document, lead
 
 OFF, DBS = Session("1", "OFF"), Session("1", "DBS")
 NAMES = ("OFF", "DBS")

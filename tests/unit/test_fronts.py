@@ -19,7 +19,7 @@ ALSO = (
 )
 """Fronts within a room."""
 
-NOT_YET = tuple(f"rigidimeter.analysis.{room}" for room in ("reading", "study", "report"))
+NOT_YET = tuple(f"rigidimeter.analysis.{room}" for room in ("reading",))
 """Rooms whose insides are imported; fewer with time, since the ceiling of their number may fall."""
 
 COMMANDS = "rigidimeter.cli"

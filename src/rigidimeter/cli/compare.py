@@ -17,7 +17,7 @@ from rigidimeter.cli.terminal_tables import show
 from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.analysis.study_anew import StudyResult
+    from rigidimeter.analysis.study import StudyResult
 
 
 @reads_recordings
@@ -74,7 +74,7 @@ def compare(
       rigidimeter compare demo-study/analysis/estimates.json --reference DBS
       rigidimeter compare demo-study/ratings.csv --value score --by condition
     """
-    from rigidimeter.analysis import study_anew as studies
+    from rigidimeter.analysis import study as studies
     from rigidimeter.analysis.report import Shown
     from rigidimeter.cli.comparison_text import comparison_blocks
     from rigidimeter.cli.inputs import Analysed, analyse_recordings, study_of
@@ -124,7 +124,7 @@ def compare(
 def _write(
     found: StudyResult, json_out: Path | None, csv_out: Path | None, place: str = ""
 ) -> None:
-    from rigidimeter.analysis.study_anew import (
+    from rigidimeter.analysis.study import (
         columns_of_rows,
         comparison_document,
         result_table,
@@ -141,7 +141,7 @@ def _write(
 
 
 def _say_changes(changes: Sequence[str]) -> None:
-    from rigidimeter.analysis.study_anew import UNCHANGED
+    from rigidimeter.analysis.study import UNCHANGED
 
     if changes and changes != (UNCHANGED,):
         echo("\nSince the last analysis:")

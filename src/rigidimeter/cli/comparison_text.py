@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from markupsafe import Markup
 
 from rigidimeter.analysis import report  # what is taken from it is imported when it is used
-from rigidimeter.analysis.study_anew import (
+from rigidimeter.analysis.study import (
     Study,
     StudyResult,
     counting,

@@ -168,7 +168,7 @@ def _primary(
 
 def _scatter_of(folder: Path) -> dict[str, Scatter]:
     """Estimate every epoch of a study, and return how much inertia, damping and stiffness vary."""
-    from rigidimeter.analysis.study_anew import day_scatter
+    from rigidimeter.analysis.study import day_scatter
     from rigidimeter.cli.study_inputs import estimate_study_inputs, read_study_inputs
     from rigidimeter.core.study_files import STUDY_FILE, is_study
     from rigidimeter.planning import CORRELATION, Scatter

@@ -15,7 +15,7 @@ from rigidimeter.cli.terminal_tables import Block, Heading, Table, show
 from rigidimeter.core.errors import UserError
 
 if TYPE_CHECKING:
-    from rigidimeter.analysis.study_anew import Ratings
+    from rigidimeter.analysis.study import Ratings
 
 MOST_OFFSETS, MOST_PAIRS = 6, 3
 """On the first screen."""
@@ -57,7 +57,7 @@ def ratings(
       rigidimeter ratings demo-study/ratings.csv --json ratings.json
       rigidimeter ratings demo-study/ratings.csv --scale 0 4 --step 0.5
     """
-    from rigidimeter.analysis.study_anew import ratings_document, table_ratings
+    from rigidimeter.analysis.study import ratings_document, table_ratings
     from rigidimeter.core.files import read_text_table, write_json
     from rigidimeter.core.records import Notice
     from rigidimeter.core.study_files import is_study, table_path
@@ -82,7 +82,7 @@ def ratings(
 
 def _blocks(found: Ratings, pair: tuple[str, str], full: bool) -> Iterator[Block]:
     """Yield the table and its sentences; with `full` every offset and every pair."""
-    from rigidimeter.analysis.study_anew import rating_offsets, ratings_document
+    from rigidimeter.analysis.study import rating_offsets, ratings_document
 
     document, fit = ratings_document(found, pair), found.fit
     by_day = any("day" in name for name in fit.variances)
@@ -130,7 +130,7 @@ def _variance(name: str, variance: float) -> str:
 
 
 def _contrast(found: Ratings, pair: tuple[str, str], *, by_day: bool) -> Iterator[Block]:
-    from rigidimeter.analysis.study_anew import rating_contrast
+    from rigidimeter.analysis.study import rating_contrast
 
     second, first = pair
     names = ("residual degrees of freedom, n − p", "Satterthwaite", "Kenward and Roger")

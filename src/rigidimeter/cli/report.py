@@ -48,7 +48,7 @@ def report(
       rigidimeter report demo-study/elbow.csv --column epoch=trial --out elbow
     """
     from rigidimeter.analysis.report import Shown, inputs_seen_from, why_not_own
-    from rigidimeter.analysis.study_anew import lead
+    from rigidimeter.analysis.study import lead
     from rigidimeter.cli.inputs import analyse_recordings, command_line, study_of
     from rigidimeter.cli.study_inputs import analyse_study_folder
     from rigidimeter.core.session import is_session

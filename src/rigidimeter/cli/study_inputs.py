@@ -12,7 +12,7 @@ from typing import Any
 
 from rigidimeter.analysis.recording import study_provenance
 from rigidimeter.analysis.report import Shown
-from rigidimeter.analysis.study_anew import (
+from rigidimeter.analysis.study import (
     TESTS_SHARE,
     Loaded,
     analyse,

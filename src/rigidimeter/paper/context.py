@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rigidimeter.analysis.study_anew import StudyResult, analyse, conclude_study, load_study
+from rigidimeter.analysis.study import StudyResult, analyse, conclude_study, load_study
 from rigidimeter.analysis.traces import Prepared, prepared_epochs
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import read_json, write_json

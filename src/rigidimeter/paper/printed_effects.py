@@ -21,7 +21,7 @@ from rigidimeter.analysis.statistics import (
     effect_from_p,
     joint_test,
 )
-from rigidimeter.analysis.study_anew import Ratings
+from rigidimeter.analysis.study import Ratings
 from rigidimeter.core.words import number, p_value
 from rigidimeter.paper.comparison_table import Bound, Claim, bounded, rounded, within_percent
 from rigidimeter.paper.context import Context

@@ -21,7 +21,7 @@ from rigidimeter.analysis.figures import (
 )
 from rigidimeter.analysis.report import Figure
 from rigidimeter.analysis.statistics import RankSum, difference, summarise
-from rigidimeter.analysis.study_anew import Compared, counting, fit_scores
+from rigidimeter.analysis.study import Compared, counting, fit_scores
 from rigidimeter.analysis.traces import analysed_epoch, representative_scores, representatives
 from rigidimeter.core.words import number, p_value
 from rigidimeter.model import Array, ClosedLoopMotion, JointDynamics, closed_loop_motion

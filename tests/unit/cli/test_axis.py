@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pytest
 
-from rigidimeter.analysis.study_anew import estimate_study, load_study
+from rigidimeter.analysis.study import estimate_study, load_study
 
 INCLUDES = "K includes the slope of the limb's weight "
 STATED = [

@@ -9,11 +9,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from tests.small_study import DAYS, record
-from tests.unit.analysis.study_anew.test_folders import one_vote, subjects
-from tests.unit.analysis.study_anew.test_sentences import grouped
+from tests.unit.analysis.study.test_folders import one_vote, subjects
+from tests.unit.analysis.study.test_sentences import grouped
 
 from rigidimeter.analysis.statistics import holm
-from rigidimeter.analysis.study_anew import compare, result_table
+from rigidimeter.analysis.study import compare, result_table
 
 
 def plain(text: str) -> str:

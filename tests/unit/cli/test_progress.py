@@ -9,7 +9,7 @@ import pytest
 
 import rigidimeter as rm
 from rigidimeter.analysis.reading import read
-from rigidimeter.analysis.study_anew import compare
+from rigidimeter.analysis.study import compare
 from rigidimeter.cli.progress import LEAST_SHARE, Meter
 from rigidimeter.core.records import Epoch
 from rigidimeter.core.settings import Settings, parse_settings

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rigidimeter.analysis.reading.formats import READERS, reader_of
-from rigidimeter.analysis.study_anew import Naming, naming, place_of
+from rigidimeter.analysis.study import Naming, naming, place_of
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.files import RECORDING_BYTES, is_dictionary, open_regular
 from rigidimeter.core.study_files import StudyFolder, TableRow, is_study, read_study_folder

@@ -18,7 +18,7 @@ from rigidimeter.analysis.batch.parts import Row
 from rigidimeter.analysis.reading.formats import ReadOptions
 from rigidimeter.analysis.reading.recording import read_as
 from rigidimeter.analysis.recording import estimate
-from rigidimeter.analysis.study_anew import load_recordings, source_of, without_excluded
+from rigidimeter.analysis.study import load_recordings, source_of, without_excluded
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.extensions import load_file
 from rigidimeter.core.files import plain_values

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rigidimeter.analysis.reading import Recording, estimates_document
 from rigidimeter.analysis.reading.formats.clocked_table import Stream
-from rigidimeter.analysis.study_anew import Condition, Loaded, Session
+from rigidimeter.analysis.study import Condition, Loaded, Session
 from rigidimeter.core.files import plain_values
 from rigidimeter.core.records import CHANNEL_UNITS, EMG_CHANNELS, Analysis, Delay, Epoch, Fit, Score
 from rigidimeter.core.session import (

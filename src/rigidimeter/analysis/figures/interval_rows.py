@@ -26,7 +26,7 @@ from rigidimeter.analysis.figures.style import (
     write_at,
 )
 from rigidimeter.analysis.statistics import largest_r
-from rigidimeter.analysis.study_anew import StudyResult, result_table
+from rigidimeter.analysis.study import StudyResult, result_table
 from rigidimeter.core.records import PARAMETERS, BandEstimate
 from rigidimeter.core.words import axis_unit, condition_name, interval, number
 

@@ -44,7 +44,7 @@ from rigidimeter.analysis.figures.points import (
 )
 from rigidimeter.analysis.figures.style import condition_colours, drawable, plain_ticks, styled
 from rigidimeter.analysis.reading import Recording
-from rigidimeter.analysis.study_anew import StudyResult, measures_of
+from rigidimeter.analysis.study import StudyResult, measures_of
 from rigidimeter.core.records import Analysis, Channel, Epoch, Fit
 from rigidimeter.core.words import condition_name, epoch_name, short_names
 from rigidimeter.planning import Design, tick_times_s

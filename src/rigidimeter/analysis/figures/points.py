@@ -30,7 +30,7 @@ from rigidimeter.analysis.figures.style import (
     write_at,
 )
 from rigidimeter.analysis.statistics import RankSum, summarise
-from rigidimeter.analysis.study_anew import (
+from rigidimeter.analysis.study import (
     Measure,
     Ratings,
     Relation,

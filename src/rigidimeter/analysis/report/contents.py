@@ -10,7 +10,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure as Drawing
 
 from rigidimeter.analysis.report.shown import Shown
-from rigidimeter.analysis.study_anew import deviation_sentence, result_table
+from rigidimeter.analysis.study import deviation_sentence, result_table
 from rigidimeter.core.records import Epoch, Fit, Score
 from rigidimeter.core.words import Column, Table, epoch_name, short_names
 

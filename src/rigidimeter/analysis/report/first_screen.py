@@ -13,13 +13,13 @@ from markupsafe import Markup
 
 from rigidimeter.analysis.report.shown import Shown
 from rigidimeter.analysis.statistics import WANTED_PERCENT
-from rigidimeter.analysis.study_anew import (
-    DifferenceRow,
+from rigidimeter.analysis.study import (
+    Compared,
     Statement,
     StudyResult,
-    difference_rows,
     p_name,
     result_table,
+    shown_cells,
     statements,
 )
 from rigidimeter.core.words import condition_name, number, plural, scaled, series, within
@@ -53,7 +53,7 @@ class Strip(NamedTuple):
     other: str
     said: Statement
     p_name: str
-    rows: tuple[tuple[DifferenceRow, Markup], ...]
+    rows: tuple[tuple[Compared, dict[str, str], Markup], ...]
 
 
 def strips(result: StudyResult) -> list[Strip]:
@@ -62,23 +62,22 @@ def strips(result: StudyResult) -> list[Strip]:
     for other, said in statements(result.study, result.comparisons).items():
         each = [one for one in result.comparisons if one.other == other]
         to = reach((size for one in each for size in one.percent(one.of_test)), MOST_PERCENT)
-        rows = tuple((row, _plot(row, to)) for row in difference_rows(each))
+        rows = tuple((one, row := shown_cells(one), _plot(one, row, to)) for one in each)
         names = condition_name(result.study.reference), condition_name(other)
         found.append(Strip(*names, said, p_name(each), rows))
     return found
 
 
-def _plot(row: DifferenceRow, to: float) -> Markup:
+def _plot(one: Compared, row: dict[str, str], to: float) -> Markup:
     """Draw the difference with the interval of its test, in % where that has a meaning."""
-    one = row.compared
     if math.isnan(one.difference):
         return Markup("")
     drawn, unit = one.percent(one.of_test), " %"
     if math.isnan(drawn[0]):
-        drawn, unit = one.of_test, f" {row.unit}".rstrip()
+        drawn, unit = one.of_test, f" {row['unit']}".rstrip()
         to = reach(drawn)
     kind = KINDS.get(one.verdict, "")
-    words = f"{row.measure} {row.difference}, 95 % interval {row.interval or 'unknown'}"
+    words = f"{row['measure']} {row['difference']}, 95 % interval {row['interval'] or 'unknown'}"
     return interval_plot(drawn, to, unit, kind=kind, words=words)
 
 

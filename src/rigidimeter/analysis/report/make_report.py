@@ -17,7 +17,7 @@ from rigidimeter.analysis.report.report_folder import (
     why_not_own,
 )
 from rigidimeter.analysis.report.shown import Shown
-from rigidimeter.analysis.study_anew import (
+from rigidimeter.analysis.study import (
     StudyResult,
     analyse,
     analysis_study,

@@ -21,7 +21,7 @@ import numpy as np
 from rigidimeter.analysis.estimation import METHODS, Method
 from rigidimeter.analysis.report.references import Cited, Prose
 from rigidimeter.analysis.report.shown import Shown
-from rigidimeter.analysis.study_anew import RATING, Compared, Condition, StudyResult, result_table
+from rigidimeter.analysis.study import RATING, Compared, Condition, StudyResult, result_table
 from rigidimeter.core.records import Epoch, Fit
 from rigidimeter.core.version import __version__
 from rigidimeter.core.words import condition_name, decimals, fixed, number, plural, series

@@ -21,7 +21,7 @@ from rigidimeter.analysis.report.epoch_traces import page_traces, traces_json
 from rigidimeter.analysis.report.methods import methods_prose
 from rigidimeter.analysis.report.sections import SECTIONS
 from rigidimeter.analysis.report.shown import Shown
-from rigidimeter.analysis.study_anew import lead, traffic_light
+from rigidimeter.analysis.study import lead, traffic_light
 from rigidimeter.core.files import DICTIONARY, csv_text, dictionary_text, visible
 from rigidimeter.core.version import __version__
 from rigidimeter.core.words import Column, Table, epoch_name, short_names, shown_below, shown_value

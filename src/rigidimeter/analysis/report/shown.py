@@ -10,7 +10,7 @@ from typing import Self
 from rigidimeter.analysis.estimation import Ready, Recorded, method_named
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.analysis.recording import provenance
-from rigidimeter.analysis.study_anew import (
+from rigidimeter.analysis.study import (
     Loaded,
     Study,
     StudyResult,

@@ -1,169 +1,236 @@
-"""One measure in two conditions, and how it stands in tables and documents."""
+"""A row of a comparison: one measure in two conditions, tested in one way, and what is concluded.
+
+    difference = other − reference          per cent = 100 · difference / reference
+
+Both values are means with the weights of the test (days, subjects, recordings), or medians (values
+of a table). A test that cannot be made is a row too, with NaN for its numbers and the reason in
+`remark`. In per cent the value in the reference is taken as known, so that an interval excludes
+zero where the one in units does.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field, fields
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple
 
-from rigidimeter.analysis.statistics import DayDifference, Effects, RankSum, Summary
-from rigidimeter.analysis.study.measures import Measure, Observation
+from rigidimeter.analysis.statistics import DayDifference, RankSum
+from rigidimeter.analysis.study.measures import LEVEL, RATING, Family, Measure, Role
+from rigidimeter.core.findings import Finding
+from rigidimeter.core.words import clear_of_zero, decimals, fixed, p_text, within
 
-TEST = "Wilcoxon rank-sum, two-sided, asymptotic, tie and continuity corrected"
+By = Literal["days", "recordings", "blocks", "values"]
+Verdict = Literal["lower", "higher", "no difference shown", "not supported", "cannot be decided"]
+Three = tuple[float, float, float]
+"""A difference and the ends of its interval."""
+Weights = Mapping[tuple[str, str], float]
+"""Of the mean of each day in a condition, by subject and day."""
 
-_TESTED = tuple(field.name for field in fields(RankSum))
-_SIZES = ("r_low", "r_high", "rank_biserial", "rank_biserial_low", "rank_biserial_high")
-_SUMMARY = ("median", "q1", "q3", "sd_percent")
+
+class Signed(NamedTuple):
+    """A difference in words with its sign, and the ends of its interval; `ends` may be empty."""
+
+    value: str
+    ends: str
+
+
+class Needed(NamedTuple):
+    """How many would decide: days with both conditions, subjects, recordings or values of each."""
+
+    number: int
+    unit: str
 
 
 @dataclass(frozen=True)
-class DayMedian:
-    """The included values of one measure on one day of one subject, in one condition."""
-
-    subject: str
-    day: str
-    condition: str
-    n: int
-    median: float
-    q1: float
-    q3: float
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """One measure in every condition, and what sets two of them apart.
+class Compared:
+    """One measure in two conditions.
 
     Attributes
     ----------
     measure : Measure
     reference, other : str
-        The two conditions that are compared; differences are reference − other. `other` is empty
-        where there is only one.
-    observations : tuple of Observation
-        The included values of all conditions, in the order of recording.
-    summaries : mapping of str to Summary
-        By condition; the compared ones first.
-    excluded : mapping of str to int
-        How many epochs of each condition have no included value.
-    pooled : mapping of str to Observation
-        The estimate from all epochs of a condition together, where there is one.
-    test : RankSum or None
-        None when a condition has too few values, for the reason in `remark`.
-    p_holm : float
-        p of `test`, adjusted by Holm's method for all measures that were tested.
-    effects : Effects or None
-        Effect sizes with bootstrap intervals.
-    days : DayDifference or None
-        The test in which days count, not epochs; None where days are not known.
-    days_p_holm : float
-        p of `days`, adjusted in its family (`families`).
-    day_medians : tuple of DayMedian
+        `other` is empty where there is one condition.
+    by : str
+        What counts as one: a day, a recording in its place, a block, or each value.
+    n : (int, int)
+        Values in each condition.
+    test : str
+        In words, such as ``paired t-test of 5 days``; empty without one.
+    unit : str
+        What the test compared: ``day``, ``subject``, ``recording``, ``block`` or ``value``.
+    units : (int, int)
+        How many of them in each condition.
+    value_reference, value_other, difference : float
+        In the unit of the measure.
+    se, df, low, high, p : float
+        Of the difference, with the 95 % interval of the test.
+    sign : float
+        That of the difference, as the test sees it.
+    measured_half : float
+        Half the 95 % interval of the measurement alone; NaN of measures without one.
+    ratio : bool
+        Whether per cent has a meaning: not for scores of a scale, nor values of a table some of
+        which are negative.
+    weights : (mapping, mapping)
+        Of the days in both means.
+    remark : str
+        Why there is no test.
+    statistic : RankSum, DayDifference or None
+        Everything that the test gave; its signs are reference − other.
+    p_adjusted : float
+        p in its family.
+    family : Family
+    half_width : float
+        Half the interval at the level of the first test of the family: the smallest difference that
+        is shown in one study of two. NaN without a test, infinite where no p can reach the level.
+    wanted_percent : float
+        The smallest difference worth finding, of the reference.
+    verdict : str
+        ``lower``, ``higher``, ``no difference shown`` (of the size that is worth finding), ``not
+        supported`` (one was found and something else may have made it), ``cannot be decided``;
+        empty before it is concluded.
+    finding : Finding or None
+        The reason; None where the test is the only reason.
+    caution : Finding or None
+        What is to be known beside the verdict: that the inertia differs.
+    needed : Needed or None
+        What would decide, where it cannot be decided.
+    simulated : (float, float) or None
+        The medians that a virtual study simulated.
     """
 
     measure: Measure
     reference: str
     other: str
-    observations: tuple[Observation, ...]
-    summaries: Mapping[str, Summary]
-    excluded: Mapping[str, int]
-    pooled: Mapping[str, Observation] = field(default_factory=dict)
-    test: RankSum | None = None
+    by: By
+    n: tuple[int, int]
+    test: str = ""
+    unit: str = "day"
+    units: tuple[int, int] = (0, 0)
+    value_reference: float = math.nan
+    value_other: float = math.nan
+    difference: float = math.nan
+    se: float = math.nan
+    df: float = math.nan
+    low: float = math.nan
+    high: float = math.nan
+    p: float = math.nan
+    sign: float = 0.0
+    measured_half: float = math.nan
+    ratio: bool = True
+    weights: tuple[Weights, Weights] = field(default=({}, {}), repr=False)
     remark: str = ""
-    p_holm: float = math.nan
-    effects: Effects | None = None
-    days: DayDifference | None = None
-    days_p_holm: float = math.nan
-    day_medians: tuple[DayMedian, ...] = ()
+    statistic: RankSum | DayDifference | None = field(default=None, repr=False)
+    p_adjusted: float = math.nan
+    family: Family = field(default_factory=Family)
+    half_width: float = math.nan
+    wanted_percent: float = math.nan
+    verdict: Verdict | Literal[""] = ""
+    finding: Finding | None = None
+    caution: Finding | None = None
+    needed: Needed | None = None
+    simulated: tuple[float, float] | None = None
 
     @property
-    def pair(self) -> tuple[str, ...]:
-        """The conditions that are compared: two, or the only one."""
-        return (self.reference, self.other) if self.other else (self.reference,)
+    def pair(self) -> tuple[str, str]:
+        """Reference and other."""
+        return self.reference, self.other
 
     @property
-    def paired(self) -> bool:
-        """Whether there are two conditions to compare."""
-        return bool(self.other)
+    def tested(self) -> bool:
+        """Whether there is a test."""
+        return not math.isnan(self.p)
 
     @property
-    def values(self) -> dict[str, tuple[float, ...]]:
-        """The included values by condition, in the order of recording."""
-        return {name: tuple(o.value for o in self.of(name)) for name in self.summaries}
+    def found(self) -> bool:
+        """Whether there is a difference at the level, of this measure alone."""
+        return self.p < LEVEL
+
+    def agrees(self, other: Compared) -> bool:
+        """Whether this test finds a difference of the sign of another."""
+        return self.found and self.sign * other.sign > 0
 
     @property
-    def groups(self) -> tuple[str, ...]:
-        """The groups of subjects of the compared values; none where they are the conditions."""
-        own = [o for o in self.observations if o.condition in self.pair and o.group]
-        if all(o.group == o.condition for o in own):
-            return ()
-        found = tuple(dict.fromkeys(o.group for o in own))
-        return found if len(found) > 1 else ()
+    def p_words(self) -> str:
+        """p, or why there is none."""
+        return p_text(self.p) if self.tested else self.remark
 
-    def of(self, condition: str) -> tuple[Observation, ...]:
-        """Return the observations of one condition."""
-        return tuple(each for each in self.observations if each.condition == condition)
+    @property
+    def role(self) -> Role:
+        """Whether the measure is primary, secondary, or the check of the instrument."""
+        return self.family.role
+
+    @property
+    def reason(self) -> str:
+        """The headline of the finding as a clause; empty without one."""
+        return "" if self.finding is None else within(self.finding.headline)
+
+    @property
+    def of_test(self) -> Three:
+        """The difference with the interval of the test."""
+        return self.difference, self.low, self.high
+
+    @property
+    def of_measurement(self) -> Three:
+        """The difference with the interval of the measurement alone."""
+        d, half = self.difference, self.measured_half
+        return d, d - half, d + half
+
+    def percent(self, sizes: Three) -> Three:
+        """Return a difference and its interval in % of the reference; NaN if without a meaning."""
+        positive = self.ratio and self.value_reference > 0
+        scale = 100 / self.value_reference if positive else math.nan
+        estimate, low, high = sizes
+        return estimate * scale, low * scale, high * scale
+
+    @property
+    def share(self) -> float:
+        """The difference as a share of the larger value."""
+        return abs(self.difference) / max(abs(self.value_reference), abs(self.value_other))
+
+    @property
+    def simulated_difference(self) -> tuple[float, float]:
+        """The difference that was simulated, and in % of the reference; NaN without a meaning."""
+        first, second = self.simulated or (math.nan, math.nan)
+        known = first > 0 and self.measure != RATING
+        return second - first, 100 / first * (second - first) if known else math.nan
+
+    def numbers(self) -> dict[str, Any]:
+        """Return the values and the difference as documents and tables have them."""
+        found: dict[str, Any] = {
+            "centre": "median" if self.by == "values" else "mean",
+            "value_reference": self.value_reference,
+            "value_other": self.value_other,
+        }
+        for name, sizes in (("difference", self.of_test), ("measured", self.of_measurement)):
+            for key, three in ((name, sizes), (f"{name}_percent", self.percent(sizes))):
+                found |= {key: three[0], f"{key}_low": three[1], f"{key}_high": three[2]}
+        del found["measured"], found["measured_percent"]  # the difference is that of the test
+        return found | {"p": self.p}
 
 
-def comparison_values(c: Comparison) -> dict[str, Any]:
-    """Return one comparison; the keys of its test are flat, those by days are under `days`."""
-    return {
-        **_names(c),
-        "groups": {
-            name: asdict(c.summaries[name]) | {"excluded": c.excluded[name]} for name in c.pair
-        },
-        "test": TEST,
-        **_tested(c),
-        "remark": c.remark,
-        "days": None if c.days is None else _days(c),
-    }
+def signed(percent: Three, own: Three, unit: str = "", two_below: float = 5.0) -> Signed:
+    """Return a difference and its interval in words: in per cent where that has a meaning.
 
+    Parameters
+    ----------
+    percent, own : (float, float, float)
+        In % and in the unit.
+    unit : str
+    two_below : float
+        A half interval below this is given with two digits.
 
-def measure_names(measure: Measure) -> dict[str, str]:
-    """Return how tables and documents name a measure."""
-    return {"measure": measure.name, "title": measure.title, "unit": measure.unit}
-
-
-def _names(c: Comparison) -> dict[str, str]:
-    return measure_names(c.measure) | {"reference": c.reference, "other": c.other}
-
-
-def _tested(c: Comparison) -> dict[str, Any]:
-    return {
-        **{name: getattr(c.test, name, None) for name in _TESTED},
-        "p_holm": c.p_holm,
-        **{name: getattr(c.effects, name, None) for name in _SIZES},
-        "interval_method": getattr(c.effects, "method", None),
-    }
-
-
-def _days(c: Comparison) -> dict[str, Any]:
-    row: dict[str, Any] = asdict(c.days) if c.days is not None else {}
-    row.pop("weights", None)
-    row["days_reference"], row["days_other"] = row.pop("n_days_x"), row.pop("n_days_y")
-    row["days_both"] = row.pop("n_days_both")
-    row["mean_reference"], row["mean_other"] = row.pop("mean_x"), row.pop("mean_y")
-    return row | {"p_holm": c.days_p_holm}
-
-
-def comparison_rows(comparisons: Iterable[Comparison]) -> list[dict[str, Any]]:
-    """Return the comparisons as a table, one row for each measure."""
-    rows = []
-    for c in comparisons:
-        row: dict[str, Any] = dict(_names(c))
-        for side, name in zip(("reference", "other"), (c.reference, c.other), strict=True):
-            known = name in c.pair
-            numbers = asdict(c.summaries[name]) if known else dict.fromkeys(("n", *_SUMMARY))
-            row[f"n_{side}"] = numbers["n"]
-            row[f"excluded_{side}"] = c.excluded[name] if known else None
-            row |= {f"{key}_{side}": numbers[key] for key in _SUMMARY}
-        row |= _tested(c) | {"remark": c.remark}
-        if c.days is not None:
-            days = _days(c)
-            days["offsets"] = " + ".join(days["offsets"])
-            row |= {
-                name if name.startswith("days_") else f"days_{name}": value
-                for name, value in days.items()
-            }
-        rows.append(row)
-    return rows
+    Examples
+    --------
+    >>> signed((-18.2, -29.0, -7.4), (-0.3, -0.5, -0.1), "N·m/rad")
+    Signed(value='−18 %', ends='−29 to −7 %')
+    """
+    known = not math.isnan(percent[0])
+    estimate, low, high = percent if known else own
+    if math.isnan(estimate):
+        return Signed("–", "")
+    after = " %" if known else f" {unit}".rstrip()
+    digits = clear_of_zero(decimals((high - low) / 2, estimate, two_below), low, high)
+    value, *ends = (fixed(size, digits, sign=True) for size in (estimate, low, high))
+    return Signed(f"{value}{after}", "" if math.isnan(low) else f"{' to '.join(ends)}{after}")

@@ -1,30 +1,44 @@
-"""What a comparison of two conditions found: every number that a page, a table or a line shows."""
+"""A study compared and concluded: what the functions of the public interface give."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from html import escape
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
 
 import rigidimeter
-from rigidimeter.analysis.estimation import Ready
-from rigidimeter.analysis.statistics import EffectDifference
-from rigidimeter.analysis.study.compared import Comparison, comparison_rows
-from rigidimeter.analysis.study.families import Primary
-from rigidimeter.analysis.study.measures import Measure
-from rigidimeter.analysis.study.ratings_found import RatingsFound
-from rigidimeter.core.records import Analysis, Epoch, FindingGroup, Fit, Notice, Score
-from rigidimeter.core.settings import Settings
+from rigidimeter.analysis.statistics import Effects, Summary
+from rigidimeter.analysis.study.compared import Compared
+from rigidimeter.analysis.study.comparisons import (
+    EffectPair,
+    OfMethod,
+    Progress,
+    compare_values,
+    day_tests,
+    effects,
+    sensitivity,
+)
+from rigidimeter.analysis.study.differences import difference_cells
+from rigidimeter.analysis.study.document import (
+    comparison_rows,
+    conclusion_rows,
+    condition_names,
+    summaries_of,
+)
+from rigidimeter.analysis.study.rows import measures_of
+from rigidimeter.analysis.study.sentences import Statement, statement
+from rigidimeter.analysis.study.study import Study
+from rigidimeter.analysis.study.verdicts import conclude, reasons
+from rigidimeter.core.records import FindingGroup, Notice
 from rigidimeter.core.words import html_table, one_line, series, with_error
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
-
-    from rigidimeter.analysis.study.statements import Statements
 
 _READ = (
     *("measure", "unit", "reference", "other", "value_reference", "value_other"),
@@ -32,266 +46,93 @@ _READ = (
 )
 """The columns of a table that is read by people."""
 
-
-@dataclass(frozen=True)
-class EffectPair:
-    """How much larger the effect size of one measure is than that of another, by stored names.
-
-    `p_holm` is adjusted by Holm's method for all pairs.
-    """
-
-    first: str
-    second: str
-    difference: EffectDifference
-    p_holm: float
-
-
-@dataclass(frozen=True)
-class Condition:
-    """One condition of a study: its name, and the stimulation if there is one.
-
-    What was not written down is None or empty. `simulated` are the medians of a virtual condition,
-    by the names of the measures.
-    """
-
-    name: str
-    title: str = ""
-    frequency_hz: float | None = None
-    amplitude: float | None = None
-    amplitude_unit: str = ""
-    pulse_width_us: float | None = None
-    electrodes: str = ""
-    wash_in_min: float | None = None
-    simulated: Mapping[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class SessionEntry:
-    """One recording of a study: whose, when, in what condition, and where it lies.
-
-    `group` is that of the subject, such as patients; empty where the table has none.
-    `source` is the name by which its epochs go in an analysis; `code` is the blinded name of its
-    condition as the table has it, `condition` what the key says, or the code without a key.
-    """
-
-    subject: str
-    day: str
-    condition: str
-    code: str
-    path: str
-    source: str
-    group: str = ""
-
-
-@dataclass(frozen=True)
-class SensitivityRow:
-    """The comparison of one measure by another method.
-
-    `method` is the estimator; `inertia` says whether J was held at its median (``fixed``) or
-    fitted with B and K in each epoch (``free``). `p_day` is that of the test by days.
-    """
-
-    measure: Measure
-    method: str
-    inertia: Literal["fixed", "free"]
-    n_reference: int
-    n_other: int
-    shift: float
-    shift_low: float
-    shift_high: float
-    p: float
-    r: float
-    p_day: float
-    chosen: bool
-
-
-@dataclass(frozen=True)
-class Exclusion:
-    """One epoch that does not count, who said so, and why.
-
-    `by` is ``protocol`` (ended early or was repeated), ``check`` (a diagnostic), ``estimate`` (no
-    fit) or ``operator`` (the study's table of exclusions; `who` is whom it names).
-    """
-
-    subject: str
-    day: str
-    condition: str
-    source: str
-    epoch: str
-    task: str
-    by: Literal["protocol", "check", "estimate", "operator"]
-    reason: str
-    who: str = ""
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """One recording of a study's table that does not count at all, and why.
-
-    `condition` is as the table has it, a code or a name.
-    """
-
-    path: str
-    subject: str
-    day: str
-    condition: str
-    reason: str
-
-
-@dataclass(frozen=True)
-class Deviation:
-    """One way in which a session was not as planned.
-
-    Attributes
-    ----------
-    subject, day : str
-    order : int
-        Place in the day that was planned; 0 where none was.
-    condition : str
-    path : str
-        Of the session; empty where none was recorded.
-    kind : str
-        ``not done``, ``not planned``, ``out of order``, ``short wait``, ``unknown wait``, ``other
-        protocol``, ``cut short``, ``plan edited``.
-    detail : str
-    """
-
-    subject: str
-    day: str
-    order: int
-    condition: str
-    path: str
-    kind: str
-    detail: str
+TESTS_SHARE = 0.1
+"""Of the work on a study folder: what its tests take."""
 
 
 @dataclass(frozen=True)
 class StudyResult:
-    """Everything that was concluded from two conditions of recordings, a study or a table.
+    """Everything that was concluded from conditions of recordings, a study or a table.
 
     Attributes
     ----------
-    title : str
-    reference, other : str
-        The conditions that are compared; `other` is empty where there is only one.
-    comparisons : tuple of Comparison
-        One for each measure; the ratings of a study are the last.
-    further : tuple of Comparison
-        Those of each other condition with the reference, where no two were chosen; p is adjusted
-        for these and `comparisons` together.
-    differences : tuple of EffectPair
+    study : Study
+        What was compared: its rows, conditions, sessions, settings and estimates.
+    comparisons : tuple of Compared
+        What is concluded of each measure in each pair of conditions; the first pair is the main
+        one. Empty where there is one condition.
+    values : tuple of Compared
+        The rank-sum tests, in which each epoch counts, with p by Holm's method; of one condition
+        alone a row for each measure without a test.
+    effects : mapping of str to Effects
+        Effect sizes of the main pair, by the name of the measure.
+    effect_pairs : tuple of EffectPair
+    methods : tuple of OfMethod
+        The main pair by every method; of a study folder alone.
     notices : tuple of Notice
     seed, resamples : int
         Of the bootstrap.
-    source, by : str
-        The table and its column of conditions, where columns of a table are compared.
-    analysis, epochs, settings
-        What was analysed; empty for columns of a table.
-    prepared : tuple of Ready
-        The epochs as they were analysed, with what was made of them, for the figures; empty where
-        they were not analysed here.
-    provenance : mapping of str to str
-    conditions, sessions, blinded, virtual, ratings, sensitivity, exclusions, left_out, changes
-        Of a study folder alone; `sessions` is empty if there is none. `blinded`: the conditions are
-        codes, for no key was given. `virtual`: every session comes from the virtual rig.
-        `changes`: what is new since the last analysis was kept, in sentences.
-    deviations : tuple of Deviation
-        Of a study folder with a plan.
-    own_rig : bool
-        Whether a session of this program was among what was analysed, so that the settings of the
-        rig are those that it was recorded with.
-    primary : Primary
     """
 
-    title: str
-    reference: str
-    other: str
-    comparisons: tuple[Comparison, ...]
-    differences: tuple[EffectPair, ...] = ()
+    study: Study
+    comparisons: tuple[Compared, ...]
+    values: tuple[Compared, ...]
+    effects: Mapping[str, Effects] = field(default_factory=dict)
+    effect_pairs: tuple[EffectPair, ...] = ()
+    methods: tuple[OfMethod, ...] = ()
     notices: tuple[Notice, ...] = ()
     seed: int = 1
     resamples: int = 9999
-    source: str = ""
-    by: str = ""
-    analysis: Analysis = Analysis("", (), (), math.nan, ())  # noqa: RUF009
-    epochs: tuple[Epoch, ...] = ()
-    prepared: tuple[Ready, ...] = field(default=(), repr=False, compare=False)
-    settings: Settings = field(default_factory=Settings)
-    provenance: Mapping[str, str] = field(default_factory=dict)
-    conditions: tuple[Condition, ...] = ()
-    sessions: tuple[SessionEntry, ...] = ()
-    blinded: bool = False
-    virtual: bool = False
-    ratings: RatingsFound | None = None
-    sensitivity: tuple[SensitivityRow, ...] = ()
-    exclusions: tuple[Exclusion, ...] = ()
-    left_out: tuple[LeftOut, ...] = ()
-    changes: tuple[str, ...] = ()
-    own_rig: bool = False
-    further: tuple[Comparison, ...] = ()
-    primary: Primary = Primary()  # noqa: RUF009
-    deviations: tuple[Deviation, ...] = ()
 
-    @property
-    def further_pairs(self) -> tuple[StudyResult, ...]:
-        """The same result with each further condition in the place of `other`."""
-        every = (*self.comparisons, *self.further)
-        return tuple(
-            replace(
-                self,
-                other=other,
-                comparisons=tuple(c for c in self.further if c.other == other),
-                further=tuple(c for c in every if c.other != other),
-                ratings=None if self.ratings is None else replace(self.ratings, other=other),
-            )
-            for other in dict.fromkeys(c.other for c in self.further)
-        )
+    def comparison(self, measure: str, other: str | None = None) -> Compared | None:
+        """Return what is concluded of a measure, by its stored name.
+
+        `other` is the condition that is compared with the reference; that of the main pair by
+        default.
+        """
+        return self._of(self.comparisons, measure, other)
+
+    def value_test(self, measure: str, other: str | None = None) -> Compared | None:
+        """Return the rank-sum test of a measure, by its stored name."""
+        return self._of(self.values, measure, other)
+
+    def _of(self, each: tuple[Compared, ...], measure: str, other: str | None) -> Compared | None:
+        wanted = measure, self.study.other if other is None else other
+        return next((one for one in each if (one.measure.name, one.other) == wanted), None)
+
+    def summaries(self, measure: str) -> dict[str, Summary]:
+        """Return the summary of the values of a measure by condition; the compared ones first."""
+        return {name: own for name, (own, _) in summaries_of(self.study, measure).items()}
 
     @property
     def condition_names(self) -> tuple[str, ...]:
         """All conditions in the order of the study or the protocol, then as recorded."""
-        compared = [name for name in (self.reference, self.other) if name]
-        found = self.analysis
-        results: tuple[Fit | Score, ...] = (*found.fits, *found.fixed_inertia, *found.scores)
-        recorded = [each.condition for each in (*self.epochs, *results)]
-        tabled = [name for each in self.comparisons for name in each.summaries]
-        order = [each.name for each in self.conditions]
-        order = order or [block.condition for block in self.settings.protocol.blocks]
-        found_in = dict.fromkeys([*compared, *recorded, *tabled])
-        return tuple(sorted(found_in, key=lambda n: order.index(n) if n in order else len(order)))
+        return condition_names(self.study)
 
     @property
     def several_subjects(self) -> bool:
         """Whether J was held at each subject's own median, for there are several subjects."""
-        return len({session.subject for session in self.sessions}) > 1
+        return len({session.subject for session in self.study.sessions}) > 1
 
     @property
     def resampled(self) -> str:
         """What the bootstrap of the effect sizes resamples."""
-        if not self.sessions:
+        if not self.study.sessions:
             return "sessions or single values"
         return "the days of each subject" if self.several_subjects else "whole days"
 
-    def comparison(self, measure: str) -> Comparison | None:
-        """Return the comparison of a measure by its stored name."""
-        return next((each for each in self.comparisons if each.measure.name == measure), None)
-
     @property
-    def statements(self) -> Statements | None:
+    def statements(self) -> Statement | None:
         """What was measured, tested and concluded, in words; None of one condition alone.
 
-        Of each comparison with the reference, those of `further` too.
+        Of each condition beside the reference.
         """
-        from rigidimeter.analysis.study.statements import statements_of_all
-
-        return statements_of_all(self)
+        return statement(self.study, self.comparisons)
 
     @property
     def findings(self) -> tuple[FindingGroup, ...]:
         """What the checks found in the epochs, and the reasons of the verdicts, by measures."""
-        from rigidimeter.analysis.study.conclusions import reasons
-
-        return (*self.analysis.findings, *reasons(self))
+        return (*self.study.analysis.findings, *reasons(self.comparisons))
 
     def table(self, *, full: bool = False) -> pd.DataFrame:
         """Return the comparisons as a pandas table, a row for each measure.
@@ -303,13 +144,9 @@ class StudyResult:
             values of each measure, their difference (other − reference) with the 95 % interval of
             its test, p after Holm, and what is concluded.
         """
-        import pandas as pd
-
-        from rigidimeter.analysis.study.conclusions import conclusion_rows
-
-        if full or not self.other:
-            return pd.DataFrame(comparison_rows((*self.comparisons, *self.further)))
-        return pd.DataFrame(conclusion_rows(self), columns=list(_READ))
+        if full or not self.study.other:
+            return pd.DataFrame(comparison_rows(self))
+        return pd.DataFrame(conclusion_rows(self.comparisons), columns=list(_READ))
 
     def plot(
         self, measures: Sequence[str] | None = None, *, axes: Sequence[Axes] | None = None
@@ -363,20 +200,46 @@ class StudyResult:
 
     def __repr__(self) -> str:
         """Return the medians of the conditions in each measure as one line."""
-        others = dict.fromkeys((self.other, *(c.other for c in self.further)))
-        names = [name for name in (self.reference, *others) if name]
+        study = self.study
+        names = [name for name in (study.reference, *study.others) if name]
         shown = []
-        for c in self.comparisons:
-            found = [c.summaries[name] for name in names or c.pair if name in c.summaries]
-            medians = series([with_error(s.median, math.nan) for s in found])
-            shown.append(one_line(c.measure.title, medians, c.measure.unit, joint=" "))
-        medians = f"medians: {', '.join(shown)}" if shown else ""
-        return one_line(self.title, series(names), medians)
+        for measure in measures_of(study.rows):
+            known = self.summaries(measure.name)
+            medians = [known[name].median for name in names or [""] if name in known]
+            words = series([with_error(median, math.nan) for median in medians])
+            shown.append(one_line(measure.title, words, measure.unit, joint=" "))
+        medians_of_each = f"medians: {', '.join(shown)}" if shown else ""
+        return one_line(study.title, series(names), medians_of_each)
 
     def _repr_html_(self) -> str:
         """Return what the terminal shows of each measure, by pairs of conditions."""
-        from rigidimeter.analysis.study.difference_rows import difference_cells
+        shown = [html_table(*difference_cells(self, other)) for other in self.study.others]
+        return "\n".join([f"<p>{escape(self.study.title)}</p>", *(shown or [escape(repr(self))])])
 
-        tables = [difference_cells(pair) for pair in (self, *self.further_pairs) if pair.other]
-        shown = [html_table(headings, cells) for headings, cells in tables]
-        return "\n".join([f"<p>{escape(self.title)}</p>", *(shown or [escape(repr(self))])])
+
+def conclude_study(
+    study: Study,
+    *,
+    seed: int = 1,
+    resamples: int = 9999,
+    progress: Progress = lambda _: None,
+) -> StudyResult:
+    """Compare a study and conclude from it, once.
+
+    Parameters
+    ----------
+    study : Study
+    seed, resamples : int
+        Of the bootstrap; with 0 resamples there are no effect sizes with intervals.
+    progress : callable
+        Called with the share of the work that was done since, 1 in all.
+    """
+    values = compare_values(study)
+    sizes, pairs = effects(study, values, seed=seed, resamples=resamples, progress=progress)
+    methods: tuple[OfMethod, ...] = ()
+    notices = study.notices
+    if study.sessions and study.other:
+        methods, lacking = sensitivity(study.rows, study.pair)
+        notices = (*notices, *lacking)
+    concluded = conclude(study, day_tests(study), methods)
+    return StudyResult(study, concluded, values, sizes, pairs, methods, notices, seed, resamples)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from rigidimeter.analysis.export import export_sessions, sessions_of_study
-from rigidimeter.analysis.study_anew import load_study
+from rigidimeter.analysis.study import load_study
 
 VALIDATOR = Path(sys.executable).with_name("bids-validator-deno")
 

@@ -16,7 +16,7 @@ from rigidimeter.analysis.export import (
     sessions_of_study,
 )
 from rigidimeter.analysis.reading import read
-from rigidimeter.analysis.study_anew import load_study
+from rigidimeter.analysis.study import load_study
 
 pynwb = pytest.importorskip("pynwb", reason="pip install 'rigidimeter[nwb]'")
 

@@ -10,7 +10,7 @@ import pytest
 
 from rigidimeter.analysis.export import sessions_of_recording, sessions_of_study
 from rigidimeter.analysis.reading import read
-from rigidimeter.analysis.study_anew import estimate_study, load_study
+from rigidimeter.analysis.study import estimate_study, load_study
 from rigidimeter.core.files import json_text
 from rigidimeter.core.session import read_session_files
 from rigidimeter.core.settings import parse_settings

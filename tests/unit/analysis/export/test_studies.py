@@ -7,7 +7,7 @@ import pytest
 
 from rigidimeter.analysis.export import export_sessions, sessions_of_recording
 from rigidimeter.analysis.reading import read
-from rigidimeter.analysis.study_anew import load_study
+from rigidimeter.analysis.study import load_study
 
 
 def test_exports_are_the_sessions_that_they_were_made_of(study: Path) -> None:

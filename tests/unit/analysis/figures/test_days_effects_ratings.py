@@ -22,7 +22,7 @@ from rigidimeter.analysis.figures import (
 )
 from rigidimeter.analysis.report import SECTIONS, Shown
 from rigidimeter.analysis.report import Figure as PageFigure
-from rigidimeter.analysis.study_anew import Measure, as_rows, counting
+from rigidimeter.analysis.study import Measure, as_rows, counting
 
 NAMES = ("OFF", "DBS")
 COLOURS, MARKERS = condition_colours(NAMES), condition_markers(NAMES)

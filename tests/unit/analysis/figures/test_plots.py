@@ -18,7 +18,7 @@ from tests.unit.analysis.report.cohorts import Design, made_study
 import rigidimeter as rm
 from rigidimeter.analysis.reading import Recording
 from rigidimeter.analysis.report import Shown
-from rigidimeter.analysis.study_anew import StudyResult
+from rigidimeter.analysis.study import StudyResult
 from rigidimeter.core.records import Analysis, Epoch, Fit, Outcome
 from rigidimeter.core.settings import Settings
 from rigidimeter.planning import design

@@ -13,7 +13,7 @@ from tests.replayed import assert_folder_replayed
 
 import rigidimeter as rm
 from rigidimeter.analysis.reading import example_data
-from rigidimeter.analysis.study_anew import load_study
+from rigidimeter.analysis.study import load_study
 from rigidimeter.core.errors import UserError
 from rigidimeter.virtual import plan_study, run_virtual_session
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigidimeter.analysis.report import Shown
-from rigidimeter.analysis.study_anew import (
+from rigidimeter.analysis.study import (
     SCORE,
     Compared,
     Condition,

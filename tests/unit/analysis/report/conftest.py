@@ -9,7 +9,7 @@ from scipy import signal
 
 from rigidimeter.analysis.recording import estimate
 from rigidimeter.analysis.report import Shown
-from rigidimeter.analysis.study_anew import analysis_study, conclude_study
+from rigidimeter.analysis.study import analysis_study, conclude_study
 from rigidimeter.core.records import Analysis, Channel, Epoch, Fit, Motion, Notice, Outcome, Score
 from rigidimeter.core.settings import Settings
 from rigidimeter.model import JointDynamics

@@ -14,7 +14,7 @@ from tests.unit.analysis.report.parsed_page import ParsedPage, assert_shows, sec
 
 from rigidimeter.analysis.reading import estimates_document
 from rigidimeter.analysis.report import Shown, page_text, report, shown_tables
-from rigidimeter.analysis.study_anew import comparison_document, difference_rows, statements
+from rigidimeter.analysis.study import comparison_document, shown_cells, statements
 from rigidimeter.cli.comparison_text import difference_blocks, full_blocks, statement_blocks
 from rigidimeter.cli.terminal_tables import Block, Heading, Table
 from rigidimeter.core.files import read_json, write_json
@@ -123,35 +123,42 @@ def test_the_terminal_has_the_tables_of_the_page_cell_for_cell(study, page, by_e
 
 
 def test_the_table_of_differences_is_one_on_page_and_terminal(study, json, page) -> None:
-    """Each cell is that of `difference_rows`, and rounds the number of the document."""
-    rows = difference_rows(study.result.comparisons)
+    """Each cell is that of `shown_cells`, and rounds the number of the document."""
+    rows = [shown_cells(one) for one in study.result.comparisons]
     (terminal,) = difference_blocks(study.result, "DBS")
     strip = page.table("DBS against OFF")
     assert [plain(heading) for heading in strip[0]][:4] == ["Measure", "OFF", "DBS", "DBS − OFF"]
     assert [*terminal.headings[1:4]] == ["OFF", "DBS", "DBS − OFF"]
     found = json["comparison"]["conclusion"]
     for row, one, cells, line in zip(rows, found, strip[1:], terminal.rows, strict=True):
-        shown = [row.reference, row.other, row.difference, row.interval, row.p, row.verdict]
-        measure = f"{row.measure}, {row.unit}" if row.unit else row.measure
+        shown = [
+            row["reference"],
+            row["other"],
+            row["difference"],
+            row["interval"],
+            row["p"],
+            row["verdict"],
+        ]
+        measure = f"{row['measure']}, {row['unit']}" if row["unit"] else row["measure"]
         assert [cells[0], *cells[1:5], *cells[6:8]] == [measure, *shown]
         reference, other, difference, simulated, interval, p, verdict = line[1:]
         assert line[0] == measure
         assert [reference, other, difference, interval, p, verdict] == shown
-        assert simulated == row.simulated == ""
-        factor = 1e3 if "10⁻³" in row.unit else 1.0
-        assert_shows(row.reference, [factor * one["value_reference"]], 3)
-        assert_shows(row.other, [factor * one["value_other"]], 3)
+        assert simulated == row["simulated"] == ""
+        factor = 1e3 if "10⁻³" in row["unit"] else 1.0
+        assert_shows(row["reference"], [factor * one["value_reference"]], 3)
+        assert_shows(row["other"], [factor * one["value_other"]], 3)
         part = "difference" if one["difference_percent"] is None else "difference_percent"
-        assert (" %" in row.difference) == (part == "difference_percent")
+        assert (" %" in row["difference"]) == (part == "difference_percent")
         factor = factor if part == "difference" else 1.0
         sizes = [factor * one[f"{part}{end}"] for end in ("", "_low", "_high")]
-        assert_rounds(f"{row.difference} {row.interval}", sizes)
+        assert_rounds(f"{row['difference']} {row['interval']}", sizes)
         if one["role"] == "check":  # J is in no family
-            assert row.p == "–"
+            assert row["p"] == "–"
         else:
-            assert_shows(row.p, [one["p_holm"]], 2)
+            assert_shows(row["p"], [one["p_holm"]], 2)
         words = {"no difference shown": "none shown", "cannot be decided": "undecided"}
-        assert row.verdict == words.get(one["verdict"], one["verdict"])
+        assert row["verdict"] == words.get(one["verdict"], one["verdict"])
 
 
 def assert_rounds(text: str, values: Sequence[float]) -> None:
@@ -172,11 +179,11 @@ def test_simulated_differences_stand_beside_those_found(study) -> None:
     virtual = made_study(
         Design(days=(4, 3), epochs=(4, 4), scores=(3, 3)), conditions=tuple(named), virtual=True
     )
-    rows = difference_rows(virtual.result.comparisons)
-    assert [row.simulated for row in rows] == ["−20 %", *[""] * 5]
+    rows = [shown_cells(one) for one in virtual.result.comparisons]
+    assert [row["simulated"] for row in rows] == ["−20 %", *[""] * 5]
     (terminal,) = difference_blocks(virtual.result, "DBS")
     assert terminal.headings[4] == "simulated"
-    assert [line[4] for line in terminal.rows] == [row.simulated for row in rows]
+    assert [line[4] for line in terminal.rows] == [row["simulated"] for row in rows]
     strip = ParsedPage(page_text(virtual)).table("DBS against OFF")
     assert strip[0][4] == "Simulated"
     assert [cells[4] for cells in strip[1:]] == ["−20 %", *["–"] * 5]

@@ -9,7 +9,7 @@ from tests.unit.analysis.report.cohorts import Design, bare, made_study, of_resu
 from tests.unit.analysis.report.parsed_page import ParsedPage
 
 from rigidimeter.analysis.report import Shown, methods_prose, page_text
-from rigidimeter.analysis.study_anew import Primary, traffic_light
+from rigidimeter.analysis.study import Primary, traffic_light
 from rigidimeter.core.study_files import PrimaryTable
 
 SMALL = Design(days=(4, 3), epochs=(4, 4), scores=(3, 3))

@@ -10,7 +10,7 @@ from tests.unit.analysis.report.cohorts import Design, made_study
 from tests.unit.analysis.report.parsed_page import sections_without
 
 from rigidimeter.analysis.report import Shown, report
-from rigidimeter.analysis.study_anew import analysis_study, conclude_study
+from rigidimeter.analysis.study import analysis_study, conclude_study
 
 DESKTOP, PHONE = (1280, 800), (390, 844)
 SCREENS = Path(__file__).parents[4] / "build" / "screens"

@@ -10,7 +10,7 @@ import pytest
 
 from rigidimeter.analysis.reading import read
 from rigidimeter.analysis.report import Shown, report
-from rigidimeter.analysis.study_anew import compare
+from rigidimeter.analysis.study import compare
 from rigidimeter.core.errors import UserError
 from rigidimeter.core.records import Epoch
 

@@ -19,7 +19,7 @@ from tests.unit.analysis.report.parsed_page import ParsedPage, sections_without
 
 from rigidimeter.analysis.report import SECTIONS, Shown, page_text, report
 from rigidimeter.analysis.statistics import DayDifference, difference
-from rigidimeter.analysis.study_anew import Compared, Condition
+from rigidimeter.analysis.study import Compared, Condition
 from rigidimeter.core.words import number, p_value
 
 SMALL = Design(days=(4, 3), epochs=(4, 4), scores=(3, 3))

@@ -37,7 +37,7 @@ from rigidimeter.analysis.report.sections.every_epoch import pooled_table
 from rigidimeter.analysis.report.sections.examiners import RATINGS, RELATION
 from rigidimeter.analysis.report.shown import Shown
 from rigidimeter.analysis.statistics import summarise
-from rigidimeter.analysis.study_anew import RATING, Rows, result_table
+from rigidimeter.analysis.study import RATING, Rows, result_table
 from rigidimeter.core.words import (
     INTERVAL,
     TURNED,

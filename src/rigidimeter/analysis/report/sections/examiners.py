@@ -16,7 +16,7 @@ from rigidimeter.analysis.report.contents import (
 )
 from rigidimeter.analysis.report.shown import Shown
 from rigidimeter.analysis.statistics import contrast, interval_of
-from rigidimeter.analysis.study_anew import Ratings, agreement, relations
+from rigidimeter.analysis.study import Ratings, agreement, relations
 from rigidimeter.core.words import (
     INTERVAL,
     SESSION,

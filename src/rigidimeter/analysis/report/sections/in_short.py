@@ -25,7 +25,7 @@ from rigidimeter.analysis.report.contents import (
     part,
 )
 from rigidimeter.analysis.report.shown import Shown
-from rigidimeter.analysis.study_anew import Rows, measures_of, result_table, traffic_light
+from rigidimeter.analysis.study import Rows, measures_of, result_table, traffic_light
 from rigidimeter.core.findings import Finding
 from rigidimeter.core.records import Analysis, FindingGroup, Fit, notes_text
 from rigidimeter.core.words import (

@@ -29,7 +29,7 @@ from rigidimeter.analysis.report.contents import (
     part,
 )
 from rigidimeter.analysis.report.shown import Shown
-from rigidimeter.analysis.study_anew import method_caveats, result_table
+from rigidimeter.analysis.study import method_caveats, result_table
 from rigidimeter.core.records import PARAMETERS
 from rigidimeter.core.words import INTERVAL, TURNED, Column, Table, condition_name, interval, number
 

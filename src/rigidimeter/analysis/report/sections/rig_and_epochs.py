@@ -31,7 +31,7 @@ from rigidimeter.analysis.report.contents import (
 from rigidimeter.analysis.report.methods import method_of
 from rigidimeter.analysis.report.sections.every_epoch import HOW, WHO
 from rigidimeter.analysis.report.shown import Shown
-from rigidimeter.analysis.study_anew import result_table
+from rigidimeter.analysis.study import result_table
 from rigidimeter.analysis.traces import analysed_epoch, representative_fits
 from rigidimeter.core.records import Delay, Fit, Score
 from rigidimeter.core.words import SESSION, Column, Table, condition_name, plural, series
