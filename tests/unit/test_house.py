@@ -24,7 +24,6 @@ READING = SOURCE / "rigidimeter" / "analysis" / "reading"
 READING_DIGEST = "a1b1a0963899826e1fdc095122dd2de69e6e69de8f9c2b29ead715c93043b77f"
 """Of the files of that room, which does not change while its successor is written."""
 STUDY = SOURCE / "rigidimeter" / "analysis" / "study"
-STUDY_NAMES = ("Test", "Difference", "Conclusion", "DifferenceRow", "DayMedian")
 """Types for which a row of a comparison is enough."""
 NOT_REACHED = pytest.mark.xfail(strict=True, reason="not reached")
 
