@@ -125,7 +125,7 @@ def untested(case: Case) -> Finding:
         lost = [out for out in case.study.left_out if out.condition == name]
         if lost and name not in read:
             which = "the recording" if len(lost) == 1 else f"all {len(lost)} recordings"
-            facts = {"which": which, "condition": name, "reason": lost[0].reason}
+            facts = {"which": which, "lost": name, "reason": lost[0].reason}
             return found_between("unused_recordings", facts, len(lost))
     return found_between("no_test", {"remark": case.test.remark})
 

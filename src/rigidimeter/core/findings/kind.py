@@ -35,7 +35,7 @@ EXAMPLE: Mapping[str, object] = {
     **{"cause": "tremor", "counts": "0 of 6 epochs in OFF, 5 of 6 in DBS", "without": "p = 0.31"},
     **{"first": "J", "second": "K", "high_j": 5.9e-3, "low_j": 4.5e-3, "who": "examiners A and B"},
     **{"tests": "5 tests", "of": " for 2 measures", "half_ms": 0.05, "remains": 3e-9},
-    **{"which": "the recording", "condition": "DBS", "reason": "there is no such file"},
+    **{"which": "the recording", "lost": "DBS", "reason": "there is no such file"},
     **{"remark": "there is one day in each condition"},
 }
 """What the templates show in examples, where the example of a kind has nothing else."""

@@ -132,8 +132,8 @@ example: {"value": 0.01, "before": "K"}
 
 == unused_recordings | caution | 1 |
 checks: number of recordings of a condition that were left out, where none is left
-headline: {which} in {condition} could not be used: {reason}
-measured: {which} in {condition} could not be used: {reason}.
+headline: {which} in {lost} could not be used: {reason}
+measured: {which} in {lost} could not be used: {reason}.
 meaning: So there is nothing to compare.
 remedy: See why each recording was left out.
 example: {"value": 1.0}
