@@ -10,14 +10,15 @@ and everything tested and concluded anew.
 
 The whole study is used or nothing: J is held at the median of a subject, a method is chosen from
 all epochs, and a session is left out for what most others are. Nothing is kept of one group of
-subjects, with what files of the user add to the package, or where something outside was read or a
-folder is a link.
+subjects, with what files of the user add to the package, or where something outside was read, a
+folder is a link or a file cannot be read.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -141,11 +142,12 @@ def rows_file(loaded: Loaded, study: Study) -> bytes | None:
         return (folder / ANALYSIS / ROWS).read_bytes()
     there = _there(folder)
     outside = there is None or loaded.recordings.outside
+    said = " ".join(one.text for one in study.notices)
+    outside |= asked["key"] is not None and str(asked["key"]) in said  # it may lie elsewhere then
     if outside or asked.pop("group", None) or files_of_the_user():
         return None
-    named = any(str(folder) in one.text for one in study.notices)
     found = {
-        "asked": _asked(folder, **asked) | {"place": str(folder) if named else ""},
+        "asked": _asked(folder, **asked) | {"place": str(folder) if str(folder) in said else ""},
         "tables": loaded.folder.digests,
         "recordings": loaded.recordings.digests,
         "there": there,
@@ -185,17 +187,19 @@ def _asked(
 
 
 def _there(folder: Path) -> dict[str, int] | None:
-    """Return the size of every file of a study, but for what is kept of its analysis.
+    """Return every folder of a study and the size of every file, but for the kept analysis.
 
-    None where a folder is a link: what is in it is not looked through.
+    None where a folder is a link, in which nothing is looked for, and where anything cannot be
+    read: it may be another time, and be as large.
     """
     found = {}
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder)
-        if path.is_symlink() and path.is_dir():
+        if name.parts[0] == ANALYSIS:
+            continue
+        if (path.is_symlink() and path.is_dir()) or not os.access(path, os.R_OK):
             return None
-        if path.is_file() and name.parts[0] != ANALYSIS:
-            found[name.as_posix()] = path.stat().st_size
+        found[name.as_posix()] = path.stat().st_size if path.is_file() else 0
     return found
 
 

@@ -36,7 +36,7 @@ from rigidimeter.analysis.study.reuse import (
     rows_file,
     stored_study,
 )
-from rigidimeter.analysis.study.study import Study
+from rigidimeter.analysis.study.study import Naming, Study
 from rigidimeter.core.errors import UserError, refused
 from rigidimeter.core.files import (
     DICTIONARY,
@@ -105,7 +105,12 @@ def keep(loaded: Loaded, result: StudyResult) -> list[str]:
         before = None
     said: list[str] = []
     edited = _edited(folder, before, results, said)
-    if before is not None:
+    if before is not None and _tells_codes(before, loaded.names):
+        said.append(
+            "the last analysis had other names of the conditions, which may tell what the codes "
+            "are, so what has changed since is not said"
+        )
+    elif before is not None:
         said += _new_inputs(before, inputs)
         old = _object(folder / COMPARISON) if COMPARISON not in edited else None
         if old is not None:
@@ -191,6 +196,11 @@ def _free(folder: Path, name: str) -> str:
     """Return the name, or the first of ``name-2``, ``name-3`` and so on that is not taken."""
     names = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
     return next(each for each in names if not (folder / each).exists())
+
+
+def _tells_codes(before: Mapping[str, Any], names: Naming) -> bool:
+    known = ("", *names.known)
+    return names.blinded and any(before.get(name) not in known for name in ("reference", "other"))
 
 
 def _new_inputs(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:

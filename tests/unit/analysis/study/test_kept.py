@@ -143,6 +143,24 @@ def test_what_is_new_is_named_with_what_it_moved(study: Path, change, first, bes
     assert kept(study, **options) == [UNCHANGED]
 
 
+def coded(folder: Path) -> None:
+    for name in ("sessions.csv", "ratings.csv"):
+        path = folder / name
+        path.write_text(path.read_text().replace(",OFF", ",X7").replace(",DBS", ",X3"))
+
+
+def test_what_has_changed_never_tells_what_codes_are(study: Path) -> None:
+    coded(study)
+    key = study.parent / "key.csv"
+    key.write_text("code,condition\nX7,OFF\nX3,DBS\n")
+    kept(study, key=key)
+    (said,) = kept(study)
+    assert "other names of the conditions" in said
+    assert not [word for word in ("OFF", "DBS", "0.") if word in said]
+    assert kept(study) == [UNCHANGED]
+    assert "reference: X3 → OFF" in kept(study, key=key)
+
+
 def test_no_edit_is_lost_and_each_is_said(study: Path) -> None:
     path = study / "analysis/days.csv"
     written = path.read_text()
@@ -265,8 +283,26 @@ class TestTwice:
         monkeypatch.setattr("rigidimeter.analysis.study.reuse.__version__", "0")
         assert kept_study(study) is None
 
-    def test_nothing_is_kept_of_a_group_nor_with_a_linked_folder(self, study: Path) -> None:
-        (study / "linked").symlink_to(study / "sessions")
+    def test_a_folder_where_a_session_was_missing_ends_it(self, study: Path) -> None:
+        shutil.rmtree(study / "sessions/1-OFF")
+        kept(study)
+        assert kept_study(study) is not None
+        (study / "sessions/1-OFF").mkdir()
+        assert kept_study(study) is None
+
+    @pytest.mark.parametrize("target", ["sessions", "nowhere"])
+    def test_nothing_is_kept_with_a_linked_folder_nor_what_cannot_be_read(
+        self, study: Path, target: str
+    ) -> None:
+        (study / "linked").symlink_to(study / target)
         kept(study)
         assert kept_study(study) is None
         assert not (study / "analysis/rows.parquet").exists()
+
+    def test_a_key_with_an_error_is_named_where_it_is(self, study: Path) -> None:
+        coded(study)
+        for name in ("one", "two"):
+            key = study.parent / f"{name}.csv"
+            key.write_text("code,condition\nX7,OFF\nX3,DBS\nX9,NONE\n")
+            assert kept_study(study, key=key) is None
+            kept(study, key=key)
