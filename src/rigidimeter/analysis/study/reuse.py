@@ -74,10 +74,9 @@ def stored_study(
         SHA-256 of the files of the analysis as they were written, by name.
     """
     analysis = folder / ANALYSIS
-    if files_of_the_user():
-        return None
+    kept = (ROWS, ESTIMATES)
     try:
-        if any(file_digest(analysis / name) != results.get(name) for name in (ROWS, ESTIMATES)):
+        if files_of_the_user() or any(file_digest(analysis / n) != results.get(n) for n in kept):
             return None
         rows, text = read_with_beside(analysis / ROWS)
         found = json.loads(text)
@@ -141,9 +140,9 @@ def rows_file(loaded: Loaded, study: Study) -> bytes | None:
     if not loaded.recordings.sessions:  # it is from there
         return (folder / ANALYSIS / ROWS).read_bytes()
     there = _there(folder)
-    outside = there is None or loaded.recordings.outside
     said = " ".join(one.text for one in study.notices)
-    outside |= asked["key"] is not None and str(asked["key"]) in said  # it may lie elsewhere then
+    # A key that is named in a notice may lie elsewhere the next time.
+    outside = there is None or loaded.recordings.outside or str(asked["key"]) in said
     if outside or asked.pop("group", None) or files_of_the_user():
         return None
     found = {

@@ -16,6 +16,7 @@ import hashlib
 import itertools
 import os
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,7 @@ from rigidimeter.analysis.study.reuse import (
     rows_file,
     stored_study,
 )
-from rigidimeter.analysis.study.study import Naming, Study
+from rigidimeter.analysis.study.study import Study
 from rigidimeter.core.errors import UserError, refused
 from rigidimeter.core.files import (
     DICTIONARY,
@@ -54,6 +55,7 @@ UNCHANGED = "nothing has changed since the last analysis"
 INPUTS = "inputs.json"
 
 _SHOWN = 12
+_PAIR = ("reference", "other")
 _TABLES = ("conclusion", "precision", "comparisons", "days", "effect_differences", "ratings",
            "sensitivity", "excluded_epochs", "left_out", "estimates", "scores")  # fmt: skip
 _COMPARED = ("shift", "p", "r")
@@ -100,16 +102,12 @@ def keep(loaded: Loaded, result: StudyResult) -> list[str]:
     contents |= {name: text_bytes(text) for name, text in texts.items()}
     inputs = _inputs(loaded, result)
     results = {name: hashlib.sha256(content).hexdigest() for name, content in contents.items()}
-    before = _object(folder / INPUTS)
-    if before is not None and not _is_inputs(before):
-        before = None
+    before = _inputs_before(folder)
     said: list[str] = []
     edited = _edited(folder, before, results, said)
-    if before is not None and _tells_codes(before, loaded.names):
-        said.append(
-            "the last analysis had other names of the conditions, which may tell what the codes "
-            "are, so what has changed since is not said"
-        )
+    known = ("", *loaded.names.known)
+    if before and loaded.names.blinded and not all(before.get(n) in known for n in _PAIR):
+        said.append("conditions had other names last time; what has changed might tell the codes")
     elif before is not None:
         said += _new_inputs(before, inputs)
         old = _object(folder / COMPARISON) if COMPARISON not in edited else None
@@ -148,10 +146,8 @@ def kept_study(
     (Loaded, Study) or None
         What is loaded has no recordings; `keep` takes it.
     """
-    before = _object(folder / ANALYSIS / INPUTS)
-    if before is None or not _is_inputs(before):
-        return None
-    return stored_study(folder, **asked, adjust=adjust, results=_results(before))
+    results = _results(_inputs_before(folder / ANALYSIS))
+    return stored_study(folder, **asked, adjust=adjust, results=results)
 
 
 def _inputs(loaded: Loaded, result: StudyResult) -> dict[str, Any]:
@@ -198,22 +194,15 @@ def _free(folder: Path, name: str) -> str:
     return next(each for each in names if not (folder / each).exists())
 
 
-def _tells_codes(before: Mapping[str, Any], names: Naming) -> bool:
-    known = ("", *names.known)
-    return names.blinded and any(before.get(name) not in known for name in ("reference", "other"))
-
-
 def _new_inputs(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
-    for name in ("software", "method", "reference", "other", "seed", "resamples"):
+    for name in ("software", "method", *_PAIR, "seed", "resamples"):
         if before.get(name) != now[name]:
             yield f"{name}: {before.get(name)} → {now[name]}"
     old, new = dict(_leaves(with_new_names(before["settings"]))), dict(_leaves(now["settings"]))
     for name in dict.fromkeys([*old, *new]):
         if old.get(name) != new.get(name):
             yield f"setting {name}: {old.get(name)} → {new.get(name)}"
-    files = before.get("files")
-    old = dict(files) if isinstance(files, dict) else {}
-    new = now["files"]
+    old, new = before["files"], now["files"]
     for what, names in (
         ("new", [name for name in new if name not in old]),
         ("gone", [name for name in old if name not in new]),
@@ -306,11 +295,9 @@ def _write(folder: Path, contents: Mapping[str, bytes], edited: Mapping[str, str
 
 def _write_new(path: Path, content: bytes) -> None:
     """Write a file unless it holds these bytes already."""
-    try:
+    with suppress(OSError):  # writing says what is wrong
         if path.is_file() and path.read_bytes() == content:
             return
-    except OSError:
-        pass  # writing says what is wrong
     with refused(path, "cannot be written"):
         replace_file(path, content)
 
@@ -327,10 +314,12 @@ def _results(before: Mapping[str, Any] | None) -> dict[str, str]:
     }
 
 
-def _is_inputs(found: Mapping[str, Any]) -> bool:
-    """Whether a document is of the form of `_inputs`."""
+def _inputs_before(folder: Path) -> dict[str, Any] | None:
+    """Return what `_inputs` was last time; None where there is nothing of its form."""
+    found = _object(folder / INPUTS) or {}
     tables = (found.get(name) for name in ("settings", "files"))
-    return found.get("schema") == INPUTS_SCHEMA and all(isinstance(t, dict) for t in tables)
+    valid = found.get("schema") == INPUTS_SCHEMA and all(isinstance(t, dict) for t in tables)
+    return found if valid else None
 
 
 def _object(path: Path) -> dict[str, Any] | None:
