@@ -123,8 +123,9 @@ def load_study(
     UserError
         If there is nothing to analyse, or an option names what does not exist.
     """
-    options: dict[str, Any] = {"key": key, "settings": settings, "method": method}
-    again = partial(load_study, folder, **options, pair=pair, group=group)
+    options: dict[str, Any] = {"settings": settings, "method": method, "pair": pair, "group": group}
+    # Wherever the working folder is then.
+    again = partial(load_study, folder.absolute(), key=key and key.absolute(), **options)
     read = read_study_folder(folder, key)
     if group is not None:
         read = _of_group(read, group)

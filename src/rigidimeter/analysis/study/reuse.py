@@ -140,9 +140,9 @@ def rows_file(loaded: Loaded, study: Study) -> bytes | None:
     if not loaded.recordings.sessions:  # it is from there
         return (folder / ANALYSIS / ROWS).read_bytes()
     there = _there(folder)
-    said = " ".join(one.text for one in study.notices)
+    said, key = " ".join(one.text for one in study.notices), str(loaded.folder.files.get("key"))
     # A key that is named in a notice may lie elsewhere the next time.
-    outside = there is None or loaded.recordings.outside or str(asked["key"]) in said
+    outside = there is None or loaded.recordings.outside or key in said
     if outside or asked.pop("group", None) or files_of_the_user():
         return None
     found = {

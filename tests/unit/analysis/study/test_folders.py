@@ -296,6 +296,15 @@ def test_names_behind_codes_change_no_number(study: Path) -> None:
         assert found.study.blinded is (not options)
 
 
+def test_a_folder_is_read_again_from_wherever_the_program_works_then(study: Path, monkeypatch):
+    coded(study)
+    (study.parent / "elsewhere.csv").write_text("code,condition\nQ,OFF\nZ,DBS\n")
+    monkeypatch.chdir(study.parent)
+    found = analysed(Path(study.name), key=Path("elsewhere.csv"))
+    monkeypatch.chdir("/")
+    assert found.study.folder_read().recordings.digests.items() <= found.study.digests.items()
+
+
 def test_subjects_are_the_units_where_each_has_both_conditions(study: Path) -> None:
     subjects(3)(study)
     found = analysed(study)
