@@ -36,8 +36,8 @@ best instrument of a jump is smooth where the caused velocity is not quite the t
 FIR_LAGS_S, FIR_SPACING_S = np.arange(0.04, 0.441, 0.02), 0.02
 """Of triangles that overlap. Before 40 ms no stretch reflex can act."""
 
-SHIFTS = 3
-"""Other times at which the perturbation might have come."""
+SHIFTS = np.arange(1, 14) * (np.sqrt(5) - 1) / 2 % 1
+"""Other times, in epochs: few are whole periods of a perturbation, however often it repeats."""
 
 FINELY, MEMORY_S = 4, 2.0
 """Samples for a coarse one, where a function jumps or bends; the past that a reflex answers."""
@@ -173,8 +173,8 @@ class Term(NamedTuple):
             return self.columns(motion, inner)
         caused, n = np.stack([motion.velocity, motion.angle]), motion.angle.size
         at_times = []
-        for k in range(SHIFTS + 1):
-            velocity, angle = motion.beside + np.roll(caused, k * n // (SHIFTS + 1), axis=1)
+        for shift in (0.0, *SHIFTS):
+            velocity, angle = motion.beside + np.roll(caused, round(shift * n), axis=1)
             at_times.append(self.columns(motion._replace(velocity=velocity, angle=angle), inner))
         return np.asarray(at_times[0] - np.mean(at_times[1:], axis=0))
 
