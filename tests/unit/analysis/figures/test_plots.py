@@ -29,6 +29,7 @@ UNIT = {"J": "(10⁻³ kg·m²)", "B": "(N·m·s/rad)", "K": "(N·m/rad)"}
 @pytest.fixture(autouse=True)
 def _no_trace() -> Iterator[None]:
     """Hold the global state of matplotlib against what it was; close what notebooks would show."""
+    plt.close("all")  # what a notebook or an example of the documents has left
     before = dict(mpl.rcParams)
     yield
     plt.close("all")
