@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from rigidimeter.analysis.estimation import chance, prepare
+from rigidimeter.analysis.estimation import TERMS, Motion, chance, prepare
 from rigidimeter.core.records import Channel, Epoch
 from rigidimeter.core.settings import parse_settings
 from rigidimeter.model import Loop
@@ -87,3 +87,28 @@ def test_signs_alone_do_not_reach_a_small_p_too_often() -> None:
     sizes = np.exp(rng.normal(0.0, 2.0, (60, 3)))
     p = [chance(sizes * rng.choice([-1.0, 1.0], 60)[:, None]) for _ in range(400)]
     assert all(np.mean(np.array(p) < level) <= level for level in (0.3, 0.1, 0.01))
+
+
+def test_the_instrument_of_a_square_is_that_of_the_page() -> None:
+    """Of x², with c caused and u the rest: c² − mean c'² + 2 u (c − mean c')."""
+    time_s = np.arange(8000) / 500
+    rng = np.random.default_rng(2)
+    both = {
+        name: Channel(name, time_s, rng.standard_normal(8000))
+        for name in ("torque_nm", "angle_rad")
+    }
+    ready = prepare([Epoch("made", "1", both, task="prbs")], parse_settings({}))
+    grid = ready.observed[0].grid
+    count = grid.coarse_window.shape[1]
+    c, u = rng.standard_normal((2, count))
+    lines = np.zeros((grid.line.size, 3), dtype=complex)
+    still = np.zeros(count)
+    caused = Motion(grid, still, c, lines, lines, J_B_K, measured=False)
+    beside = caused._replace(beside=np.stack([still, u]))
+    (term,) = (one for one in TERMS if one.name == "stiffness by angle")
+    squares = term.seen(beside, np.zeros((1, 0)))[0]
+    others = [np.roll(c, round(k * (np.sqrt(5) - 1) / 2 % 1 * count)) for k in range(1, 14)]
+    less = [np.mean(each, axis=0) for each in (others, np.square(others))]
+    made = grid.coarse_lines(c**2 - less[1] + 2 * u * (c - less[0]))
+    assert squares == pytest.approx(made, abs=1e-9 * np.max(np.abs(made)))
+    assert term.seen(caused, np.zeros((1, 0)))[0] == pytest.approx(grid.coarse_lines(c**2))

@@ -37,7 +37,7 @@ FIR_LAGS_S, FIR_SPACING_S = np.arange(0.04, 0.441, 0.02), 0.02
 """Of triangles that overlap. Before 40 ms no stretch reflex can act."""
 
 SHIFTS = np.arange(1, 14) * (np.sqrt(5) - 1) / 2 % 1
-"""Other times, in epochs: few are whole periods of a perturbation, however often it repeats."""
+"""Other times, as shares of the epoch: no multiples of the period of what repeats in it."""
 
 FINELY, MEMORY_S = 4, 2.0
 """Samples for a coarse one, where a function jumps or bends; the past that a reflex answers."""

@@ -16,6 +16,7 @@ from rigidimeter.analysis.study import (
     StudyResult,
     analysis_study,
     conclude_study,
+    condition_names,
     prepare_study,
 )
 from rigidimeter.analysis.traces import ChannelFacts, Prepared, channel_facts, prepared_epochs
@@ -139,9 +140,4 @@ class Shown:
     @property
     def condition_names(self) -> tuple[str, ...]:
         """The conditions of the result, and those of epochs from which nothing was estimated."""
-        study = self.study
-        order = [each.name for each in study.conditions]
-        order = order or [block.condition for block in study.settings.protocol.blocks]
-        recorded = [epoch.condition for epoch in self.epochs]
-        names = dict.fromkeys([*filter(None, study.pair), *recorded, *self.result.condition_names])
-        return tuple(sorted(names, key=lambda n: order.index(n) if n in order else len(order)))
+        return condition_names(self.study, [epoch.condition for epoch in self.epochs])

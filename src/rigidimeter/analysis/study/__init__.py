@@ -32,6 +32,7 @@ from rigidimeter.analysis.study.document import (
     columns_of_rows,
     comparison_document,
     conclusion_rows,
+    condition_names,
     result_table,
     table_csv,
 )

@@ -177,12 +177,15 @@ def _by_days(result: StudyResult) -> dict[tuple[Measure, str], dict[str, Any]]:
     return found
 
 
-def condition_names(study: Study) -> tuple[str, ...]:
-    """Return all conditions in the order of the study or the protocol, then as recorded."""
+def condition_names(study: Study, recorded: Iterable[str] = ()) -> tuple[str, ...]:
+    """Return all conditions in the order of the study or the protocol, then as recorded.
+
+    `recorded` are those of epochs of which the rows may hold nothing.
+    """
     order = [each.name for each in study.conditions]
     order = order or [block.condition for block in study.settings.protocol.blocks]
     of_epochs = study.rows[study.rows["scope"] != "all"]  # that of all epochs has no condition
-    names = dict.fromkeys([*filter(None, study.pair), *map(str, of_epochs["condition"].unique())])
+    names = dict.fromkeys([*filter(None, study.pair), *recorded, *of_epochs["condition"].unique()])
     return tuple(sorted(names, key=lambda n: order.index(n) if n in order else len(order)))
 
 

@@ -107,7 +107,7 @@ def keep(loaded: Loaded, result: StudyResult) -> list[str]:
     edited = _edited(folder, before, results, said)
     known = ("", *loaded.names.known)
     if before and loaded.names.blinded and not all(before.get(n) in known for n in _PAIR):
-        said.append("conditions had other names last time; what has changed might tell the codes")
+        said.append("condition names differ from last time; listing changes could reveal the codes")
     elif before is not None:
         said += _new_inputs(before, inputs)
         old = _object(folder / COMPARISON) if COMPARISON not in edited else None

@@ -155,7 +155,7 @@ def test_what_has_changed_never_tells_what_codes_are(study: Path) -> None:
     key.write_text("code,condition\nX7,OFF\nX3,DBS\n")
     kept(study, key=key)
     (said,) = kept(study)
-    assert said.startswith("conditions had other names last time")
+    assert said.startswith("condition names differ from last time")
     assert not [word for word in ("OFF", "DBS", "0.") if word in said]
     assert kept(study) == [UNCHANGED]
     assert "reference: X3 → OFF" in kept(study, key=key)

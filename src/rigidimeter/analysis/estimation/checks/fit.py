@@ -113,7 +113,7 @@ LATE = 0.1
 On rigs of 200 to 1000 ticks/s it was .34 to .50 late with velocity PI drives, with drives of second
 order at most .06 where these take less than 2 % off J."""
 
-FEWEST_TICKS = 1000
+FEWEST_TICKS = 1000  # from fewer the gain in one tick is not known well enough
 AT_ONCE, ERRORS, SHORT = (0.75, 1.25), 2.0, 0.5
 """What is gained in the first tick after a step of a motor's torque, over what is gained in the
 fourth (`EACH`), is above the first by so many standard errors, and not above the second. Measured
